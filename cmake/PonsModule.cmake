@@ -1,0 +1,54 @@
+include(GoogleTest)
+
+add_library(pons_flags INTERFACE)
+target_compile_features(pons_flags INTERFACE cxx_std_23)
+# -ffp-contract=off: the same seed gives the same bytes whatever the compiler fuses.
+target_compile_options(pons_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion
+  -Wnon-virtual-dtor -Woverloaded-virtual -Werror -ffp-contract=off
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-maybe-uninitialized>)
+target_include_directories(pons_flags INTERFACE "${PROJECT_SOURCE_DIR}" "${PROJECT_BINARY_DIR}/generated")
+
+# pons_module(NAME [SOURCES ...] [TESTS ...] [USES modules ...] [LIBRARIES external targets ...] [TEST_LIBRARIES ...])
+#
+# Declares the folder it is called in as module NAME: a static library pons::NAME (an interface one without SOURCES) and,
+# with TESTS, one test program. USES may only name modules that cmake/Layers.cmake allows.
+function(pons_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;TESTS;USES;LIBRARIES;TEST_LIBRARIES" ${ARGN})
+  if(ARG_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "pons_module(${name}): unknown arguments ${ARG_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT DEFINED PONS_MAY_USE_${name})
+    message(FATAL_ERROR "pons_module(${name}): not in cmake/Layers.cmake; add it there and to docs/architecture.md")
+  endif()
+  foreach(used IN LISTS ARG_USES)
+    if(NOT used IN_LIST PONS_MAY_USE_${name})
+      message(FATAL_ERROR "pons/${name} may not use pons/${used}: cmake/Layers.cmake allows '${PONS_MAY_USE_${name}}'")
+    endif()
+  endforeach()
+  list(TRANSFORM ARG_USES PREPEND "pons::" OUTPUT_VARIABLE uses)
+
+  if(ARG_SOURCES)
+    add_library(pons_${name} STATIC ${ARG_SOURCES})
+    target_link_libraries(pons_${name} PUBLIC pons_flags ${uses} ${ARG_LIBRARIES})
+  else()
+    add_library(pons_${name} INTERFACE)
+    target_link_libraries(pons_${name} INTERFACE pons_flags ${uses} ${ARG_LIBRARIES})
+  endif()
+  add_library(pons::${name} ALIAS pons_${name})
+
+  if(ARG_TESTS)
+    pons_test(${name}_test SOURCES ${ARG_TESTS} LIBRARIES pons::${name} ${ARG_TEST_LIBRARIES})
+  endif()
+endfunction()
+
+# pons_test(NAME SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, its cases known to ctest.
+function(pons_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE pons_flags ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}"
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

@@ -1,0 +1,56 @@
+// The contract every robot satisfies, simulated or real. The cerebellum talks to this and to nothing lower.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "pons/core/axes.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/image.hpp"
+#include "pons/core/realtime.hpp"
+#include "pons/core/time.hpp"
+
+namespace pons::body {
+
+// What the robot measures. Fixed size.
+struct Sensors {
+  Time stamp;
+  AxisVector position;                        // rad
+  AxisVector speed;                           // rad/s
+  std::array<double, 3> wrist_force_n{};      // at the flange, flange frame: what the tool and load exert on the arm
+  std::array<double, 3> wrist_torque_nm{};    // likewise
+  std::array<double, kMaxCups> cup_vacuum_kpa{};  // below ambient; 0 = open, about 60 = sealed
+  double belt_travel_m = 0;                   // encoder: how far the belt has run since the start
+  double belt_speed_m_s = 0;                  // encoder
+  bool photo_eye_blocked = false;             // at the belt's entry
+  bool stop_input = false;                    // the body's own stop button or safety chain
+};
+
+// What the robot is told. Fixed size.
+struct SetPoints {
+  AxisVector torque_nm;                 // one an axis
+  std::uint32_t vacuum_on = 0;          // bit i = cup i
+  bool power = false;                   // false: drives off, brakes on, whatever the torque says
+};
+
+// A robot. One thread calls read and write, in turn, once a tick.
+class Body {
+ public:
+  virtual ~Body() = default;
+  // The newest measurement. Never blocks.
+  virtual void read(Sensors& sensors) PONS_NONBLOCKING = 0;
+  // In force until the next write. Never blocks.
+  virtual void write(const SetPoints& set_points) PONS_NONBLOCKING = 0;
+};
+
+// A camera: begin() opens the shutter, finish() waits for the picture. begin is called by whoever advances the body;
+// finish may be called by another thread. At most one frame is under way.
+class Camera {
+ public:
+  virtual ~Camera() = default;
+  [[nodiscard]] virtual const Intrinsics& intrinsics() const = 0;
+  virtual void begin(Time now) = 0;
+  [[nodiscard]] virtual Expected<void> finish(RgbdFrame& frame) = 0;
+};
+
+}  // namespace pons::body

@@ -1,0 +1,30 @@
+// Something perceived: a value with a frame, a time stamp and an uncertainty. Never the truth.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "pons/core/pose.hpp"
+#include "pons/core/time.hpp"
+
+namespace pons {
+
+// A loose object on a surface. Its frame sits in the middle of the top face, z up, x along the longer side.
+struct ObjectBelief {
+  std::uint32_t track = 0;  // stays with the object while it is tracked; never used again
+  Time stamp;               // when the pose held
+  Pose world_from_top = Pose::Identity();
+  Vector3 velocity_m_s = Vector3::Zero();  // of that pose, world frame (what carries it, moves it)
+  Vector3 size_m = Vector3::Zero();        // along its x, along its y, height above what carries it
+  double position_sigma_m = 0;             // 1 σ, each axis
+  double yaw_sigma_rad = 0;                // 1 σ
+  double confidence = 0;                   // 0..1: seen how often, how consistently
+  double flatness_m = 0;                   // RMS distance of the top's points from their plane
+  int frames_seen = 0;
+  Time last_seen;            // when a camera last saw it (stamp may be predicted further)
+  bool crowded = false;      // touches, overlaps or leans on a neighbour
+  std::string code;          // label text, empty until read
+  int label_attempts = 0;    // frames good enough to read a label on it, readable or not
+};
+
+}  // namespace pons

@@ -1,0 +1,64 @@
+// A robot's kinematics and dynamics by Pinocchio, from its URDF: the controller's own model, not the simulator's.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "pons/core/axes.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/pose.hpp"
+#include "pons/core/realtime.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::model {
+
+using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, static_cast<int>(kMaxAxes)>;
+
+// What the tool carries, as a point mass rigid to the flange.
+struct Payload {
+  double mass_kg = 0;
+  std::array<double, 3> com_m{};  // flange frame
+};
+
+// A capsule placed in the world.
+struct PlacedCapsule {
+  Vector3 from, to;  // m, world frame
+  double radius_m;
+};
+
+// Holds Pinocchio's model and a scratch pad of its own, so one object serves one thread; copy() for another.
+class RobotModel {
+ public:
+  // Errors: no file, broken URDF, flange link missing, more than kMaxAxes axes, limits of another length.
+  [[nodiscard]] static Expected<RobotModel> load(const world::Robot& robot);
+  RobotModel(RobotModel&&) noexcept;
+  RobotModel& operator=(RobotModel&&) noexcept;
+  ~RobotModel();
+  [[nodiscard]] RobotModel copy() const;
+
+  [[nodiscard]] int axes() const;
+  [[nodiscard]] const world::Robot& robot() const;
+
+  // Forward kinematics of the tool tip. q in rad.
+  [[nodiscard]] Pose world_from_tip(const AxisVector& q);
+  // d(tip)/dq: linear rows first (m/rad), then angular, both along world axes, at the tip.
+  [[nodiscard]] Jacobian tip_jacobian(const AxisVector& q);
+  // The solution of the seed's branch nearest to the seed, inside position limits (turns of 2π considered); damped
+  // Gauss-Newton. Error when none is found to 1e-6 m and 1e-6 rad.
+  [[nodiscard]] Expected<AxisVector> inverse(const Pose& world_from_tip, const AxisVector& seed);
+  // The robot's self-filter capsules, tool included, at q.
+  void place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules);
+
+  // Torques (N·m) for the asked acceleration at (q, speed), tool and payload included: recursive Newton-Euler.
+  void inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration, const Payload& payload,
+                        AxisVector& torque_nm) PONS_NONBLOCKING;
+
+ private:
+  struct Impl;
+  explicit RobotModel(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pons::model

@@ -1,0 +1,50 @@
+// From where the arm is to where it shall be, jerk-limited and as fast as the limits allow.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "pons/core/axes.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/segment.hpp"
+
+namespace pons::motion {
+
+using Trajectory = std::vector<Segment>;  // contiguous in time; position, speed, acceleration continuous
+
+// Where a motion ends, or passes: acceleration there is zero at the end, free at a via point.
+struct Waypoint {
+  AxisVector position;
+  AxisVector speed;
+};
+
+// Point to point, all axes arriving together, each within `limits`. Any start inside the limits. Time-optimal for the
+// slowest axis. Errors: start or end outside the limits, not finite, no profile.
+[[nodiscard]] Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits);
+
+// Through `vias` (positions only; speeds there are chosen to keep the whole short) to `end`.
+[[nodiscard]] Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<const AxisVector> vias,
+                                                const Waypoint& end, const AxisLimits& limits);
+
+// To standstill as soon as the limits allow, axes together.
+[[nodiscard]] Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& limits);
+
+// Follows path(t), t seconds from `at`, for `duration_s`: fits quintics through samples every `knot_s`, checks every limit.
+// The path must start at `start` (position, speed and acceleration within tolerances stated in the source).
+[[nodiscard]] Expected<Trajectory> follow(const AxisState& start, Time at,
+                                          const std::function<Expected<AxisVector>(double)>& path, double duration_s,
+                                          double knot_s, const AxisLimits& limits);
+
+// How far the worst axis goes beyond its limit: 1 = exactly at it. Position counts as 0 inside and 2 outside.
+struct LimitUse {
+  double speed = 0, acceleration = 0, jerk = 0;
+  bool inside_position = true;
+  [[nodiscard]] double worst() const;
+};
+[[nodiscard]] LimitUse limit_use(std::span<const Segment> trajectory, const AxisLimits& limits);
+
+// The motion at `time`: before the first segment its start, after the last its end with zero acceleration.
+[[nodiscard]] AxisState sample(std::span<const Segment> trajectory, Time time, Eigen::Index axes);
+
+}  // namespace pons::motion

@@ -1,0 +1,44 @@
+// Frames to beliefs: what lies on the belt, where, how large, with what label; what fell into the tray. Never in the loop.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/core/image.hpp"
+#include "pons/model/robot_model.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::perception {
+
+// What the robot and belt measured when the frame's shutter was open.
+struct Moment {
+  AxisVector joint_position;  // rad
+  double belt_travel_m = 0;
+};
+
+// Deterministic; one thread. `world` must outlive it.
+class Perception {
+ public:
+  Perception(const world::World& world, model::RobotModel model);
+  ~Perception();
+
+  // Takes in one frame (in the order of their stamps). Frames of a camera that watches the belt update tracks; those of a
+  // camera that watches a place update occupancy().
+  void process(const RgbdFrame& frame, const Moment& moment);
+
+  // Every live track, predicted to `now` by the belt's travel. Ordered by track.
+  [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
+
+  // The arm took this one (or it fell): stop predicting it with the belt.
+  void forget(std::uint32_t track);
+
+  // How many separate things lie in a watched place (the tray), as last seen.
+  [[nodiscard]] int occupancy(std::string_view place) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pons::perception

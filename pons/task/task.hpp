@@ -1,0 +1,42 @@
+// What a task and an outcome are. Pure data.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
+
+namespace pons::task {
+
+using Json = nlohmann::json;
+
+// One step: a skill by name and the arguments its schema describes.
+struct Step {
+  std::string skill;
+  Json arguments = Json::object();
+};
+
+// What a brain asks for: {"id":"P000123","priority":50,"deadline_s":12.5,"steps":[{"skill":"pick","object":"P000123"},…]}
+struct Task {
+  std::string id;                    // 1–64 of A–Z a–z 0–9 - _ . :
+  int priority = 50;                 // 0 … 100, higher first
+  std::optional<Time> deadline;      // of no use afterwards; among equal priorities the earlier goes first
+  std::vector<Step> steps;           // run in order
+};
+
+// Exactly one a task.
+enum class Outcome : std::uint8_t { kSucceeded, kFailed, kCancelled, kException };
+
+[[nodiscard]] std::string_view name(Outcome outcome);
+[[nodiscard]] Expected<Outcome> outcome_from(std::string_view name);
+
+[[nodiscard]] Json to_json(const Task& task);
+// Shape and ranges only; which skills exist and what they take, the bridge's review knows.
+[[nodiscard]] Expected<Task> task_from(const Json& json);
+
+}  // namespace pons::task
