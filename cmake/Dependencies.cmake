@@ -26,7 +26,8 @@ set(lib "${PONS_PREFIX}/lib")
 foreach(name pinocchio_default pinocchio_parsers pinocchio_collision coal urdfdom_model tinyxml2)
   pons_wheel_library(${name} "${lib}/lib${name}.so")
 endforeach()
-target_include_directories(pons_ext_pinocchio_default SYSTEM INTERFACE "${PONS_PREFIX}/include")
+target_include_directories(pons_ext_pinocchio_default SYSTEM INTERFACE "${PONS_PREFIX}/include"
+  "${PONS_PREFIX}/include/urdfdom_headers")
 target_compile_definitions(pons_ext_pinocchio_default INTERFACE
   BOOST_MPL_LIMIT_LIST_SIZE=30 BOOST_MPL_LIMIT_VECTOR_SIZE=30 BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS
   BOOST_FUSION_INVOKE_MAX_ARITY=12 PINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION PINOCCHIO_WITH_COLLISION
@@ -58,18 +59,16 @@ add_library(pons_opencv INTERFACE)
 target_include_directories(pons_opencv SYSTEM INTERFACE /usr/include/opencv4)
 target_link_libraries(pons_opencv INTERFACE opencv_core opencv_imgproc)
 add_library(ext::opencv ALIAS pons_opencv)
-add_library(pons_opencv_io INTERFACE)
-target_link_libraries(pons_opencv_io INTERFACE pons_opencv opencv_imgcodecs)
-add_library(ext::opencv_io ALIAS pons_opencv_io)
-
 find_package(yaml-cpp REQUIRED)
 add_library(ext::yaml ALIAS yaml-cpp)
 find_package(nlohmann_json REQUIRED)
-add_library(ext::json ALIAS nlohmann_json)
+add_library(ext::json ALIAS nlohmann_json::nlohmann_json)
 find_package(fmt REQUIRED)
-add_library(ext::fmt ALIAS fmt)
+add_library(ext::fmt ALIAS fmt::fmt)
 find_package(spdlog REQUIRED)
+add_library(ext::spdlog ALIAS spdlog::spdlog)
 find_package(CLI11 REQUIRED)
+add_library(ext::cli11 ALIAS CLI11::CLI11)
 
 add_library(pons_egl INTERFACE)
 target_link_libraries(pons_egl INTERFACE EGL)

@@ -20,3 +20,5 @@ set(PONS_MAY_USE_gate wire task link model world rt core)
 set(PONS_MAY_USE_runner bridge cerebellum perception brain record body
     task link world motion model rt wire core)
 set(PONS_MAY_USE_referee sim bridge core)
+# Of a module it may use, the only headers (by prefix) that a module may include; tools/check_layers enforces it.
+set(PONS_ONLY_referee pons/sim/truth.hpp pons/bridge/journal/)

@@ -1,4 +1,6 @@
-include(GoogleTest)
+if(PONS_BUILD_TESTS)
+  include(GoogleTest)
+endif()
 
 add_library(pons_flags INTERFACE)
 target_compile_features(pons_flags INTERFACE cxx_std_23)
@@ -42,7 +44,11 @@ function(pons_module name)
 endfunction()
 
 # pons_test(NAME SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, its cases known to ctest.
+# Without PONS_BUILD_TESTS it does nothing.
 function(pons_test name)
+  if(NOT PONS_BUILD_TESTS)
+    return()
+  endif()
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)

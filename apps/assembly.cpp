@@ -1,0 +1,69 @@
+#include "apps/assembly.hpp"
+
+#include <utility>
+
+namespace pons::apps {
+namespace {
+
+// What a warehouse system would know in the morning: which code goes where, and how urgently. Not what a parcel weighs.
+brain::Orders orders_of(const world::Manifest& manifest) {
+  brain::Orders orders;
+  for (const world::ManifestRow& row : manifest) orders[row.parcel_id] = {row.destination, row.priority};
+  return orders;
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
+                                                    const AssemblyOptions& options) {
+  std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
+  auto model = model::RobotModel::load(self->world.robot);
+  if (!model) return std::unexpected(model.error());
+  auto simulation = sim::Simulation::create(self->world, manifest, options.seed);
+  if (!simulation) return std::unexpected(simulation.error());
+  self->simulation = std::move(*simulation);
+  auto journal = bridge::Journal::open(options.journal);
+  if (!journal) return std::unexpected(journal.error());
+  self->journal = std::move(*journal);
+
+  self->bridge_end = std::make_unique<link::BridgeEnd>(self->link.bridge_end());
+  self->cerebellum_end = std::make_unique<link::CerebellumEnd>(self->link.cerebellum_end());
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{});
+  self->perception = std::make_unique<perception::Perception>(self->world, model->copy());
+  self->cell = std::make_unique<skills::Cell>(*self->bridge_end, self->world, std::move(*model));
+  skills::add_skills(self->registry, *self->cell);
+  self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
+  self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);
+
+  if (options.socket) {
+    auto socket = gate::LocalSocket::listen(*options.socket);
+    if (!socket) return std::unexpected(socket.error());
+    self->desk = std::make_unique<Desk>(std::move(*socket), *self->bridge, *self->journal);
+  }
+  self->crew = std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
+  std::function<void(Time)> visitors;
+  if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), visitors);
+  return self;
+}
+
+runner::SkillPort Assembly::skill_port() {
+  return {.refresh = [this](Time now, std::vector<ObjectBelief> objects) { cell->refresh(now, std::move(objects)); },
+          .state = [this]() -> const link::State& { return cell->arm.state(); },
+          .take_forgotten = [this] { return cell->take_forgotten(); },
+          .arm = [this](Time now) { cell->arm.arm(now); }};
+}
+
+runner::Parts Assembly::parts() {
+  return {.plant = {.body = &simulation->body(),
+                    .cameras = simulation->cameras(),
+                    .advance = [this](Time now) { simulation->advance_to(now); },
+                    .finished = [this] { return simulation->finished(); },
+                    .health = [this] { return simulation->health(); }},
+          .cerebellum = cerebellum.get(),
+          .link = cerebellum_end.get(),
+          .bridge_side = bridge_side.get(),
+          .crew = crew.get()};
+}
+
+}  // namespace pons::apps

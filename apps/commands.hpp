@@ -1,0 +1,29 @@
+// The subcommands of `pons`. Each adds itself to the parser; what a person chose runs after parsing.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "pons/core/error.hpp"
+
+namespace pons::apps {
+
+inline constexpr int kExitGood = 0;
+inline constexpr int kExitBadRun = 1;    // parcels lost or missorted, a limit broken, a part failed
+inline constexpr int kExitBadInput = 2;  // what was asked cannot be done: one line says why
+inline constexpr int kExitInterrupted = 130;
+
+using Chosen = std::function<int()>;  // returns the exit code
+
+void add_run(CLI::App& app, Chosen& chosen);
+void add_worlds(CLI::App& app, Chosen& chosen);
+void add_skills(CLI::App& app, Chosen& chosen);
+void add_task(CLI::App& app, Chosen& chosen);
+void add_doctor(CLI::App& app, Chosen& chosen);
+void add_completion(CLI::App& app, Chosen& chosen);
+
+// Prints "pons: <line>" on the error stream.
+int bad_input(const Error& error);
+int bad_run(const Error& error);
+
+}  // namespace pons::apps

@@ -1,0 +1,111 @@
+// pons worlds, pons skills, pons completion: what there is.
+
+#include <fmt/format.h>
+
+#include "apps/commands.hpp"
+#include "apps/paths.hpp"
+#include "pons/link/link.hpp"
+#include "pons/model/robot_model.hpp"
+#include "pons/skills/skills.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::apps {
+namespace {
+
+int worlds() {
+  const auto folder = worlds_folder();
+  const std::vector<std::string> names = world::list(folder);
+  if (names.empty()) return bad_input({"no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds"});
+  int code = kExitGood;
+  for (const std::string& name : names) {
+    const auto world = world::load(folder, name);
+    if (!world) {
+      fmt::print("{:<14} broken: {}\n", name, world.error().line());
+      code = kExitBadInput;
+      continue;
+    }
+    std::size_t chutes = 0;
+    for (const world::Place& place : world->places) chutes += place.kind == world::PlaceKind::kChute ? 1 : 0;
+    fmt::print("{:<14} {} ({} axes), {} chutes, {} cameras\n", name, world->robot.name, world->robot.home.size(), chutes,
+               world->cameras.size());
+  }
+  return code;
+}
+
+// Skills are made for a cell; any world will do to ask them for their names.
+int skills(const std::string& name) {
+  const auto folder = worlds_folder();
+  const std::vector<std::string> names = world::list(folder);
+  if (names.empty()) return bad_input({"no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds"});
+  const auto world = world::load(folder, names.front());
+  if (!world) return bad_input(world.error());
+  auto model = model::RobotModel::load(world->robot);
+  if (!model) return bad_input(model.error());
+  link::Link link;
+  link::BridgeEnd end = link.bridge_end();
+  skills::Cell cell(end, *world, std::move(*model));
+  task::SkillRegistry registry;
+  skills::add_skills(registry, cell);
+  if (name.empty()) {
+    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<10} {}\n", skill_name, type.summary);
+    return kExitGood;
+  }
+  const task::SkillType* type = registry.find(name);
+  if (type == nullptr) return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
+  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\narguments:\n{}\n", type->name, type->summary,
+             type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")), to_s(type->timeout),
+             type->attempts, type->schema.dump(2));
+  return kExitGood;
+}
+
+constexpr const char* kBash = R"(_pons() {
+  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}
+  case $before in
+    --manifest|--journal|--report|--picture|--socket) COMPREPLY=($(compgen -f -- "$current")); return ;;
+  esac
+  if [ "$COMP_CWORD" -eq 1 ]; then
+    COMPREPLY=($(compgen -W "run worlds skills task doctor completion --help --version" -- "$current"))
+  elif [ "$command" = run ] && [ "$COMP_CWORD" -eq 2 ]; then
+    COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current"))
+  elif [ "$command" = run ]; then
+    COMPREPLY=($(compgen -W "--parcels --manifest --seed --lockstep --realtime --journal --report --picture --socket --explain --quiet --help" -- "$current"))
+  elif [ "$command" = skills ]; then
+    COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1) --help" -- "$current"))
+  elif [ "$command" = task ] && [ "$COMP_CWORD" -eq 2 ]; then
+    COMPREPLY=($(compgen -W "submit list show --help" -- "$current"))
+  elif [ "$command" = task ]; then
+    COMPREPLY=($(compgen -f -W "--socket --journal --help" -- "$current"))
+  elif [ "$command" = completion ]; then
+    COMPREPLY=($(compgen -W "bash zsh" -- "$current"))
+  fi
+}
+complete -F _pons pons
+)";
+
+}  // namespace
+
+void add_worlds(CLI::App& app, Chosen& chosen) {
+  app.add_subcommand("worlds", "List the worlds")->callback([&chosen] { chosen = worlds; });
+}
+
+void add_skills(CLI::App& app, Chosen& chosen) {
+  auto name = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("skills", "List the skills, or describe one");
+  command->add_option("skill", *name, "Describe this one: its arguments, timeout, resources");
+  command->callback([name, &chosen] { chosen = [name] { return skills(*name); }; });
+}
+
+void add_completion(CLI::App& app, Chosen& chosen) {
+  auto shell = std::make_shared<std::string>("bash");
+  CLI::App* command = app.add_subcommand("completion", "Print shell completion: eval \"$(pons completion bash)\"");
+  command->add_option("shell", *shell, "bash or zsh")->check(CLI::IsMember({"bash", "zsh"}));
+  command->callback([shell, &chosen] {
+    chosen = [shell] {
+      if (*shell == "zsh") fmt::print("autoload -U +X bashcompinit && bashcompinit\n");
+      fmt::print("{}", kBash);
+      return kExitGood;
+    };
+  });
+}
+
+}  // namespace pons::apps

@@ -1,0 +1,47 @@
+// The command line: composes, parses, and runs what was chosen.
+
+#include <cstdio>
+#include <fmt/format.h>
+
+#include "apps/commands.hpp"
+
+namespace pons::apps {
+
+int bad_input(const Error& error) {
+  fmt::print(stderr, "pons: {}\n", error.line());
+  return kExitBadInput;
+}
+
+int bad_run(const Error& error) {
+  fmt::print(stderr, "pons: {}\n", error.line());
+  return kExitBadRun;
+}
+
+}  // namespace pons::apps
+
+int main(int argc, char** argv) {
+  using namespace pons::apps;
+  CLI::App app{"Pons: the bridge between a robot's brain and its body.", "pons"};
+  app.set_version_flag("--version", PONS_VERSION);
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::help);
+  app.footer("Start with: pons run parcel_cell");
+  Chosen chosen;
+  add_run(app, chosen);
+  add_worlds(app, chosen);
+  add_skills(app, chosen);
+  add_task(app, chosen);
+  add_doctor(app, chosen);
+  add_completion(app, chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::CallForVersion& version) {
+    return app.exit(version);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "pons: {}; pons --help shows what there is\n", error.what());
+    return kExitBadInput;
+  }
+  return chosen();
+}

@@ -1,0 +1,241 @@
+// pons run: one run of a world, from the first parcel to the report.
+
+#include <csignal>
+#include <filesystem>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "apps/assembly.hpp"
+#include "apps/commands.hpp"
+#include "apps/paths.hpp"
+#include "apps/png.hpp"
+#include "apps/progress.hpp"
+#include "pons/core/digest.hpp"
+#include "pons/record/report.hpp"
+#include "pons/referee/referee.hpp"
+#include "pons/runner/realtime.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RunOptions {
+  std::string world;
+  std::int64_t parcels = 200;
+  fs::path manifest, journal, report, picture, socket;
+  std::uint64_t seed = 1;
+  bool parcels_given = false, realtime = false, lockstep = false, quiet = false, explain = false;
+};
+
+constexpr int kPictureWidth = 1280, kPictureHeight = 800;
+constexpr double kSlowest_s = 12.0;  // simulated, a parcel: a run that takes longer hangs
+constexpr double kSlowestStart_s = 60.0;
+
+volatile std::sig_atomic_t interrupts = 0;
+
+// The first Ctrl-C stops the robot in a controlled way; a third one ends the process at once.
+void on_interrupt(int) {
+  interrupts = interrupts + 1;
+  if (interrupts >= 3) _exit(kExitInterrupted);
+}
+
+void watch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = on_interrupt;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+// A file that a run will write at its end: refused now rather than after the work.
+Expected<void> writable(const fs::path& file, const char* option) {
+  if (file.empty()) return {};
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return fail("no such folder", folder.string(), std::string("create it, or change ") + option);
+  if (fs::is_directory(file, error)) return fail("is a folder", file.string(), std::string("name a file for ") + option);
+  if (access(folder.c_str(), W_OK) != 0) return fail("not writable", folder.string(), std::string("change ") + option);
+  return {};
+}
+
+Expected<world::Manifest> manifest_of(const RunOptions& options, const world::World& world) {
+  if (options.manifest.empty()) return world::draw_manifest(world, options.parcels, options.seed);
+  auto manifest = world::read_manifest(options.manifest, world);
+  if (manifest && options.parcels_given) {
+    if (options.parcels < 1) return fail("--parcels is " + std::to_string(options.parcels), "pons run", "ask for at least 1");
+    if (manifest->size() > static_cast<std::size_t>(options.parcels)) manifest->resize(static_cast<std::size_t>(options.parcels));
+  }
+  return manifest;
+}
+
+// Where the journal lies when nobody says: in a folder of its own that goes away with the run.
+class TemporaryJournal {
+ public:
+  TemporaryJournal() {
+    std::string pattern = (fs::temp_directory_path() / "pons-XXXXXX").string();
+    if (mkdtemp(pattern.data()) != nullptr) folder_ = pattern;
+  }
+  ~TemporaryJournal() {
+    std::error_code ignored;
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+  }
+  TemporaryJournal(const TemporaryJournal&) = delete;
+  TemporaryJournal& operator=(const TemporaryJournal&) = delete;
+  [[nodiscard]] fs::path file() const { return folder_ / "journal.db"; }
+
+ private:
+  fs::path folder_;
+};
+
+std::uint64_t state_hash(const Assembly& cell, const referee::Verdict& verdict) {
+  Digest digest;
+  digest.add(cell.simulation->state_digest());
+  for (const sim::ParcelTruth& parcel : sim::Truth(*cell.simulation).parcels()) {
+    digest.add(parcel.parcel_id);
+    digest.add(parcel.place);
+    digest.add(parcel.arrived.ns());
+  }
+  digest.add(verdict.sorted);
+  return digest.value();
+}
+
+record::Report report_of(const RunOptions& options, const Assembly& cell, const referee::Verdict& verdict,
+                         const runner::RunResult& result, double wall_s) {
+  record::Report report;
+  report.seed = options.seed;
+  report.world = cell.world.name;
+  report.parcels = {.offered = verdict.offered,
+                    .sorted = verdict.sorted,
+                    .missorted = verdict.missorted,
+                    .lost = verdict.lost,
+                    .duplicated = verdict.duplicated,
+                    .exceptions = {verdict.deserved, verdict.undeserved},
+                    .damaged = verdict.damaged};
+  Time first = result.end;
+  for (const sim::ParcelTruth& parcel : sim::Truth(*cell.simulation).parcels()) {
+    if (parcel.where != sim::Whereabouts::kNotOffered) first = std::min(first, parcel.offered);
+  }
+  report.throughput = record::throughput(to_s(cell.bridge_side->last_outcome() - first), verdict.sorted);
+  report.retries = cell.bridge->retries();
+  const cerebellum::Statistics& loop = cell.cerebellum->statistics();
+  report.limits = {.violations = static_cast<std::int64_t>(verdict.violations + loop.violations),
+                   .worst_ratio = std::max(verdict.worst_ratio, loop.worst_ratio())};
+  report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
+                 .missed = static_cast<std::int64_t>(result.loop.missed),
+                 .p50_us = result.loop.p50_us,
+                 .p99_us = result.loop.p99_us};
+  report.sim_seconds = result.end.s();
+  report.wall_seconds = wall_s;
+  report.state_hash = state_hash(cell, verdict);
+  return report;
+}
+
+Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
+  const auto rgb = cell.simulation->picture(kPictureWidth, kPictureHeight);
+  if (!rgb) return std::unexpected(rgb.error());
+  return write_png(file, kPictureWidth, kPictureHeight, *rgb);
+}
+
+// Watches the run: Ctrl-C, the progress bar, and the moment for the picture.
+runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progress, std::int64_t total, bool& pictured) {
+  return {.interrupted = [] { return interrupts > 0; },
+          .progress =
+              [&, total](Time now) {
+                const std::int64_t done = cell.bridge_side->done();
+                if (!options.quiet) progress.show({now, done, cell.bridge_side->succeeded(), cell.bridge->queue_length()});
+                // With something on the cups, halfway: that is what the cell looks like.
+                if (!options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
+                  pictured = take_picture(cell, options.picture).has_value();
+                }
+              },
+          .limit = Time(from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(total)))};
+}
+
+int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
+  Progress progress(stderr, total);
+  bool pictured = false;
+  runner::Parts parts = cell.parts();
+  const runner::Watch watcher = watch(options, cell, progress, total, pictured);
+  const auto began = std::chrono::steady_clock::now();
+  const auto result = options.realtime ? runner::run_realtime(parts, watcher) : runner::run_lockstep(parts, watcher);
+  const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  progress.finish();
+  if (!result) return bad_run(result.error());
+
+  const sim::Truth truth(*cell.simulation);
+  const auto verdict = referee::judge(truth.parcels(), truth.arm(), *cell.journal,
+                                      {cell.world.rules.max_press_n, cell.world.rules.max_drop_m},
+                                      result->complete ? referee::RunEnd::kComplete : referee::RunEnd::kBrokenOff);
+  if (!verdict) return bad_run(verdict.error());
+  const record::Report report = report_of(options, cell, *verdict, *result, wall_s);
+  fmt::print("{}", record::summary(report));
+  if (options.explain) {
+    for (const std::string& finding : verdict->findings) fmt::print("  {}\n", finding);
+  }
+  if (!options.report.empty()) {
+    if (auto written = record::write(report, options.report); !written) return bad_run(written.error());
+    fmt::print("report: {}\n", options.report.string());
+  }
+  if (!options.picture.empty()) {
+    if (!pictured) {
+      if (auto taken = take_picture(cell, options.picture); !taken) return bad_run(taken.error());
+    }
+    fmt::print("picture: {}\n", options.picture.string());
+  }
+  if (!options.journal.empty()) fmt::print("journal: {}\n", options.journal.string());
+  if (interrupts > 0) return kExitInterrupted;
+  const bool good = result->complete && verdict->lost == 0 && verdict->missorted == 0 && verdict->duplicated == 0 &&
+                    report.limits.violations == 0;
+  return good ? kExitGood : kExitBadRun;
+}
+
+int run(const RunOptions& options) {
+  for (const auto& [file, name] : {std::pair{options.report, "--report"}, {options.picture, "--picture"}}) {
+    if (auto possible = writable(file, name); !possible) return bad_input(possible.error());
+  }
+  auto world = world::load(worlds_folder(), options.world);
+  if (!world) return bad_input(world.error());
+  const auto manifest = manifest_of(options, *world);
+  if (!manifest) return bad_input(manifest.error());
+
+  const TemporaryJournal temporary;
+  AssemblyOptions assembly{.journal = options.journal.empty() ? temporary.file() : options.journal,
+                           .seed = options.seed,
+                           .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep};
+  if (!options.socket.empty()) {
+    assembly.socket = options.socket;
+  } else if (options.realtime) {
+    assembly.socket = default_socket();
+  }
+  auto cell = Assembly::build(std::move(*world), *manifest, assembly);
+  if (!cell) return bad_input(cell.error());
+  watch_interrupts();
+  return run_cell(options, **cell, static_cast<std::int64_t>(manifest->size()));
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Chosen& chosen) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted");
+  command->add_option("world", options->world, "A world's name; `pons worlds` lists them")->required();
+  auto* parcels = command->add_option("--parcels", options->parcels, "How many parcels (200)");
+  command->add_option("--manifest", options->manifest, "CSV file of parcels, instead of drawing them from the seed");
+  command->add_option("--seed", options->seed, "What is drawn: parcels, arrivals, noise (1)");
+  auto* lockstep = command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
+  command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")->excludes(lockstep);
+  command->add_option("--journal", options->journal, "SQLite file that keeps tasks and outcomes (a temporary one)");
+  command->add_option("--report", options->report, "JSON file for the figures of the run");
+  command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
+  command->add_option("--socket", options->socket, "Where `pons task` reaches this run (on by default with --realtime)");
+  command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
+  command->add_flag("--quiet", options->quiet, "No progress");
+  command->callback([options, parcels, &chosen] {
+    options->parcels_given = parcels->count() > 0;
+    chosen = [options] { return run(*options); };
+  });
+}
+
+}  // namespace pons::apps

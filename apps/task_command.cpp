@@ -1,0 +1,133 @@
+// pons task: submit to a running bridge, list and show from it or from a journal at rest.
+
+#include <filesystem>
+#include <fmt/format.h>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "apps/commands.hpp"
+#include "apps/paths.hpp"
+#include "pons/bridge/journal/journal.hpp"
+#include "pons/gate/local_socket.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using bridge::Json;
+
+constexpr std::streamsize kLargestTask = 64 * 1024;
+
+struct TaskOptions {
+  fs::path socket, journal;
+  std::string file, id;
+};
+
+Expected<Json> ask(const TaskOptions& options, const Json& request) {
+  const fs::path socket = options.socket.empty() ? default_socket() : options.socket;
+  auto answer = gate::ask(socket, request);
+  if (!answer) return answer;
+  if (!answer->value("ok", false)) return fail(answer->value("error", std::string("refused without a reason")));
+  return answer;
+}
+
+Expected<std::string> read_task(const std::string& file) {
+  std::string text;
+  std::ifstream opened;
+  if (file != "-") {
+    opened.open(file, std::ios::binary);
+    if (!opened) return fail("cannot be read", file, "name a JSON file, or - for standard input");
+  }
+  std::istream& in = file == "-" ? std::cin : opened;
+  text.resize(static_cast<std::size_t>(kLargestTask) + 1);
+  in.read(text.data(), kLargestTask + 1);
+  if (in.gcount() > kLargestTask) return fail("larger than 64 KiB", file, "a task is a short JSON object");
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+int submit(const TaskOptions& options) {
+  const auto text = read_task(options.file);
+  if (!text) return bad_input(text.error());
+  const Json task = Json::parse(*text, nullptr, false);
+  if (task.is_discarded()) return bad_input({"not JSON", options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
+  const auto answer = ask(options, {{"op", "submit"}, {"task", task}});
+  if (!answer) return bad_input(answer.error());
+  fmt::print("{}: {}\n", answer->value("id", std::string{}), answer->value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
+  return kExitGood;
+}
+
+void print_row(const Json& task) {
+  const std::string outcome = task.value("outcome", std::string{});
+  fmt::print("{:<20} {:>3}  {:<10} {}\n", task.value("id", std::string{}), task.value("priority", 0),
+             !outcome.empty() ? outcome : (task.value("started", false) ? "running" : "waiting"),
+             task.value("reason", std::string{}));
+}
+
+Expected<Json> from_journal(const fs::path& file, const std::string& id) {
+  const auto journal = bridge::Journal::open_to_read(file);
+  if (!journal) return std::unexpected(journal.error());
+  Json answer;
+  if (id.empty()) {
+    const auto tasks = (*journal)->tasks();
+    if (!tasks) return std::unexpected(tasks.error());
+    answer["tasks"] = Json::array();
+    for (const bridge::TaskRecord& record : *tasks) answer["tasks"].push_back(bridge::to_json(record));
+    return answer;
+  }
+  const auto history = (*journal)->task(id);
+  if (!history) return std::unexpected(history.error());
+  if (!*history) return fail("no task '" + id + "'", file.string(), "pons task list shows those there are");
+  answer["task"] = bridge::to_json((*history)->record);
+  answer["events"] = Json::array();
+  for (const bridge::Event& event : (*history)->events) answer["events"].push_back(bridge::to_json(event));
+  return answer;
+}
+
+int list(const TaskOptions& options) {
+  const auto answer = options.journal.empty() ? ask(options, {{"op", "list"}}) : from_journal(options.journal, {});
+  if (!answer) return bad_input(answer.error());
+  for (const Json& task : answer->at("tasks")) print_row(task);
+  return kExitGood;
+}
+
+int show(const TaskOptions& options) {
+  const auto answer =
+      options.journal.empty() ? ask(options, {{"op", "show"}, {"id", options.id}}) : from_journal(options.journal, options.id);
+  if (!answer) return bad_input(answer.error());
+  print_row(answer->at("task"));
+  for (const Json& event : answer->at("events")) {
+    fmt::print("  {:>10.3f} s  {:<12} {}\n", event.value("time_s", 0.0), event.value("kind", std::string{}),
+               event.contains("detail") ? event.at("detail").dump() : "");
+  }
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_task(CLI::App& app, Chosen& chosen) {
+  auto options = std::make_shared<TaskOptions>();
+  CLI::App* task = app.add_subcommand("task", "Submit tasks to a running bridge; list and show them");
+  task->require_subcommand(1);
+  const auto common = [options](CLI::App* command) {
+    command->add_option("--socket", options->socket, "Where the run listens (its --socket)");
+  };
+  CLI::App* submit_command = task->add_subcommand("submit", "Submit one task from a JSON file");
+  submit_command->add_option("file", options->file, "JSON file, - for standard input")->required();
+  common(submit_command);
+  submit_command->callback([options, &chosen] { chosen = [options] { return submit(*options); }; });
+
+  CLI::App* list_command = task->add_subcommand("list", "List the tasks");
+  common(list_command);
+  list_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
+  list_command->callback([options, &chosen] { chosen = [options] { return list(*options); }; });
+
+  CLI::App* show_command = task->add_subcommand("show", "Show one task and what happened to it");
+  show_command->add_option("id", options->id, "The task's id")->required();
+  common(show_command);
+  show_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
+  show_command->callback([options, &chosen] { chosen = [options] { return show(*options); }; });
+}
+
+}  // namespace pons::apps

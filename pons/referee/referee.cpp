@@ -1,0 +1,155 @@
+#include "pons/referee/referee.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <map>
+
+namespace pons::referee {
+namespace {
+
+using bridge::Json;
+using sim::LabelTruth;
+using sim::ParcelTruth;
+using sim::Whereabouts;
+using task::Outcome;
+
+// What the journal says of one parcel.
+struct Entry {
+  int tasks = 0, successes = 0;
+  bool ended = false;       // every task of it has an outcome
+  bool succeeded = false;
+  bool ride = false;        // let go by on purpose
+  std::string last_reason;
+};
+
+// Tasks name their parcel as "object" in a step's arguments; a task without one speaks of the parcel of its own id.
+std::string object_of(const task::Task& task) {
+  for (const task::Step& step : task.steps)
+    if (step.arguments.contains("object")) return step.arguments.at("object").get<std::string>();
+  return task.id;
+}
+
+Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
+  std::map<std::string, Entry> entries;
+  const auto tasks = journal.tasks();
+  if (!tasks) return std::unexpected(tasks.error());
+  for (const bridge::TaskRecord& record : *tasks) {
+    Entry& entry = entries[object_of(record.task)];
+    entry.ended = record.outcome.has_value() && (entry.tasks == 0 || entry.ended);
+    ++entry.tasks;
+    if (!record.outcome) continue;
+    if (record.outcome->outcome == Outcome::kSucceeded) {
+      entry.succeeded = true;
+      ++entry.successes;
+    }
+    entry.last_reason = record.outcome->reason;
+  }
+  const auto events = journal.events("");
+  if (!events) return std::unexpected(events.error());
+  for (const bridge::Event& event : *events) {
+    if (event.kind != "ride") continue;
+    Entry& entry = entries[event.detail.value("code", std::string{})];
+    entry.ride = true;
+    entry.last_reason = event.detail.value("reason", std::string{});
+  }
+  return entries;
+}
+
+class Judge {
+ public:
+  Judge(Verdict& verdict, const std::map<std::string, Entry>& entries, RunEnd end)
+      : verdict_(verdict), entries_(entries), end_(end) {}
+
+  void parcel(const ParcelTruth& parcel) {
+    const auto found = entries_.find(parcel.parcel_id);
+    const Entry entry = found == entries_.end() ? Entry{} : found->second;
+    if (entry.successes > 1) ++verdict_.duplicated;
+    switch (parcel.where) {
+      case Whereabouts::kNotOffered: return;
+      case Whereabouts::kChute: return in_chute(parcel, entry);
+      case Whereabouts::kException: return in_exception(parcel, entry);
+      case Whereabouts::kTray:
+      case Whereabouts::kFloor: return below(parcel, entry);
+      case Whereabouts::kBelt:
+      case Whereabouts::kHeld:
+      case Whereabouts::kFalling:
+        if (end_ == RunEnd::kBrokenOff && !entry.succeeded) {
+          ++verdict_.unfinished;
+        } else {
+          lost(parcel, entry, "never arrived anywhere");
+        }
+        return;
+    }
+  }
+
+ private:
+  void in_chute(const ParcelTruth& parcel, const Entry& entry) {
+    if (parcel.place != parcel.destination) {
+      ++verdict_.missorted;
+      find(parcel, entry, "missorted");
+    } else if (!entry.succeeded) {
+      lost(parcel, entry, "in its chute, but the journal does not say so");
+    } else {
+      ++verdict_.sorted;
+    }
+  }
+
+  void in_exception(const ParcelTruth& parcel, const Entry& entry) {
+    if (entry.succeeded) return lost(parcel, entry, "in the exception chute, but the journal says sorted");
+    if (!entry.ride && !entry.ended) return lost(parcel, entry, "in the exception chute without an entry");
+    if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {
+      ++verdict_.deserved;
+    } else {
+      ++verdict_.undeserved;
+      find(parcel, entry, "undeserved exception");
+    }
+  }
+
+  void below(const ParcelTruth& parcel, const Entry& entry) {
+    if (entry.succeeded || (!entry.ride && !entry.ended)) return lost(parcel, entry, "fell without an entry");
+    ++verdict_.undeserved;
+    find(parcel, entry, "fell, with an entry");
+  }
+
+  void lost(const ParcelTruth& parcel, const Entry& entry, std::string_view why) {
+    ++verdict_.lost;
+    find(parcel, entry, fmt::format("lost: {}", why));
+  }
+
+  void find(const ParcelTruth& parcel, const Entry& entry, std::string_view what) {
+    verdict_.findings.push_back(fmt::format(
+        "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; journal: {}",
+        parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(), parcel.size_m.y(),
+        parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "", parcel.picks, parcel.drops,
+        entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason)));
+  }
+
+  Verdict& verdict_;
+  const std::map<std::string, Entry>& entries_;
+  RunEnd end_;
+};
+
+}  // namespace
+
+Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const sim::ArmTruth& arm, const bridge::Journal& journal,
+                        const Rules& rules, RunEnd end) {
+  const auto entries = read(journal);
+  if (!entries) return std::unexpected(entries.error());
+  Verdict verdict;
+  Judge judge(verdict, *entries, end);
+  for (const ParcelTruth& parcel : parcels) {
+    if (parcel.where == Whereabouts::kNotOffered) continue;
+    ++verdict.offered;
+    judge.parcel(parcel);
+    if (parcel.max_press_n > rules.max_press_n || parcel.max_drop_m > rules.max_drop_m) {
+      ++verdict.damaged;
+      verdict.findings.push_back(fmt::format("{}: damaged: pressed {:.0f} N, dropped {:.2f} m", parcel.parcel_id,
+                                             parcel.max_press_n, parcel.max_drop_m));
+    }
+  }
+  verdict.violations = arm.speed_violations + arm.torque_violations;
+  verdict.worst_ratio = std::max(arm.worst_speed_ratio, arm.worst_torque_ratio);
+  return verdict;
+}
+
+}  // namespace pons::referee

@@ -1,0 +1,42 @@
+// Compares the simulator's truth with the journal: where each parcel really ended, and what the journal says of it; how
+// hard the arm really worked, and what it may.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pons/bridge/journal/journal.hpp"
+#include "pons/core/error.hpp"
+#include "pons/sim/truth.hpp"
+
+namespace pons::referee {
+
+// What counts as damage; from the world's rules.
+struct Rules {
+  double max_press_n = 0;
+  double max_drop_m = 0;
+};
+
+struct Verdict {
+  int offered = 0;
+  int sorted = 0;      // in the ordered chute, and the journal says so
+  int missorted = 0;   // in another chute than the order's
+  int lost = 0;        // no outcome, or not where the outcome says, or on floor or tray without an entry
+  int duplicated = 0;  // handled twice by the journal
+  int deserved = 0;    // exceptions that had a reason: label, mass, size
+  int undeserved = 0;  // exceptions that had none, drops with an entry among them
+  int damaged = 0;
+  int unfinished = 0;  // still on the belt or in the hand when the run was broken off
+  std::uint64_t violations = 0;      // axis-steps beyond a limit, as the simulator saw the arm
+  double worst_ratio = 0;            // of measured speed or commanded torque to its limit
+  std::vector<std::string> findings; // one line for each parcel that is not sorted or deservedly excepted
+};
+
+enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };
+
+// Errors: the journal cannot be read.
+[[nodiscard]] Expected<Verdict> judge(const std::vector<sim::ParcelTruth>& parcels, const sim::ArmTruth& arm,
+                                      const bridge::Journal& journal, const Rules& rules, RunEnd end);
+
+}  // namespace pons::referee

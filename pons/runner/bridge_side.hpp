@@ -1,0 +1,66 @@
+// Everything that happens at the bridge's pace of 100 Hz, the same in lockstep and in real time: beliefs in, the brain's
+// tasks admitted, skills ticked, outcomes out, visitors answered.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pons/brain/dispatcher.hpp"
+#include "pons/bridge/bridge.hpp"
+#include "pons/link/message.hpp"
+#include "pons/runner/camera_crew.hpp"
+
+namespace pons::runner {
+
+inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
+
+// The skills as the runner sees them; it knows none by name.
+struct SkillPort {
+  std::function<void(Time, std::vector<ObjectBelief>)> refresh;  // before any skill is ticked
+  std::function<const link::State&()> state;                     // as of the last refresh
+  std::function<std::vector<std::uint32_t>()> take_forgotten;    // tracks that were taken off the belt
+  std::function<void(Time)> arm;                                 // one step out of a stop, towards operational
+};
+
+class BridgeSide {
+ public:
+  // All must outlive it. `visitors` is called once a period, before the bridge's tick: requests from outside.
+  BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills, std::function<void(Time)> visitors);
+
+  // One period. Error: a camera or the journal failed; the run cannot go on.
+  [[nodiscard]] Expected<void> tick(Time now, CameraCrew& crew);
+  // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
+  void stop(Time now, const std::string& reason);
+  [[nodiscard]] bool idle() const;
+  // Writes what became of orders that were never identified. Once, at the end of a run.
+  void close(Time now);
+
+  [[nodiscard]] Time last_outcome() const { return last_outcome_; }
+  [[nodiscard]] std::int64_t done() const { return outcomes_ + rides_; }  // tasks ended and parcels let ride
+  [[nodiscard]] std::int64_t succeeded() const { return succeeded_; }
+  [[nodiscard]] std::int64_t stops() const { return stops_; }
+
+ private:
+  void take_in(const Snapshot& snapshot, Time now);
+  [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
+  void ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  void look_after_arm(Time now);
+
+  bridge::Bridge& bridge_;
+  brain::Dispatcher& dispatcher_;
+  SkillPort skills_;
+  std::function<void(Time)> visitors_;
+  Snapshot seen_;
+  std::vector<std::uint32_t> gone_;      // taken off the belt, while snapshots may still show them
+  std::vector<std::uint32_t> forgotten_; // to tell perception with the next frame
+  std::optional<Time> stopped_since_;
+  Time last_outcome_;
+  std::int64_t outcomes_ = 0, succeeded_ = 0, rides_ = 0, stops_ = 0, unlabelled_ = 0;
+  bool stopping_ = false, was_operational_ = false;
+};
+
+}  // namespace pons::runner

@@ -1,0 +1,110 @@
+#include "pons/skills/arm.hpp"
+
+#include <algorithm>
+
+namespace pons::skills {
+namespace {
+
+// Two bridge periods: one for the command to arrive under load, one in reserve.
+constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
+// A cup below this share of the sealed vacuum lets go.
+constexpr double kOpenShare = 0.4;
+
+AxisState at_rest(const AxisVector& position) {
+  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
+}
+
+}  // namespace
+
+Arm::Arm(link::BridgeEnd& link, const world::World& world)
+    : link_(link), world_(world), rest_(at_rest(world.robot.home)) {}
+
+void Arm::refresh(Time now) {
+  link_.latest(state_);
+  const bool is_operational = operational();
+  if (is_operational != was_operational_) {
+    // After a stop the arm is where it came to rest, whatever was planned.
+    asked_.clear();
+    rest_ = at_rest(state_.commanded.position.size() > 0 ? state_.commanded.position : world_.robot.home);
+    was_operational_ = is_operational;
+  }
+  // Segments that ended are history; the last one says where the arm rests.
+  const auto live = std::find_if(asked_.begin(), asked_.end(), [&](const Segment& s) { return s.end() >= now; });
+  if (live == asked_.end()) {
+    if (!asked_.empty()) asked_.erase(asked_.begin(), asked_.end() - 1);
+  } else {
+    asked_.erase(asked_.begin(), live);
+  }
+  send({.kind = link::CommandKind::kHeartbeat});
+}
+
+AxisState Arm::planned(Time time) const {
+  if (asked_.empty()) return rest_;
+  return motion::sample(asked_, time, rest_.position.size());
+}
+
+Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().end(); }
+
+Time Arm::splice_time(Time now) { return now + kSpliceLead; }
+
+Expected<void> Arm::stream(const motion::Trajectory& trajectory) {
+  bool first = true;
+  for (const Segment& segment : trajectory) {
+    link::Command command{.kind = link::CommandKind::kMotion, .splice = first, .segment = segment};
+    if (!send(command)) return fail("the link to the cerebellum is full", "arm", "the loop has stopped taking commands");
+    first = false;
+  }
+  if (!trajectory.empty()) {
+    const Time start = trajectory.front().start;
+    std::erase_if(asked_, [&](const Segment& s) { return s.start >= start; });
+    if (!asked_.empty() && asked_.back().end() > start) asked_.back().duration = start - asked_.back().start;
+    asked_.insert(asked_.end(), trajectory.begin(), trajectory.end());
+  }
+  return {};
+}
+
+Expected<void> Arm::stop(Time now) {
+  const Time from = splice_time(now);
+  auto trajectory = motion::stop(planned(from), from, world_.robot.limits);
+  if (!trajectory) return std::unexpected(trajectory.error());
+  return stream(*trajectory);
+}
+
+void Arm::vacuum(bool on) {
+  const std::uint32_t all = (1U << world_.robot.tool.cups_m.size()) - 1U;
+  send({.kind = link::CommandKind::kVacuum, .vacuum_on = on ? all : 0U});
+}
+
+void Arm::payload(double mass_kg, const Vector3& com_in_flange_m) {
+  send({.kind = link::CommandKind::kPayload,
+        .payload_kg = mass_kg,
+        .payload_com_m = {com_in_flange_m.x(), com_in_flange_m.y(), com_in_flange_m.z()}});
+}
+
+int Arm::sealed_cups() const {
+  const auto& vacuum = state_.cup_vacuum_kpa;
+  return static_cast<int>(
+      std::count_if(vacuum.begin(), vacuum.end(), [&](double kpa) { return kpa >= world_.robot.tool.sealed_kpa; }));
+}
+
+bool Arm::all_cups_open() const {
+  const auto& vacuum = state_.cup_vacuum_kpa;
+  return std::all_of(vacuum.begin(), vacuum.end(),
+                     [&](double kpa) { return kpa < kOpenShare * world_.robot.tool.sealed_kpa; });
+}
+
+void Arm::arm(Time) {
+  if (state_.safety == link::SafetyState::kProtectiveStop || state_.safety == link::SafetyState::kEmergencyStop) {
+    send({.kind = link::CommandKind::kReset});
+  } else if (state_.safety == link::SafetyState::kDisarmed) {
+    send({.kind = link::CommandKind::kArm});
+  }
+}
+
+bool Arm::send(link::Command command) {
+  command.sequence = ++sequence_;
+  command.epoch = state_.epoch;
+  return link_.send(command);
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,56 @@
+// The bridge's hand on the arm: streams motion and vacuum through the link and remembers what it asked for, so that the
+// next motion can start in the middle of the last one without a seam. One thread, the bridge's.
+#pragma once
+
+#include <cstdint>
+
+#include "pons/core/error.hpp"
+#include "pons/link/link.hpp"
+#include "pons/motion/motion.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::skills {
+
+class Arm {
+ public:
+  // Both must outlive it.
+  Arm(link::BridgeEnd& link, const world::World& world);
+
+  // Once a bridge tick, before any skill: takes in the newest state and shows the cerebellum that the bridge lives.
+  void refresh(Time now);
+
+  [[nodiscard]] const link::State& state() const { return state_; }
+  [[nodiscard]] bool operational() const { return state_.safety == link::SafetyState::kOperational; }
+
+  // Where the motion asked for so far will be at `time`.
+  [[nodiscard]] AxisState planned(Time time) const;
+  [[nodiscard]] Time motion_end() const;
+  // The earliest moment from which a motion may be replaced: the link and the loop need some ticks.
+  [[nodiscard]] static Time splice_time(Time now);
+
+  // Replaces what was asked for from trajectory.front().start on. Error: the link is full.
+  [[nodiscard]] Expected<void> stream(const motion::Trajectory& trajectory);
+  // From the splice time to standstill along the limits.
+  [[nodiscard]] Expected<void> stop(Time now);
+
+  void vacuum(bool on);
+  void payload(double mass_kg, const Vector3& com_in_flange_m);
+  [[nodiscard]] int sealed_cups() const;
+  [[nodiscard]] bool all_cups_open() const;
+
+  // Leaves a stop (when it may) and arms from standstill. Moves nothing.
+  void arm(Time now);
+
+ private:
+  bool send(link::Command command);
+
+  link::BridgeEnd& link_;
+  const world::World& world_;
+  link::State state_;
+  motion::Trajectory asked_;
+  AxisState rest_;  // in force when nothing was asked for since arming
+  std::uint64_t sequence_ = 0;
+  bool was_operational_ = false;
+};
+
+}  // namespace pons::skills

@@ -1,0 +1,64 @@
+#include "pons/skills/cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace pons::skills {
+namespace {
+
+// Planned motion stays this far inside the enforced limits, so that rounding never trips them.
+constexpr double kPlanShare = 0.97;
+// Above this the arm is slower: torque, and the cups' grip against inertia.
+constexpr double kHeavyKg = 2.0;
+constexpr double kHeavyShare = 0.75;
+// Belt speed changes within seconds; its slope is smoothed over about this long.
+constexpr double kBeltSmoothing_s = 0.15;
+
+}  // namespace
+
+Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotModel robot)
+    : world(cell_world), arm(link, cell_world), model(robot.copy()), router(cell_world, std::move(robot)) {}
+
+void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
+  arm.refresh(now);
+  const double passed_s = to_s(now - now_);
+  const double speed = belt_speed_m_s();
+  if (passed_s > 0 && now_ > Time{}) {
+    const double slope = (speed - last_belt_speed_m_s_) / passed_s;
+    const double share = std::min(1.0, passed_s / kBeltSmoothing_s);
+    belt_acceleration_m_s2_ += share * (slope - belt_acceleration_m_s2_);
+  }
+  last_belt_speed_m_s_ = speed;
+  now_ = now;
+  objects_ = std::move(objects);
+}
+
+const ObjectBelief* Cell::find(std::string_view code) const {
+  const auto found = std::find_if(objects_.begin(), objects_.end(), [&](const ObjectBelief& o) { return o.code == code; });
+  return found == objects_.end() ? nullptr : &*found;
+}
+
+Vector3 Cell::predict(const ObjectBelief& object, Time time) const {
+  const double ahead_s = to_s(time - object.stamp);
+  Vector3 position = object.world_from_top.translation() + ahead_s * object.velocity_m_s;
+  if (object.velocity_m_s.x() != 0) position.x() += 0.5 * belt_acceleration_m_s2_ * ahead_s * ahead_s;
+  return position;
+}
+
+Pose Cell::tip_down(const Vector3& position, double yaw) {
+  Pose pose = pose_xyz_yaw(position.x(), position.y(), position.z(), yaw);
+  pose.rotate(Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()));
+  return pose;
+}
+
+AxisLimits Cell::limits_for(double mass_kg) const {
+  AxisLimits limits = world.robot.limits;
+  limits.speed_rad_s *= kPlanShare;
+  limits.acceleration_rad_s2 *= kPlanShare * (mass_kg > kHeavyKg ? kHeavyShare : 1.0);
+  limits.jerk_rad_s3 *= kPlanShare;
+  return limits;
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,64 @@
+// What all arm skills share: the world, the arm, what is believed to lie where, and what hangs on the cups. One object a
+// bridge, one thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/model/robot_model.hpp"
+#include "pons/skills/arm.hpp"
+#include "pons/skills/route.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::skills {
+
+// The parcel on the cups.
+struct Held {
+  std::string code;
+  Load load;
+  double mass_kg = 0;
+};
+
+class Cell {
+ public:
+  // `link` and `world` must outlive it.
+  Cell(link::BridgeEnd& link, const world::World& world, model::RobotModel model);
+
+  // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`.
+  void refresh(Time now, std::vector<ObjectBelief> objects);
+
+  // The belief with this label, or nullptr.
+  [[nodiscard]] const ObjectBelief* find(std::string_view code) const;
+  [[nodiscard]] const std::vector<ObjectBelief>& objects() const { return objects_; }
+  // Where that belief will be at `time`, carried on by the belt as it runs and changes speed now.
+  [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
+  [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
+
+  // Taken off the belt: perception is told to let go of the track.
+  void forget(std::uint32_t track) { forgotten_.push_back(track); }
+  [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
+
+  // Tip pose, tool pointing down, over (x, y, z) with its x axis at `yaw`.
+  [[nodiscard]] static Pose tip_down(const Vector3& position, double yaw);
+  // Limits the arm keeps with this on its cups: planned a little inside those that the cerebellum enforces.
+  [[nodiscard]] AxisLimits limits_for(double mass_kg) const;
+
+  const world::World& world;
+  Arm arm;
+  model::RobotModel model;
+  Router router;
+  std::optional<Held> held;
+
+ private:
+  Time now_;
+  double belt_acceleration_m_s2_ = 0;
+  double last_belt_speed_m_s_ = 0;
+  std::vector<ObjectBelief> objects_;
+  std::vector<std::uint32_t> forgotten_;
+};
+
+}  // namespace pons::skills

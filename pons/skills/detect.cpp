@@ -1,0 +1,59 @@
+#include "pons/skills/detect.hpp"
+
+#include <cmath>
+
+namespace pons::skills {
+namespace {
+
+using task::Progress;
+using task::Status;
+
+class Detect final : public task::Skill {
+ public:
+  Detect(Cell& cell, std::string code, Time until) : cell_(cell), code_(std::move(code)), until_(until) {}
+
+  Progress tick(Time now) override {
+    if (cancelled_) return {Status::kFailed, "cancelled", {}};
+    if (const ObjectBelief* object = cell_.find(code_)) {
+      const Vector3 p = object->world_from_top.translation();
+      const auto& r = object->world_from_top.linear();
+      return {Status::kSucceeded,
+              {},
+              {{"position_m", {p.x(), p.y(), p.z()}},
+               {"yaw_rad", std::atan2(r(1, 0), r(0, 0))},
+               {"size_m", {object->size_m.x(), object->size_m.y(), object->size_m.z()}},
+               {"confidence", object->confidence}}};
+    }
+    return now < until_ ? Progress{} : Progress{Status::kFailed, "not seen", {}};
+  }
+
+  void cancel(Time) override { cancelled_ = true; }
+
+ private:
+  Cell& cell_;
+  std::string code_;
+  Time until_;
+  bool cancelled_ = false;
+};
+
+}  // namespace
+
+task::SkillType detect(Cell& cell) {
+  return {.name = "detect",
+          .summary = "Wait until a labelled object is seen, and say where it is",
+          .schema = {{"type", "object"},
+                     {"properties",
+                      {{"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}},
+                       {"within_s", {{"type", "number"}, {"minimum", 0}, {"maximum", 60}}}}},
+                     {"required", {"object"}},
+                     {"additionalProperties", false}},
+          .resources = {},
+          .timeout = std::chrono::seconds(70),
+          .attempts = 1,
+          .start = [&cell](const task::Json& arguments, Time now) {
+            return std::make_unique<Detect>(cell, arguments.at("object").get<std::string>(),
+                                            now + from_s(arguments.value("within_s", 5.0)));
+          }};
+}
+
+}  // namespace pons::skills

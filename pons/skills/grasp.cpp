@@ -1,0 +1,134 @@
+#include "pons/skills/grasp.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace pons::skills {
+namespace {
+
+constexpr double kHover_m = 0.035;         // the straight part above the parcel
+constexpr double kComeDown_m_s = 0.25;     // speed there
+constexpr double kPress_m = 0.006;         // bellows pressed together at the contact
+constexpr double kRide_s = 0.40;           // along with the belt, while vacuum builds
+constexpr double kKnot_s = 0.05;
+constexpr double kConverged_s = 0.002;
+constexpr int kRounds = 8;
+
+void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
+
+std::vector<ObjectBelief> all_but(const std::vector<ObjectBelief>& objects, std::uint32_t track) {
+  std::vector<ObjectBelief> others;
+  for (const ObjectBelief& object : objects)
+    if (object.track != track) others.push_back(object);
+  return others;
+}
+
+Vector3 belt_velocity(const Cell& cell) { return {cell.belt_speed_m_s(), 0, 0}; }
+
+}  // namespace
+
+AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed_m_s) {
+  const model::Jacobian jacobian = cell.model.tip_jacobian(q);
+  Eigen::Matrix<double, 6, 1> twist = Eigen::Matrix<double, 6, 1>::Zero();
+  twist.head<3>() = tip_speed_m_s;
+  // Damped: near a singular pose the speed is wrong by a little rather than infinite.
+  const Eigen::Matrix<double, 6, 6> gram = jacobian * jacobian.transpose() + 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
+  return jacobian.transpose() * gram.ldlt().solve(twist);
+}
+
+Expected<double> nearest_yaw(Cell& cell, const AxisVector& q, const Vector3& position, double object_yaw_rad) {
+  Expected<double> best = fail("out of reach", "grasp");
+  double least = 0;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const double yaw = object_yaw_rad + quarter * std::numbers::pi / 2;
+    const auto there = cell.model.inverse(Cell::tip_down(position, yaw), q);
+    if (!there) continue;
+    const double turn = (*there - q).cwiseAbs().maxCoeff();
+    if (best && turn >= least) continue;
+    best = yaw;
+    least = turn;
+  }
+  return best;
+}
+
+Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at, double yaw_rad, double duration_s) {
+  const Vector3 from = cell.model.world_from_tip(start.position).translation();
+  const Vector3 speed = belt_velocity(cell);
+  AxisVector seed = start.position;
+  const auto path = [&, seed](double t) mutable -> Expected<AxisVector> {
+    auto q = cell.model.inverse(Cell::tip_down(from + t * speed, yaw_rad), seed);
+    if (q) seed = *q;
+    return q;
+  };
+  return motion::follow(start, at, path, duration_s, kKnot_s, cell.limits_for(0));
+}
+
+Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad, const Vector3& offset,
+                                   const Vector3& tip_speed, const AxisLimits& limits) {
+  const Vector3 from = cell.model.world_from_tip(start.position).translation();
+  const auto q = cell.model.inverse(Cell::tip_down(from + offset, yaw_rad), start.position);
+  if (!q) return std::unexpected(q.error());
+  return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, limits);
+}
+
+Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                           std::optional<double> yaw_rad) {
+  Grasp grasp;
+  const double object_yaw = std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
+  const auto others = all_but(cell.objects(), object.track);
+  const AxisLimits limits = cell.limits_for(0);
+  const Vector3 up{0, 0, kHover_m};
+  const Vector3 come_down = belt_velocity(cell) - Vector3(0, 0, kComeDown_m_s);
+
+  // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find.
+  double ahead_s = 0.8;
+  Expected<motion::Trajectory> way = fail("out of reach", "grasp");
+  AxisVector seed = start.position;
+  for (int round = 0; round < kRounds; ++round) {
+    const Vector3 hover = cell.predict(object, at + from_s(ahead_s)) + up;
+    if (!yaw_rad) {
+      const auto yaw = nearest_yaw(cell, start.position, hover, object_yaw);
+      if (!yaw) return std::unexpected(yaw.error());
+      yaw_rad = *yaw;
+    }
+    const auto q = cell.model.inverse(Cell::tip_down(hover, *yaw_rad), seed);
+    if (!q) return std::unexpected(q.error());
+    seed = *q;
+    way = cell.router.route(start, at, {*q, joint_speed(cell, *q, come_down)}, nullptr, others, limits);
+    if (!way) return std::unexpected(way.error());
+    const double needed_s = to_s(way->back().end() - at);
+    const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;
+    ahead_s = needed_s;
+    if (converged) break;
+  }
+  grasp.yaw_rad = *yaw_rad;
+  grasp.trajectory = std::move(*way);
+  grasp.hover = grasp.trajectory.back().end();
+
+  // The last centimetres: straight down on the parcel, ending at the belt's speed.
+  const AxisState hovering = motion::sample(grasp.trajectory, grasp.hover, cell.model.axes());
+  double down_s = 2 * kHover_m / kComeDown_m_s;
+  Expected<motion::Trajectory> down = fail("out of reach", "grasp");
+  for (int round = 0; round < kRounds; ++round) {
+    grasp.contact_point = cell.predict(object, grasp.hover + from_s(down_s)) - Vector3(0, 0, kPress_m);
+    const auto q = cell.model.inverse(Cell::tip_down(grasp.contact_point, grasp.yaw_rad), seed);
+    if (!q) return std::unexpected(q.error());
+    down = motion::move(hovering, grasp.hover, {*q, joint_speed(cell, *q, belt_velocity(cell))}, limits);
+    if (!down) return std::unexpected(down.error());
+    const double needed_s = to_s(down->back().end() - grasp.hover);
+    const bool converged = std::abs(needed_s - down_s) < kConverged_s;
+    down_s = needed_s;
+    if (converged) break;
+  }
+  append(grasp.trajectory, *down);
+  grasp.contact = grasp.trajectory.back().end();
+
+  const AxisState touching = motion::sample(grasp.trajectory, grasp.contact, cell.model.axes());
+  const auto along = ride(cell, touching, grasp.contact, grasp.yaw_rad, kRide_s);
+  if (!along) return std::unexpected(along.error());
+  append(grasp.trajectory, *along);
+  return grasp;
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,76 @@
+#include "pons/skills/move_to.hpp"
+
+namespace pons::skills {
+namespace {
+
+using task::Progress;
+using task::Status;
+
+constexpr double kAbove_m = 0.15;
+
+class MoveTo final : public task::Skill {
+ public:
+  MoveTo(Cell& cell, std::string place) : cell_(cell), place_(std::move(place)) {}
+
+  Progress tick(Time now) override {
+    if (!cell_.arm.operational()) {
+      moving_ = false;
+      return {Status::kRetry, "the arm was stopped", {}};
+    }
+    if (moving_) {
+      if (now < arrives_) return {};
+      return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{Status::kSucceeded, {}, {}};
+    }
+    const Time from = Arm::splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+    const auto q = target(state.position);
+    if (!q) return {Status::kFailed, q.error().line(), {}};
+    const Load* load = cell_.held ? &cell_.held->load : nullptr;
+    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, load, cell_.objects(),
+                                        cell_.limits_for(cell_.held ? cell_.held->mass_kg : 0));
+    if (!way) return {Status::kFailed, way.error().line(), {}};
+    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
+    arrives_ = way->back().end();
+    moving_ = true;
+    return {};
+  }
+
+  void cancel(Time now) override {
+    cancelled_ = true;
+    moving_ = true;
+    if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
+  }
+
+ private:
+  Expected<AxisVector> target(const AxisVector& from) {
+    if (place_ == "home") return cell_.world.robot.home;
+    const world::Place* place = cell_.world.place(place_);
+    if (place == nullptr) return fail("no place '" + place_ + "' in this world", "move_to");
+    const double depth = cell_.held ? cell_.held->load.size_m.z() : 0;
+    return cell_.model.inverse(Cell::tip_down(place->center_m + Vector3(0, 0, kAbove_m + depth), 0), from);
+  }
+
+  Cell& cell_;
+  std::string place_;
+  Time arrives_;
+  bool moving_ = false, cancelled_ = false;
+};
+
+}  // namespace
+
+task::SkillType move_to(Cell& cell) {
+  return {.name = "move_to",
+          .summary = "Bring the tool over a place, or home",
+          .schema = {{"type", "object"},
+                     {"properties", {{"place", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
+                     {"required", {"place"}},
+                     {"additionalProperties", false}},
+          .resources = {"arm"},
+          .timeout = std::chrono::seconds(15),
+          .attempts = 2,
+          .start = [&cell](const task::Json& arguments, Time) {
+            return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>());
+          }};
+}
+
+}  // namespace pons::skills

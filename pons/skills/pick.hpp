@@ -1,0 +1,16 @@
+// pick: takes one parcel off the moving belt and weighs it.
+#pragma once
+
+#include <memory>
+
+#include "pons/skills/cell.hpp"
+#include "pons/task/skill.hpp"
+
+namespace pons::skills {
+
+// Arguments {"object": code}. Ends kSucceeded with the parcel on the cups and `cell.held` set; kRetry after a missed
+// grasp; kException when the parcel is too heavy (put back on the belt) or rode past the pick zone.
+// Detail: mass_kg, sealed cups, seconds.
+[[nodiscard]] task::SkillType pick(Cell& cell);
+
+}  // namespace pons::skills

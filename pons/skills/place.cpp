@@ -1,0 +1,136 @@
+#include "pons/skills/place.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+#include "pons/skills/grasp.hpp"
+#include "pons/skills/scale.hpp"
+
+namespace pons::skills {
+namespace {
+
+using task::Progress;
+using task::Status;
+
+constexpr double kOverRim_m = 0.03;  // between rim and the parcel's underside when it is let go
+constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
+constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
+constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
+constexpr double kGoneShare = 0.4;   // of the load's mass
+constexpr double kGoneLeast_kg = 0.08;
+constexpr int kLostTicks = 3;
+
+class Place final : public task::Skill {
+ public:
+  Place(Cell& cell, std::string name, std::string object, Time now)
+      : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now) {}
+
+  Progress tick(Time now) override {
+    if (!cell_.arm.operational()) {
+      phase_ = Phase::kPlan;
+      return {Status::kRetry, "the arm was stopped", {}};
+    }
+    switch (phase_) {
+      case Phase::kPlan: return plan(now);
+      case Phase::kCarry: return carry(now);
+      case Phase::kRelease: return release(now);
+      case Phase::kHold: return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
+    }
+    return {Status::kFailed, "unreachable", {}};
+  }
+
+  void cancel(Time now) override {
+    if (phase_ == Phase::kRelease || phase_ == Phase::kHold) return;  // it is over the mouth already
+    if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
+    phase_ = Phase::kHold;
+  }
+
+ private:
+  enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kHold };
+
+  Progress plan(Time now) {
+    if (!cell_.held) return {Status::kFailed, "nothing is held", {}};
+    if (!object_.empty() && cell_.held->code != object_) {
+      return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
+    }
+    const world::Place* target = cell_.world.place(name_);
+    if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
+    const Load& load = cell_.held->load;
+    const Vector3 tip = target->center_m + Vector3(0, 0, kOverRim_m + load.size_m.z());
+    const Time from = Arm::splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+
+    // The parcel's sides along the mouth's; which of the four turns, the arm decides.
+    const auto yaw = nearest_yaw(cell_, state.position, tip, load.yaw_in_tip_rad);
+    if (!yaw) return {Status::kFailed, name_ + " is out of reach", {}};
+    const auto q = cell_.model.inverse(Cell::tip_down(tip, *yaw), state.position);
+    if (!q) return {Status::kFailed, q.error().line(), {}};
+    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
+                                        cell_.limits_for(cell_.held->mass_kg));
+    if (!way) return {Status::kFailed, way.error().line(), {}};
+    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
+    arrives_ = way->back().end();
+    phase_ = Phase::kCarry;
+    return {};
+  }
+
+  Progress carry(Time now) {
+    lost_ticks_ = cell_.arm.sealed_cups() == 0 ? lost_ticks_ + 1 : 0;
+    if (lost_ticks_ >= kLostTicks) {
+      cell_.arm.vacuum(false);
+      cell_.held.reset();
+      cell_.arm.payload(0, Vector3::Zero());
+      const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+      return {Status::kFailed, "dropped", {{"at_m", {tip.x(), tip.y(), tip.z()}}}};
+    }
+    if (now + kLetGoEarly < arrives_) return {};
+    cell_.arm.vacuum(false);
+    phase_ = Phase::kRelease;
+    return {};
+  }
+
+  Progress release(Time now) {
+    if (now < arrives_ + kRested || !cell_.arm.all_cups_open()) return late(now);
+    const double felt_kg = weigh_now(cell_, now);
+    if (felt_kg > std::max(kGoneLeast_kg, kGoneShare * cell_.held->mass_kg)) return late(now);
+    const std::string code = cell_.held->code;
+    cell_.held.reset();
+    cell_.arm.payload(0, Vector3::Zero());
+    return {Status::kSucceeded, {}, {{"place", name_}, {"object", code}, {"seconds", to_s(now - started_)}}};
+  }
+
+  Progress late(Time now) {
+    if (now < arrives_ + kLetGoWithin) return {};
+    return {Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_, now)), {}};
+  }
+
+  Cell& cell_;
+  std::string name_, object_;
+  Time started_, arrives_;
+  Phase phase_ = Phase::kPlan;
+  int lost_ticks_ = 0;
+};
+
+}  // namespace
+
+task::SkillType place(Cell& cell) {
+  return {.name = "place",
+          .summary = "Carry what the cups hold to a place, let go, and make sure that it left",
+          .schema = {{"type", "object"},
+                     {"properties",
+                      {{"place", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}},
+                       {"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
+                     {"required", {"place"}},
+                     {"additionalProperties", false}},
+          .resources = {"arm"},
+          .timeout = std::chrono::seconds(15),
+          .attempts = 3,
+          .start = [&cell](const task::Json& arguments, Time now) {
+            return std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),
+                                           arguments.value("object", std::string{}), now);
+          }};
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,17 @@
+#include "pons/skills/skills.hpp"
+
+#include "pons/skills/detect.hpp"
+#include "pons/skills/move_to.hpp"
+#include "pons/skills/pick.hpp"
+#include "pons/skills/place.hpp"
+
+namespace pons::skills {
+
+void add_skills(task::SkillRegistry& registry, Cell& cell) {
+  registry.add(detect(cell));
+  registry.add(move_to(cell));
+  registry.add(pick(cell));
+  registry.add(place(cell));
+}
+
+}  // namespace pons::skills
