@@ -54,6 +54,9 @@ class RobotModel {
   // Torques (N·m) for the asked acceleration at (q, speed), tool and payload included: recursive Newton-Euler.
   void inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration, const Payload& payload,
                         AxisVector& torque_nm) PONS_NONBLOCKING;
+  // The reverse: the acceleration that these torques cause, by the articulated-body algorithm (Featherstone 1983).
+  void forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm, const Payload& payload,
+                        AxisVector& acceleration) PONS_NONBLOCKING;
 
  private:
   struct Impl;

@@ -32,7 +32,8 @@ class Skill {
  public:
   virtual ~Skill() = default;
   [[nodiscard]] virtual Progress tick(Time now) = 0;
-  // Leave the world safe, then end; tick() goes on being called until it ends. Does not drop what is held.
+  // Leave the world safe, then end; tick() goes on being called until it ends. Does not drop what is held. Ending with
+  // kSucceeded then means that the step was done all the same; a step broken off ends with kFailed or kException.
   virtual void cancel(Time now) = 0;
 };
 

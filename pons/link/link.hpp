@@ -1,0 +1,67 @@
+// The link inside one process: the only way from the bridge to the cerebellum. Commands go down through a ring (all of them,
+// in order), states come up through a triple buffer (the newest), and one word stops everything.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "pons/core/realtime.hpp"
+#include "pons/link/message.hpp"
+#include "pons/rt/ring.hpp"
+#include "pons/rt/triple_buffer.hpp"
+
+namespace pons::link {
+
+// Some 600 KiB: keep it on the heap. Outlives both ends.
+class Link {
+ public:
+  static constexpr std::size_t kCommands = 1024;
+
+  // Latches an emergency stop. Any thread, signal handlers too; wait-free. No command lifts it.
+  void raise_emergency_stop() PONS_NONBLOCKING { emergency_.store(1, std::memory_order_release); }
+  // Lets go of the word, as a person does who unlocks the button. The stop itself stays until kReset.
+  void clear_emergency_stop() PONS_NONBLOCKING { emergency_.store(0, std::memory_order_release); }
+  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return emergency_.load(std::memory_order_acquire) != 0; }
+
+ private:
+  friend class BridgeEnd;
+  friend class CerebellumEnd;
+  rt::SpscRing<Command, kCommands> commands_;
+  rt::TripleBuffer<State> states_;
+  std::atomic<std::uint32_t> emergency_{0};
+};
+
+// The bridge's end. One thread.
+class BridgeEnd {
+ public:
+  explicit BridgeEnd(Link& link) : link_(link) {}
+
+  // False when the ring is full (the cerebellum does not take commands): nothing was sent.
+  [[nodiscard]] bool send(const Command& command) PONS_NONBLOCKING { return link_.commands_.push(command); }
+  // How many commands send() is sure to take now: look before sending the pieces of a motion, which are useless in part.
+  [[nodiscard]] std::size_t room() const PONS_NONBLOCKING { return link_.commands_.free(); }
+  // The newest state; a default one (epoch 0) before the first tick. Valid until the next call.
+  [[nodiscard]] const State& latest() PONS_NONBLOCKING { return link_.states_.read(); }
+  void latest(State& state) PONS_NONBLOCKING { state = link_.states_.read(); }
+  void raise_emergency_stop() PONS_NONBLOCKING { link_.raise_emergency_stop(); }
+  void clear_emergency_stop() PONS_NONBLOCKING { link_.clear_emergency_stop(); }
+
+ private:
+  Link& link_;
+};
+
+// The cerebellum's end. One thread.
+class CerebellumEnd {
+ public:
+  explicit CerebellumEnd(Link& link) : link_(link) {}
+
+  // False when there is none.
+  [[nodiscard]] bool receive(Command& command) PONS_NONBLOCKING { return link_.commands_.pop(command); }
+  void publish(const State& state) PONS_NONBLOCKING { link_.states_.write(state); }
+  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return link_.emergency_stop_raised(); }
+
+ private:
+  Link& link_;
+};
+
+}  // namespace pons::link

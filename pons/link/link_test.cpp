@@ -1,0 +1,74 @@
+#include "pons/link/link.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <type_traits>
+
+namespace pons::link {
+namespace {
+
+static_assert(std::is_trivially_copyable_v<Command>);
+
+TEST(Link, CommandsGoDownInOrderAndRefuseWhenFull) {
+  const auto link = std::make_unique<Link>();
+  BridgeEnd bridge(*link);
+  CerebellumEnd cerebellum(*link);
+  Command command;
+  for (std::uint64_t i = 0; i < Link::kCommands; ++i) {
+    command.sequence = i;
+    ASSERT_TRUE(bridge.send(command));
+  }
+  EXPECT_EQ(bridge.room(), 0u);
+  EXPECT_FALSE(bridge.send(command));
+  for (std::uint64_t i = 0; i < Link::kCommands; ++i) {
+    ASSERT_TRUE(cerebellum.receive(command));
+    ASSERT_EQ(command.sequence, i);
+  }
+  EXPECT_FALSE(cerebellum.receive(command));
+}
+
+TEST(Link, TheNewestStateComesUp) {
+  const auto link = std::make_unique<Link>();
+  BridgeEnd bridge(*link);
+  CerebellumEnd cerebellum(*link);
+  EXPECT_EQ(bridge.latest().epoch, 0u);
+  State state;
+  state.epoch = 3;
+  state.position = AxisVector::Constant(6, 0.5);
+  cerebellum.publish(state);
+  state.tick = 2;
+  cerebellum.publish(state);
+  EXPECT_EQ(bridge.latest().tick, 2u);
+  EXPECT_EQ(bridge.latest().position, AxisVector::Constant(6, 0.5));
+}
+
+TEST(Link, AnybodyMayRaiseTheEmergencyWordAndItStays) {
+  const auto link = std::make_unique<Link>();
+  const CerebellumEnd cerebellum(*link);
+  EXPECT_FALSE(cerebellum.emergency_stop_raised());
+  std::thread([&] { link->raise_emergency_stop(); }).join();
+  EXPECT_TRUE(cerebellum.emergency_stop_raised());
+  EXPECT_TRUE(cerebellum.emergency_stop_raised());
+  link->clear_emergency_stop();
+  EXPECT_FALSE(cerebellum.emergency_stop_raised());
+}
+
+TEST(Message, EveryValueHasAName) {
+  std::set<std::string_view> names;
+  for (int i = 0; i <= static_cast<int>(SafetyState::kEmergencyStop); ++i) names.insert(name(static_cast<SafetyState>(i)));
+  EXPECT_EQ(names.size(), 5u);
+  names.clear();
+  for (int i = 0; i <= static_cast<int>(StopCause::kBodySilent); ++i) names.insert(name(static_cast<StopCause>(i)));
+  EXPECT_EQ(names.size(), 9u);
+  names.clear();
+  for (int i = 0; i <= static_cast<int>(StopResult::kFailed); ++i) names.insert(name(static_cast<StopResult>(i)));
+  EXPECT_EQ(names.size(), 5u);
+  EXPECT_FALSE(names.contains("unknown"));
+}
+
+}  // namespace
+}  // namespace pons::link

@@ -1,0 +1,202 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+
+#include "pons/core/random.hpp"
+#include "pons/model/robot_model.hpp"
+#include "pons/model/test_robots.hpp"
+
+namespace pons::model {
+namespace {
+
+constexpr double kHalfPi = std::numbers::pi / 2;
+
+Pose tool_down(double x, double y, double z, double yaw) {
+  Pose pose = pose_xyz_yaw(x, y, z, yaw);
+  pose.rotate(Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()));
+  return pose;
+}
+
+Eigen::Affine3d link(double q, double d, double a, double alpha) {
+  return Eigen::Affine3d(Eigen::AngleAxisd(q, Vector3::UnitZ()) * Eigen::Translation3d(a, 0, d) *
+                         Eigen::AngleAxisd(alpha, Vector3::UnitX()));
+}
+
+// Where the branch (shoulder +, wrist of q5's sign) of the published parameters has the elbow for this pose: cos(q3), or
+// nothing in the way of reach when |cos(q3)| > 1. Analytic: q1 from the wrist's offset, q5 and q6 from the tool, then the
+// planar triangle.
+double elbow_cosine(const Pose& base_from_flange, double shoulder, double q5_sign) {
+  const Vector3 wrist = base_from_flange.translation() - 0.0996 * base_from_flange.linear().col(2);
+  const double across = 0.1333 / std::hypot(wrist.x(), wrist.y());
+  if (across > 1) return 2;
+  const double q1 = std::atan2(wrist.y(), wrist.x()) + shoulder * std::acos(across) + kHalfPi;
+  const Vector3 p = base_from_flange.translation();
+  const double q5 = q5_sign * std::acos(std::clamp((p.x() * std::sin(q1) - p.y() * std::cos(q1) - 0.1333) / 0.0996, -1.0, 1.0));
+  const Eigen::Matrix3d r = base_from_flange.linear().transpose();
+  const double q6 = std::atan2((-r(1, 0) * std::sin(q1) + r(1, 1) * std::cos(q1)) / std::sin(q5),
+                               (r(0, 0) * std::sin(q1) - r(0, 1) * std::cos(q1)) / std::sin(q5));
+  const Eigen::Affine3d t14 = link(q1, 0.1625, 0, kHalfPi).inverse() * Eigen::Affine3d(base_from_flange) *
+                              link(q6, 0.0996, 0, 0).inverse() * link(q5, 0.0997, 0, -kHalfPi).inverse();
+  const Vector3 p13 = t14 * Vector3(0, -0.1333, 0);
+  return (p13.squaredNorm() - 0.425 * 0.425 - 0.3922 * 0.3922) / (2 * 0.425 * 0.3922);
+}
+
+struct Tally {
+  int reachable = 0, solved = 0, other_branch = 0, false_solutions = 0;
+  std::vector<double> microseconds;
+  [[nodiscard]] double percentile(double share) {
+    std::sort(microseconds.begin(), microseconds.end());
+    return microseconds[static_cast<std::size_t>(share * static_cast<double>(microseconds.size() - 1))];
+  }
+};
+
+TEST(Inverse, TenThousandToolDownPosesOnTheHomeBranch) {
+  const auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  const Pose base_from_world = robot.world_from_base.inverse();
+  const Pose flange_from_tip = robot.tool.flange_from_tip;
+  Random random(11);
+  Tally tally;
+  // The home branch, in the analytic solution's words.
+  const Pose home_flange = base_from_world * model.world_from_tip(robot.home) * flange_from_tip.inverse();
+  double shoulder = 0;
+  for (const double candidate : {-1.0, 1.0}) {
+    if (std::abs(elbow_cosine(home_flange, candidate, -1) - std::cos(robot.home[2])) < 1e-6) shoulder = candidate;
+  }
+  ASSERT_NE(shoulder, 0);
+  while (tally.reachable < 10'000) {
+    const Pose target = tool_down(random.uniform(-0.95, 0.95), random.uniform(-1.05, 0.6), random.uniform(0.85, 1.25),
+                                  random.uniform(-std::numbers::pi, std::numbers::pi));
+    const double cosine = elbow_cosine(base_from_world * target * flange_from_tip.inverse(), shoulder, -1);
+    const bool reachable = std::abs(cosine) < 0.9995;  // 1.8° away from a straight or folded elbow
+    const auto begin = std::chrono::steady_clock::now();
+    const auto q = model.inverse(target, robot.home);
+    const auto end = std::chrono::steady_clock::now();
+    if (!reachable) {
+      if (q && std::abs(cosine) > 1.0005) ++tally.false_solutions;
+      continue;
+    }
+    ++tally.reachable;
+    tally.microseconds.push_back(1e-3 * static_cast<double>((end - begin).count()));
+    if (!q) continue;
+    ++tally.solved;
+    const Pose reached = model.world_from_tip(*q);
+    ASSERT_LT((reached.translation() - target.translation()).norm(), 1e-6);
+    ASSERT_LT((reached.linear() - target.linear()).norm(), 2e-6);
+    ASSERT_NEAR(std::cos((*q)[2]), cosine, 1e-4);
+    const bool same = std::sin((*q)[2]) * std::sin(robot.home[2]) > 0 && std::sin((*q)[4]) * std::sin(robot.home[4]) > 0;
+    if (!same) ++tally.other_branch;
+    for (int axis = 0; axis < 6; ++axis) {
+      ASSERT_TRUE((*q)[axis] >= robot.limits.position_min[axis] && (*q)[axis] <= robot.limits.position_max[axis]);
+    }
+  }
+  std::printf("solved %d of %d, %d on another branch, %d unreachable ones solved; median %.1f us, 99 %% %.1f us, worst %.1f us\n",
+              tally.solved, tally.reachable, tally.other_branch, tally.false_solutions, tally.percentile(0.5), tally.percentile(0.99),
+              tally.percentile(1));
+  EXPECT_GE(tally.solved, 9'990);
+  EXPECT_EQ(tally.other_branch, 0);
+  EXPECT_EQ(tally.false_solutions, 0);
+}
+
+TEST(Inverse, StaysNearTheSeedWhenThePoseIsNear) {
+  const auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  Random random(12);
+  for (int i = 0; i < 1000; ++i) {
+    AxisVector q = robot.home;
+    for (auto& angle : q) angle += random.uniform(-0.3, 0.3);
+    AxisVector seed = q;
+    for (auto& angle : seed) angle += random.uniform(-0.05, 0.05);
+    const auto found = model.inverse(model.world_from_tip(q), seed);
+    ASSERT_TRUE(found.has_value());
+    ASSERT_LT((*found - q).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+TEST(Inverse, TakesTheTurnNearestToTheSeed) {
+  const auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  AxisVector seed = robot.home;
+  seed[5] = 5.5;
+  AxisVector wanted = seed;
+  wanted[5] = 6.2;
+  EXPECT_NEAR(model.inverse(model.world_from_tip(wanted), seed).value()[5], 6.2, 1e-6);
+  wanted[5] = 6.5;  // beyond the limit of 2π: one turn back
+  EXPECT_NEAR(model.inverse(model.world_from_tip(wanted), seed).value()[5], 6.5 - 2 * std::numbers::pi, 1e-6);
+}
+
+TEST(Inverse, RefusesWhatIsOutOfReach) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  const auto q = model.inverse(tool_down(2, 0, 1, 0), hanging_arm().home);
+  ASSERT_FALSE(q.has_value());
+  EXPECT_NE(q.error().line().find("cannot reach (2.000, 0.000, 1.000)"), std::string::npos);
+  Pose nonsense = Pose::Identity();
+  nonsense.translation().x() = NAN;
+  EXPECT_FALSE(model.inverse(nonsense, hanging_arm().home).has_value());
+}
+
+// A seven-axis arm of the common kind (published parameters of a Panda), written out from its table.
+std::filesystem::path seven_axis_urdf() {
+  const double xyz[7][3] = {{0, 0, 0.333}, {0, 0, 0}, {0, -0.316, 0}, {0.0825, 0, 0}, {-0.0825, 0.384, 0}, {0, 0, 0}, {0.088, 0, 0}};
+  const double roll[7] = {0, -kHalfPi, kHalfPi, kHalfPi, -kHalfPi, kHalfPi, kHalfPi};
+  const auto path = std::filesystem::path(testing::TempDir()) / "seven.urdf";
+  std::ofstream file(path);
+  file.precision(17);
+  file << "<robot name='seven'><link name='l0'/>";
+  for (int i = 0; i < 7; ++i) {
+    file << "<link name='l" << i + 1 << "'><inertial><mass value='2'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
+         << "iyz='0'/></inertial></link><joint name='j" << i + 1 << "' type='revolute'><parent link='l" << i << "'/><child link='l"
+         << i + 1 << "'/><origin xyz='" << xyz[i][0] << ' ' << xyz[i][1] << ' ' << xyz[i][2] << "' rpy='" << roll[i]
+         << " 0 0'/><axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='80' velocity='2'/></joint>";
+  }
+  file << "<link name='flange'/><joint name='f' type='fixed'><parent link='l7'/><child link='flange'/><origin xyz='0 0 0.107'/>"
+       << "</joint></robot>";
+  return path;
+}
+
+world::Robot seven_axis_arm() {
+  world::Robot robot;
+  robot.name = "seven";
+  robot.urdf = seven_axis_urdf();
+  robot.flange_link = "flange";
+  robot.home = axis_vector({0, -0.785, 0, -2.356, 0, 1.571, 0.785});
+  robot.limits.position_min = axis_vector({-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973});
+  robot.limits.position_max = axis_vector({2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973});
+  for (auto* list : {&robot.limits.speed_rad_s, &robot.limits.acceleration_rad_s2, &robot.limits.jerk_rad_s3, &robot.limits.torque_nm}) {
+    *list = AxisVector::Constant(7, 10);
+  }
+  return robot;
+}
+
+TEST(Inverse, RedundantArmStaysInsideItsLimitsAndNearItsSeed) {
+  const auto robot = seven_axis_arm();
+  auto model = RobotModel::load(robot).value();
+  Random random(13);
+  int solved = 0, asked = 0;
+  double farthest = 0;
+  std::vector<double> microseconds;
+  for (; asked < 2000; ++asked) {
+    const double radius = random.uniform(0.35, 0.6), azimuth = random.uniform(-1.5, 1.5);
+    const Pose target = tool_down(radius * std::cos(azimuth), radius * std::sin(azimuth), random.uniform(0.1, 0.5),
+                                  azimuth + random.uniform(-1.0, 1.0));
+    const auto begin = std::chrono::steady_clock::now();
+    const auto q = model.inverse(target, robot.home);
+    microseconds.push_back(1e-3 * static_cast<double>((std::chrono::steady_clock::now() - begin).count()));
+    if (!q) continue;
+    ++solved;
+    EXPECT_LT((model.world_from_tip(*q).translation() - target.translation()).norm(), 1e-6);
+    EXPECT_TRUE(((*q - robot.limits.position_min).array() >= 0).all() && ((robot.limits.position_max - *q).array() >= 0).all());
+    farthest = std::max(farthest, (*q - robot.home).tail(5).head(4).cwiseAbs().maxCoeff());
+  }
+  std::sort(microseconds.begin(), microseconds.end());
+  std::printf("seven axes: solved %d of %d, middle axes at most %.2f rad from home, median %.1f us\n", solved, asked, farthest,
+              microseconds[microseconds.size() / 2]);
+  EXPECT_GE(solved, 1990);
+  EXPECT_LT(farthest, 1.6);
+}
+
+}  // namespace
+}  // namespace pons::model

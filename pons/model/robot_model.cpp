@@ -1,0 +1,232 @@
+#include "pons/model/robot_model.hpp"
+
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+
+#include <pinocchio/algorithm/aba.hpp>
+#include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+#include <pinocchio/multibody.hpp>
+#include <pinocchio/parsers/urdf.hpp>
+
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "pons/model/inverse.hpp"
+
+namespace pons::model {
+namespace {
+
+constexpr double kGravityMS2 = 9.81;
+
+Pose pose_of(const pinocchio::SE3& m) {
+  Pose pose = Pose::Identity();
+  pose.linear() = m.rotation();
+  pose.translation() = m.translation();
+  return pose;
+}
+
+pinocchio::SE3 se3_of(const Pose& pose) { return {pose.linear(), pose.translation()}; }
+
+// Keeps what the URDF parser would print, for the one line of error. Restores the printer that was there.
+class ParserMessages final : public console_bridge::OutputHandler {
+ public:
+  ParserMessages() : before_(console_bridge::getOutputHandler()) { console_bridge::useOutputHandler(this); }
+  ~ParserMessages() override { console_bridge::useOutputHandler(before_); }
+  ParserMessages(const ParserMessages&) = delete;
+  ParserMessages& operator=(const ParserMessages&) = delete;
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first.empty()) first = text;
+  }
+  std::string first;
+
+ private:
+  console_bridge::OutputHandler* before_;
+};
+
+pinocchio::Inertia point_mass(double mass_kg, const Vector3& com_m) {
+  return {mass_kg, com_m, pinocchio::Symmetric3::Zero()};
+}
+
+}  // namespace
+
+// Vectors are dynamic although AxisVector would do: Pinocchio's libraries are compiled for them.
+struct RobotModel::Impl final : Chain {
+  world::Robot robot;
+  pinocchio::Model model;
+  pinocchio::Data data;
+  Pose base_from_world = Pose::Identity();
+  pinocchio::FrameIndex flange = 0;
+  pinocchio::JointIndex last_joint = 0;
+  pinocchio::SE3 last_joint_from_flange;
+  pinocchio::SE3 last_joint_from_tip;
+  pinocchio::Inertia last_inertia;  // last link and tool, without payload
+  std::vector<pinocchio::FrameIndex> capsule_frames;
+  Eigen::VectorXd q, v, a, tau;
+
+  Impl(world::Robot robot_in, pinocchio::Model model_in)
+      : robot(std::move(robot_in)), model(std::move(model_in)), data(model) {
+    base_from_world = robot.world_from_base.inverse();
+    model.gravity.linear() = base_from_world.linear() * Vector3(0, 0, -kGravityMS2);
+    flange = model.getFrameId(robot.flange_link);
+    last_joint = model.frames[flange].parentJoint;
+    last_joint_from_flange = model.frames[flange].placement;
+    last_joint_from_tip = last_joint_from_flange * se3_of(robot.tool.flange_from_tip);
+    last_inertia = model.inertias[last_joint] + last_joint_from_flange.act(point_mass(robot.tool.mass_kg, robot.tool.com_m));
+    model.inertias[last_joint] = last_inertia;
+    for (const auto& capsule : robot.capsules) capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
+    q = v = a = tau = Eigen::VectorXd::Zero(model.nv);
+  }
+
+  // The payload is a point mass rigid to the flange: it joins the inertia of the last moving link.
+  void carry(const Payload& payload) PONS_NONBLOCKING {
+    const Vector3 com(payload.com_m[0], payload.com_m[1], payload.com_m[2]);
+    model.inertias[last_joint] = last_inertia;
+    if (payload.mass_kg > 0) model.inertias[last_joint] += last_joint_from_flange.act(point_mass(payload.mass_kg, com));
+  }
+
+  void evaluate(const AxisVector& at, Pose& world_from_tip, Jacobian& jacobian) override {
+    q = at;
+    pinocchio::computeJointJacobians(model, data, q);
+    const pinocchio::SE3 base_from_tip = data.oMi[last_joint] * last_joint_from_tip;
+    world_from_tip = robot.world_from_base * pose_of(base_from_tip);
+    jacobian.resize(6, model.nv);
+    const Eigen::Matrix3d turn = robot.world_from_base.linear();
+    for (Eigen::Index axis = 0; axis < model.nv; ++axis) {
+      // data.J holds each axis's twist at the base origin, in base axes; move it to the tip, turn it to the world.
+      const Vector3 angular = data.J.col(axis).tail<3>();
+      const Vector3 linear = data.J.col(axis).head<3>() + angular.cross(base_from_tip.translation());
+      jacobian.col(axis).head<3>() = turn * linear;
+      jacobian.col(axis).tail<3>() = turn * angular;
+    }
+  }
+  const AxisLimits& limits() const override { return robot.limits; }
+};
+
+RobotModel::RobotModel(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RobotModel::RobotModel(RobotModel&&) noexcept = default;
+RobotModel& RobotModel::operator=(RobotModel&&) noexcept = default;
+RobotModel::~RobotModel() = default;
+
+namespace {
+
+// The first thing about `model` that this program cannot work with.
+Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
+  const std::string where = robot.urdf.string();
+  if (model.nv == 0) return fail("the robot has no moving joint", where, "give at least one joint type revolute or prismatic");
+  if (model.nq != model.nv) {
+    return fail("a joint is continuous, floating or spherical", where, "make it revolute with limits, or fixed");
+  }
+  if (model.nv > static_cast<int>(kMaxAxes)) {
+    return fail(fmt::format("{} moving joints, at most {} are supported", model.nv, kMaxAxes), where, "fix some of them");
+  }
+  if (!model.existFrame(robot.flange_link, pinocchio::BODY)) {
+    return fail(fmt::format("no link named '{}'", robot.flange_link), where, "name the flange link of this URDF in the robot file");
+  }
+  const auto parent = model.frames[model.getFrameId(robot.flange_link)].parentJoint;
+  if (parent != static_cast<pinocchio::JointIndex>(model.njoints) - 1) {
+    return fail(fmt::format("link '{}' does not hang on the last moving joint", robot.flange_link), where,
+                "describe one chain of joints that ends in the flange");
+  }
+  for (const auto& capsule : robot.capsules) {
+    if (!model.existFrame(capsule.link, pinocchio::BODY)) {
+      return fail(fmt::format("a capsule hangs on '{}', which is no link", capsule.link), where, "correct the capsule's link");
+    }
+  }
+  const auto& limits = robot.limits;
+  const std::pair<const char*, const AxisVector*> lists[] = {
+      {"home", &robot.home},          {"position_min", &limits.position_min},         {"position_max", &limits.position_max},
+      {"speed", &limits.speed_rad_s}, {"acceleration", &limits.acceleration_rad_s2}, {"jerk", &limits.jerk_rad_s3},
+      {"torque", &limits.torque_nm}};
+  for (const auto& [name, list] : lists) {
+    if (list->size() == model.nv) continue;
+    return fail(fmt::format("'{}' has {} values, the URDF {} moving joints", name, list->size(), model.nv), robot.name,
+                "give one value a moving joint");
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<RobotModel> RobotModel::load(const world::Robot& robot) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(robot.urdf, ignored)) {
+    return fail("no such URDF file", robot.urdf.string(), "correct the robot file's 'urdf'");
+  }
+  pinocchio::Model model;
+  ParserMessages messages;
+  try {
+    pinocchio::urdf::buildModel(robot.urdf.string(), model);
+  } catch (const std::exception& error) {
+    return fail(fmt::format("broken URDF: {}", messages.first.empty() ? error.what() : messages.first), robot.urdf.string(),
+                "mend the XML there");
+  }
+  if (auto checked = check(robot, model); !checked) return std::unexpected(checked.error());
+  return RobotModel(std::make_unique<Impl>(robot, std::move(model)));
+}
+
+RobotModel RobotModel::copy() const {
+  auto impl = std::make_unique<Impl>(*impl_);
+  return RobotModel(std::move(impl));
+}
+
+int RobotModel::axes() const { return impl_->model.nv; }
+const world::Robot& RobotModel::robot() const { return impl_->robot; }
+
+Pose RobotModel::world_from_tip(const AxisVector& q) {
+  impl_->q = q;
+  pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);
+  return impl_->robot.world_from_base * pose_of(impl_->data.oMi[impl_->last_joint] * impl_->last_joint_from_tip);
+}
+
+Jacobian RobotModel::tip_jacobian(const AxisVector& q) {
+  Pose tip;
+  Jacobian jacobian;
+  impl_->evaluate(q, tip, jacobian);
+  return jacobian;
+}
+
+Expected<AxisVector> RobotModel::inverse(const Pose& world_from_tip, const AxisVector& seed) {
+  if (seed.size() != axes() || !seed.allFinite() || !world_from_tip.matrix().allFinite()) {
+    return fail("pose or seed is not finite, or the seed has another number of axes", impl_->robot.name);
+  }
+  if (const auto q = solve_inverse(*impl_, world_from_tip, seed)) return *q;
+  const Vector3& p = world_from_tip.translation();
+  return fail(fmt::format("the tip cannot reach ({:.3f}, {:.3f}, {:.3f}) m in that orientation", p.x(), p.y(), p.z()),
+              impl_->robot.name, "choose a pose inside the arm's reach");
+}
+
+void RobotModel::place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules) {
+  impl_->q = q;
+  pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);
+  capsules.clear();
+  for (std::size_t i = 0; i < impl_->robot.capsules.size(); ++i) {
+    const auto& capsule = impl_->robot.capsules[i];
+    const auto& frame = impl_->model.frames[impl_->capsule_frames[i]];
+    const Pose world_from_link = impl_->robot.world_from_base * pose_of(impl_->data.oMi[frame.parentJoint] * frame.placement);
+    capsules.push_back({world_from_link * capsule.from, world_from_link * capsule.to, capsule.radius_m});
+  }
+}
+
+void RobotModel::inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration,
+                                  const Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING {
+  impl_->carry(payload);
+  impl_->q = q;
+  impl_->v = speed;
+  impl_->a = acceleration;
+  torque_nm = pinocchio::rnea(impl_->model, impl_->data, impl_->q, impl_->v, impl_->a);
+}
+
+void RobotModel::forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm,
+                                  const Payload& payload, AxisVector& acceleration) PONS_NONBLOCKING {
+  impl_->carry(payload);
+  impl_->q = q;
+  impl_->v = speed;
+  impl_->tau = torque_nm;
+  acceleration = pinocchio::aba(impl_->model, impl_->data, impl_->q, impl_->v, impl_->tau, pinocchio::Convention::LOCAL);
+}
+
+}  // namespace pons::model

@@ -1,0 +1,163 @@
+#include "pons/model/robot_model.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pons/core/random.hpp"
+#include "pons/model/test_robots.hpp"
+
+namespace pons::model {
+namespace {
+
+AxisVector random_axes(Random& random, double span) {
+  AxisVector q(6);
+  for (auto& angle : q) angle = random.uniform(-span, span);
+  return q;
+}
+
+// T = Rz(q) Tz(d) Tx(a) Rx(alpha), the published parameters.
+Pose denavit_hartenberg(const AxisVector& q) {
+  constexpr double kHalfPi = std::numbers::pi / 2;
+  const double d[] = {0.1625, 0, 0, 0.1333, 0.0997, 0.0996}, a[] = {0, -0.425, -0.3922, 0, 0, 0},
+               alpha[] = {kHalfPi, 0, 0, kHalfPi, -kHalfPi, 0};
+  Pose pose = Pose::Identity();
+  for (int i = 0; i < 6; ++i) {
+    pose = pose * Eigen::AngleAxisd(q[i], Vector3::UnitZ()) * Eigen::Translation3d(a[i], 0, d[i]) *
+           Eigen::AngleAxisd(alpha[i], Vector3::UnitX());
+  }
+  return pose;
+}
+
+TEST(RobotModel, ForwardKinematicsFollowThePublishedParameters) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(1);
+  for (int i = 0; i < 1000; ++i) {
+    const AxisVector q = random_axes(random, 6);
+    const Pose expected = hanging_arm().world_from_base * denavit_hartenberg(q) * hanging_arm().tool.flange_from_tip;
+    ASSERT_TRUE(model.world_from_tip(q).matrix().isApprox(expected.matrix(), 1e-10)) << q.transpose();
+  }
+}
+
+TEST(RobotModel, JacobianIsTheDerivativeOfTheTip) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(2);
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 100; ++i) {
+    const AxisVector q = random_axes(random, 3);
+    const Jacobian jacobian = model.tip_jacobian(q);
+    for (int axis = 0; axis < 6; ++axis) {
+      AxisVector low = q, high = q;
+      low[axis] -= kStep;
+      high[axis] += kStep;
+      const Pose from = model.world_from_tip(low), to = model.world_from_tip(high);
+      const Eigen::AngleAxisd turn(Eigen::Matrix3d(to.linear() * from.linear().transpose()));
+      EXPECT_TRUE(jacobian.col(axis).head<3>().isApprox((to.translation() - from.translation()) / (2 * kStep), 1e-5) ||
+                  jacobian.col(axis).head<3>().norm() < 1e-6);
+      EXPECT_TRUE(jacobian.col(axis).tail<3>().isApprox(turn.axis() * turn.angle() / (2 * kStep), 1e-5));
+    }
+  }
+}
+
+// At rest the torques must balance the weight of every part: tau = -sum(J_com^T m g), and a known load adds J_load^T m g.
+TEST(RobotModel, PayloadAddsExactlyItsWeight) {
+  const auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  Random random(3);
+  const AxisVector still = AxisVector::Zero(6);
+  const Payload payload{.mass_kg = 2.5, .com_m = {0.02, -0.01, 0.16}};
+  for (int i = 0; i < 100; ++i) {
+    const AxisVector q = random_axes(random, 3);
+    AxisVector empty, loaded;
+    model.inverse_dynamics(q, still, still, {}, empty);
+    model.inverse_dynamics(q, still, still, payload, loaded);
+    // The load's centre seen from the tip; the Jacobian moves there rigidly.
+    const Pose tip = model.world_from_tip(q);
+    const Vector3 from_tip = tip.linear() * Vector3(0.02, -0.01, 0.0);
+    const Jacobian jacobian = model.tip_jacobian(q);
+    for (int axis = 0; axis < 6; ++axis) {
+      const Vector3 linear = jacobian.col(axis).head<3>() + Vector3(jacobian.col(axis).tail<3>()).cross(from_tip);
+      EXPECT_NEAR(loaded[axis] - empty[axis], 2.5 * 9.81 * linear.z(), 1e-9);
+    }
+  }
+}
+
+// Energy gained per second equals the power put in, whatever the motion: checks inertia and gravity together.
+TEST(RobotModel, FirstAxisOfAHangingArmCarriesNoWeight) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(4);
+  AxisVector torque;
+  for (int i = 0; i < 100; ++i) {
+    model.inverse_dynamics(random_axes(random, 3), AxisVector::Zero(6), AxisVector::Zero(6), {}, torque);
+    EXPECT_NEAR(torque[0], 0, 1e-9);
+  }
+}
+
+// The pendulum of the last two links about the shoulder, by hand: only the second axis accelerates, arm stretched level.
+TEST(RobotModel, StretchedArmWeighsWhatItsPartsWeigh) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  AxisVector torque;
+  model.inverse_dynamics(AxisVector::Zero(6), AxisVector::Zero(6), AxisVector::Zero(6), {}, torque);
+  // Masses and the published centres along the arm (x); wrist 1, 2, 3 and tool hang at the wrist.
+  const double moment = 8.058 * 0.2125 + 2.846 * (0.425 + 0.2422) + (1.37 + 1.3 + 0.365 + 0.9) * (0.425 + 0.3922);
+  // The first axis points down, the arm along -x: the torque that holds it is negative about the second axis.
+  EXPECT_NEAR(std::abs(torque[1]), 9.81 * moment, 1e-6);
+}
+
+TEST(RobotModel, ForwardDynamicsInvertInverseDynamics) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const AxisVector q = random_axes(random, 3), speed = random_axes(random, 3), wanted = random_axes(random, 20);
+    const Payload payload{.mass_kg = random.uniform(0, 3), .com_m = {0, 0.01, 0.2}};
+    AxisVector torque, acceleration;
+    model.inverse_dynamics(q, speed, wanted, payload, torque);
+    model.forward_dynamics(q, speed, torque, payload, acceleration);
+    EXPECT_TRUE(acceleration.isApprox(wanted, 1e-8)) << acceleration.transpose() << " | " << wanted.transpose();
+  }
+}
+
+TEST(RobotModel, CapsulesMoveWithTheirLinks) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  std::vector<PlacedCapsule> capsules;
+  const AxisVector q = hanging_arm().home;
+  model.place_capsules(q, capsules);
+  ASSERT_EQ(capsules.size(), 2u);
+  EXPECT_TRUE(capsules[1].to.isApprox(model.world_from_tip(q).translation(), 1e-9));
+  EXPECT_NEAR((capsules[0].from - capsules[0].to).norm(), 0.3922, 1e-9);
+}
+
+TEST(RobotModel, CopyIsIndependentAndEqual) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  auto copy = model.copy();
+  const AxisVector q = hanging_arm().home;
+  AxisVector here, there;
+  model.inverse_dynamics(q, q, q, {.mass_kg = 3, .com_m = {0, 0, 0.1}}, here);
+  copy.inverse_dynamics(q, q, q, {}, there);
+  EXPECT_FALSE(here.isApprox(there, 1e-3));
+  model.inverse_dynamics(q, q, q, {}, here);
+  EXPECT_EQ(here, there);
+}
+
+TEST(RobotModel, LoadingSaysWhatIsWrong) {
+  auto robot = hanging_arm();
+  robot.urdf = "no/such.urdf";
+  EXPECT_NE(RobotModel::load(robot).error().line().find("no/such.urdf: no such URDF file"), std::string::npos);
+  robot = hanging_arm();
+  robot.flange_link = "hand";
+  EXPECT_NE(RobotModel::load(robot).error().line().find("no link named 'hand'"), std::string::npos);
+  robot = hanging_arm();
+  robot.limits.jerk_rad_s3 = AxisVector::Constant(5, 400);
+  EXPECT_NE(RobotModel::load(robot).error().line().find("'jerk' has 5 values, the URDF 6"), std::string::npos);
+  robot = hanging_arm();
+  robot.flange_link = "forearm_link";
+  EXPECT_NE(RobotModel::load(robot).error().line().find("does not hang on the last moving joint"), std::string::npos);
+  const auto path = std::filesystem::path(testing::TempDir()) / "broken.urdf";
+  std::ofstream(path) << "<robot name='x'><link";
+  robot = hanging_arm();
+  robot.urdf = path;
+  EXPECT_NE(RobotModel::load(robot).error().line().find("broken URDF"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace pons::model

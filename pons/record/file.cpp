@@ -1,0 +1,111 @@
+#include "pons/record/file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <system_error>
+
+namespace pons::record {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[nodiscard]] std::unexpected<Error> cannot(std::string_view what, const fs::path& where, int error) {
+  std::string mend = "choose another path";
+  if (error == ENOSPC || error == EDQUOT) mend = "free some space or choose another path";
+  if (error == EACCES || error == EPERM) mend = "change the folder's permissions or choose another path";
+  return fail(fmt::format("cannot {}: {}", what, std::generic_category().message(error)), where.string(), mend);
+}
+
+// The file that a name stands for once links are followed: replacing the link itself would cut it off from its target.
+[[nodiscard]] fs::path behind_links(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_symlink(path, error)) return path;
+  fs::path target = fs::weakly_canonical(path, error);
+  return error ? path : target;
+}
+
+[[nodiscard]] fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+// An open file descriptor, closed on every way out.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+// 0, or the errno of what went wrong.
+[[nodiscard]] int write_and_sync(const fs::path& path, std::string_view bytes) {
+  const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
+  if (file.number() < 0) return errno;
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(file.number(), bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return ::fsync(file.number()) == 0 ? 0 : errno;
+}
+
+// The rename lives in the folder: until the folder is synced, a power cut can undo it.
+[[nodiscard]] int sync_folder(const fs::path& folder) {
+  const Descriptor directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (directory.number() < 0) return errno;
+  // Some file systems cannot sync a folder (EINVAL); theirs is then as good as it gets.
+  return ::fsync(directory.number()) == 0 || errno == EINVAL ? 0 : errno;
+}
+
+}  // namespace
+
+Expected<void> check_writable(const fs::path& path) {
+  if (path.empty() || !path.has_filename()) {
+    return fail("no file name", path.string(), "give the path of a file, not of a folder");
+  }
+  const fs::path target = behind_links(path);
+  const fs::path folder = folder_of(target);
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
+    return fail(fs::is_directory(status) ? "is a folder" : "is not a regular file", path.string(),
+                "give the path of a file");
+  }
+  if (!fs::is_directory(folder, error)) {
+    return fail("the folder does not exist", folder.string(), "create it or choose another path");
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return cannot("write into this folder", folder, errno);
+  return {};
+}
+
+Expected<void> write_whole(const fs::path& path, std::string_view bytes) {
+  if (auto writable = check_writable(path); !writable) return writable;
+  const fs::path target = behind_links(path);
+  fs::path part = target;
+  part += fmt::format(".{}.part", ::getpid());
+
+  if (const int error = write_and_sync(part, bytes); error != 0) {
+    ::unlink(part.c_str());
+    return cannot("write", path, error);
+  }
+  if (::rename(part.c_str(), target.c_str()) != 0) {
+    const int error = errno;
+    ::unlink(part.c_str());
+    return cannot("replace the file", path, error);
+  }
+  if (const int error = sync_folder(folder_of(target)); error != 0) return cannot("sync the folder", path, error);
+  return {};
+}
+
+}  // namespace pons::record

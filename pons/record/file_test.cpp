@@ -1,0 +1,104 @@
+#include "pons/record/file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <sys/resource.h>
+
+namespace pons::record {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class FileTest : public ::testing::Test {
+ protected:
+  FileTest() : folder_(fs::temp_directory_path() / ("pons_file_test_" + std::to_string(::getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~FileTest() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] static std::string read(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  [[nodiscard]] std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(FileTest, WritesAndReplaces) {
+  const fs::path path = folder_ / "a.json";
+  ASSERT_TRUE(write_whole(path, "a longer first text"));
+  EXPECT_EQ(read(path), "a longer first text");
+  ASSERT_TRUE(write_whole(path, std::string_view("b\0c", 3)));
+  EXPECT_EQ(read(path), std::string("b\0c", 3));
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(FileTest, KeepsALinkALink) {
+  const fs::path link = folder_ / "link.json";
+  ASSERT_TRUE(write_whole(folder_ / "target.json", "old"));
+  fs::create_symlink("target.json", link);
+  ASSERT_TRUE(write_whole(link, "new"));
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(read(folder_ / "target.json"), "new");
+}
+
+TEST_F(FileTest, SaysWhatWhereAndHowToMend) {
+  const auto missing = write_whole(folder_ / "nowhere" / "a.json", "x");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().line(),
+            (folder_ / "nowhere").string() + ": the folder does not exist; create it or choose another path");
+
+  const auto directory = write_whole(folder_, "x");
+  ASSERT_FALSE(directory);
+  EXPECT_THAT(directory.error().line(), HasSubstr("is a folder"));
+
+  const auto device = write_whole("/dev/null", "x");
+  ASSERT_FALSE(device);
+  EXPECT_THAT(device.error().line(), HasSubstr("is not a regular file"));
+
+  ASSERT_FALSE(write_whole("", "x"));
+  const auto kernel = check_writable("/proc/a.json");
+  // Root may write into a folder without permission, but nobody creates a file in /proc.
+  const auto written = write_whole("/proc/a.json", "x");
+  EXPECT_FALSE(kernel && written);
+  EXPECT_EQ(files(), 0);
+}
+
+// A full disk, as the file size limit plays it: the old file stays, and no part of the new one does.
+TEST_F(FileTest, LeavesTheOldFileWhenTheDiskIsFull) {
+  const fs::path path = folder_ / "a.json";
+  ASSERT_TRUE(write_whole(path, "old"));
+
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit tight{.rlim_cur = 1000, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
+  const auto full = write_whole(path, std::string(4000, 'x'));
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+
+  ASSERT_FALSE(full);
+  EXPECT_THAT(full.error().line(), HasSubstr("cannot write"));
+  EXPECT_EQ(read(path), "old");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(FileTest, AsksWithoutWriting) {
+  EXPECT_TRUE(check_writable(folder_ / "a.json"));
+  EXPECT_EQ(files(), 0);
+}
+
+}  // namespace
+}  // namespace pons::record

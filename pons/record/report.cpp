@@ -1,0 +1,87 @@
+#include "pons/record/report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "pons/record/file.hpp"
+
+namespace pons::record {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+[[nodiscard]] Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+[[nodiscard]] std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
+
+}  // namespace
+
+Report::Throughput throughput(double span_s, std::int64_t sorted) {
+  if (sorted <= 0 || !(span_s > 0)) return {.seconds_per_parcel = std::numeric_limits<double>::quiet_NaN()};
+  const double seconds_per_parcel = span_s / static_cast<double>(sorted);
+  return {.seconds_per_parcel = seconds_per_parcel, .parcels_per_hour = 3600.0 / seconds_per_parcel};
+}
+
+nlohmann::ordered_json to_json(const Report& report) {
+  const auto& parcels = report.parcels;
+  const auto& loop = report.loop;
+  Json json;
+  json["seed"] = report.seed;
+  json["world"] = report.world;
+  json["parcels"] = {
+      {"offered", parcels.offered},
+      {"sorted", parcels.sorted},
+      {"missorted", parcels.missorted},
+      {"lost", parcels.lost},
+      {"duplicated", parcels.duplicated},
+      {"exceptions", {{"deserved", parcels.exceptions.deserved}, {"undeserved", parcels.exceptions.undeserved}}},
+      {"damaged", parcels.damaged}};
+  json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
+                        {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
+  json["retries"] = report.retries;
+  json["limits"] = {{"violations", report.limits.violations}, {"worst_ratio", number(report.limits.worst_ratio)}};
+  json["loop"] = {
+      {"ticks", loop.ticks}, {"missed", loop.missed}, {"p50_us", number(loop.p50_us)}, {"p99_us", number(loop.p99_us)}};
+  json["sim_seconds"] = number(report.sim_seconds);
+  json["wall_seconds"] = number(report.wall_seconds);
+  json["state_hash"] = hex(report.state_hash);
+  return json;
+}
+
+Expected<void> write(const Report& report, const std::filesystem::path& path) {
+  // A world's name comes from a path and may hold any bytes: replace what is not UTF-8 rather than throw.
+  return write_whole(path, to_json(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+std::string summary(const Report& report) {
+  const auto& parcels = report.parcels;
+  std::string text;
+  const auto line = [&text](std::string_view name, std::string_view value) {
+    text += fmt::format("  {:<14}{}\n", name, value);
+  };
+  line("world", fmt::format("{}, seed {}", report.world, report.seed));
+  line("sorted", fmt::format("{} of {} parcels offered", parcels.sorted, parcels.offered));
+  line("exceptions",
+       fmt::format("{} deserved, {} undeserved", parcels.exceptions.deserved, parcels.exceptions.undeserved));
+  line("missorted", fmt::format("{}", parcels.missorted));
+  line("lost", fmt::format("{}", parcels.lost));
+  line("duplicated", fmt::format("{}", parcels.duplicated));
+  line("damaged", fmt::format("{}", parcels.damaged));
+  line("retries", fmt::format("{}", report.retries));
+  line("throughput", std::isfinite(report.throughput.seconds_per_parcel)
+                         ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",
+                                       report.throughput.seconds_per_parcel, report.throughput.parcels_per_hour)
+                         : std::string("nothing sorted"));
+  line("limits", fmt::format("{} violations, closest {:.1f} % of a limit", report.limits.violations,
+                             100 * report.limits.worst_ratio));
+  line("control loop", fmt::format("{} ticks, {} missed, step {:.1f} µs median, {:.1f} µs p99", report.loop.ticks,
+                                   report.loop.missed, report.loop.p50_us, report.loop.p99_us));
+  line("time", fmt::format("{:.1f} s simulated in {:.1f} s", report.sim_seconds, report.wall_seconds));
+  line("state hash", hex(report.state_hash));
+  return text;
+}
+
+}  // namespace pons::record

@@ -1,0 +1,68 @@
+// What one run came to, for people and for programs. docs/schema/report.json describes the file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "pons/core/error.hpp"
+
+namespace pons::record {
+
+// Counts are of parcels, from the referee's truth compared with the journal; times are simulated unless named
+// otherwise.
+struct Report {
+  struct Exceptions {
+    std::int64_t deserved = 0;    // unreadable, unknown, overweight, too large: nothing could have sorted them
+    std::int64_t undeserved = 0;  // sortable, yet not sorted
+  };
+  struct Parcels {
+    std::int64_t offered = 0;
+    std::int64_t sorted = 0;
+    std::int64_t missorted = 0;   // in another chute than the order's
+    std::int64_t lost = 0;        // no outcome, or not where the outcome says, or on the floor or tray without an entry
+    std::int64_t duplicated = 0;  // more than one outcome
+    Exceptions exceptions{};
+    std::int64_t damaged = 0;  // pressed or dropped too hard
+  };
+  struct Throughput {
+    double seconds_per_parcel = 0;  // first parcel offered to last outcome, over parcels sorted; NaN when none was
+    double parcels_per_hour = 0;
+  };
+  struct Limits {
+    std::int64_t violations = 0;  // axis-ticks beyond a limit
+    double worst_ratio = 0;       // the closest that anything came to its limit, or the furthest beyond: 1 is the limit
+  };
+  struct Loop {
+    std::int64_t ticks = 0;
+    std::int64_t missed = 0;  // ticks that began later than a period after their time; 0 in lockstep
+    double p50_us = 0;        // CPU time of a control step
+    double p99_us = 0;
+  };
+
+  std::uint64_t seed = 0;
+  std::string world{};
+  Parcels parcels{};
+  Throughput throughput{};
+  std::int64_t retries = 0;
+  Limits limits{};
+  Loop loop{};
+  double sim_seconds = 0;
+  double wall_seconds = 0;
+  std::uint64_t state_hash = 0;  // sixteen hexadecimal digits in the file; equal for equal runs of one seed
+};
+
+// `span_s` from the first parcel offered to the last outcome; nothing sorted gives NaN and 0.
+[[nodiscard]] Report::Throughput throughput(double span_s, std::int64_t sorted);
+
+// Keys in the order of the struct. A number that is not finite becomes null.
+[[nodiscard]] nlohmann::ordered_json to_json(const Report& report);
+
+// Puts the report at `path`, whole or not at all (see write_whole).
+[[nodiscard]] Expected<void> write(const Report& report, const std::filesystem::path& path);
+
+// A dozen aligned lines for a terminal, each ended by a newline.
+[[nodiscard]] std::string summary(const Report& report);
+
+}  // namespace pons::record

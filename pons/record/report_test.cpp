@@ -1,0 +1,138 @@
+#include "pons/record/report.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace pons::record {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using Json = nlohmann::ordered_json;
+
+[[nodiscard]] Report example() {
+  return {.seed = std::numeric_limits<std::uint64_t>::max(),
+          .world = "parcel_cell",
+          .parcels = {.offered = 200,
+                      .sorted = 190,
+                      .missorted = 1,
+                      .lost = 2,
+                      .duplicated = 3,
+                      .exceptions = {.deserved = 4, .undeserved = 5},
+                      .damaged = 6},
+          .throughput = throughput(570, 190),
+          .retries = 7,
+          .limits = {.violations = 0, .worst_ratio = 0.985},
+          .loop = {.ticks = 600000, .missed = 0, .p50_us = 9.5, .p99_us = 21},
+          .sim_seconds = 600,
+          .wall_seconds = 41.25,
+          .state_hash = 0x00f0e0d0c0b0a090};
+}
+
+[[nodiscard]] Json read(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return Json::parse(file);
+}
+
+[[nodiscard]] std::string type_of(const Json& value) {
+  if (value.is_number_integer()) return "integer";
+  return value.type_name();
+}
+
+[[nodiscard]] bool has_type(const Json& value, const Json& types) {
+  const auto fits = [&](const Json& type) { return type == type_of(value) || (type == "number" && value.is_number()); };
+  return types.is_array() ? std::any_of(types.begin(), types.end(), fits) : fits(types);
+}
+
+// Where `value` departs from `schema`, in the keywords that docs/schema/report.json uses.
+void departures(const Json& value, const Json& schema, const std::string& at, std::vector<std::string>& found) {
+  if (!has_type(value, schema.at("type"))) found.push_back(at + ": is " + type_of(value));
+  if (value.is_number() && schema.contains("minimum") && value < schema["minimum"]) found.push_back(at + ": too small");
+  if (value.is_string() && schema.contains("pattern") &&
+      !std::regex_match(value.get<std::string>(), std::regex(schema["pattern"].get<std::string>()))) {
+    found.push_back(at + ": does not match");
+  }
+  if (!value.is_object()) return;
+  for (const auto& key : schema.at("required")) {
+    if (!value.contains(key.get<std::string>())) found.push_back(at + "/" + key.get<std::string>() + ": missing");
+  }
+  for (const auto& [key, part] : value.items()) {
+    if (!schema.at("properties").contains(key)) {
+      found.push_back(at + "/" + key + ": unknown");
+    } else {
+      departures(part, schema["properties"][key], at + "/" + key, found);
+    }
+  }
+}
+
+[[nodiscard]] std::vector<std::string> departures(const Json& value) {
+  std::vector<std::string> found;
+  departures(value, read("docs/schema/report.json"), "", found);
+  return found;
+}
+
+TEST(Report, SatisfiesItsSchema) {
+  EXPECT_THAT(departures(to_json(example())), IsEmpty());
+  EXPECT_THAT(departures(to_json(Report{.world = "empty", .throughput = throughput(0, 0)})), IsEmpty());
+}
+
+TEST(Report, SchemaRefusesWhatIsNotAReport) {
+  Json report = to_json(example());
+  report.erase("loop");
+  report["retries"] = 1.5;
+  report["parcels"]["lost"] = -1;
+  report["parcels"]["found"] = 1;
+  report["state_hash"] = "F00";
+  EXPECT_THAT(departures(report),
+              ::testing::UnorderedElementsAre("/loop: missing", "/retries: is number", "/parcels/lost: too small",
+                                              "/parcels/found: unknown", "/state_hash: does not match"));
+}
+
+TEST(Report, KeepsEveryFigure) {
+  EXPECT_EQ(to_json(example()), Json::parse(R"({
+    "seed": 18446744073709551615, "world": "parcel_cell",
+    "parcels": {"offered": 200, "sorted": 190, "missorted": 1, "lost": 2, "duplicated": 3,
+                "exceptions": {"deserved": 4, "undeserved": 5}, "damaged": 6},
+    "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
+    "limits": {"violations": 0, "worst_ratio": 0.985},
+    "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0},
+    "sim_seconds": 600.0, "wall_seconds": 41.25, "state_hash": "00f0e0d0c0b0a090"})"));
+}
+
+TEST(Report, NothingSortedHasNoSecondsPerParcel) {
+  const Json json = to_json(Report{.throughput = throughput(12, 0)});
+  EXPECT_TRUE(json["throughput"]["seconds_per_parcel"].is_null());
+  EXPECT_EQ(json["throughput"]["parcels_per_hour"], 0.0);
+}
+
+TEST(Report, WritesWhatItSays) {
+  const auto path = std::filesystem::temp_directory_path() / ("pons_report_" + std::to_string(::getpid()) + ".json");
+  Report report = example();
+  report.world = "not \xff UTF-8";
+  ASSERT_TRUE(write(report, path));
+  const Json written = read(path);
+  std::filesystem::remove(path);
+  EXPECT_EQ(written["parcels"], to_json(report)["parcels"]);
+  EXPECT_THAT(written["world"].get<std::string>(), HasSubstr("UTF-8"));
+}
+
+TEST(Report, SummaryIsAligned) {
+  const std::string text = summary(example());
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 13);
+  EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
+  EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));
+  EXPECT_THAT(text, HasSubstr("  state hash    00f0e0d0c0b0a090\n"));
+  EXPECT_THAT(summary(Report{.throughput = throughput(3, 0)}), HasSubstr("nothing sorted"));
+}
+
+}  // namespace
+}  // namespace pons::record

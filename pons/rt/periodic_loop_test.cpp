@@ -1,0 +1,41 @@
+#include "pons/rt/periodic_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace pons::rt {
+namespace {
+
+TEST(PeriodicLoop, TicksAreAPeriodApartAndSkippedOnesAreCounted) {
+  const MonotonicClock clock;
+  constexpr Duration kPeriod{500'000};
+  PeriodicLoop loop(clock, kPeriod);
+  std::vector<Time> ticks;
+  loop.run([&](Time scheduled) {
+    EXPECT_GE(clock.now(), scheduled);
+    ticks.push_back(scheduled);
+    if (ticks.size() == 10) {
+      // A tick that takes three and a half periods makes the loop miss three.
+      while (clock.now() < scheduled + kPeriod * 7 / 2) {
+      }
+    }
+    return ticks.size() < 50;
+  });
+  ASSERT_EQ(ticks.size(), 50u);
+  EXPECT_EQ(loop.ticks(), 50u);
+  EXPECT_GE(loop.missed(), 3u);
+  for (std::size_t i = 1; i < ticks.size(); ++i) EXPECT_EQ((ticks[i] - ticks[i - 1]) % kPeriod, Duration{0});
+  EXPECT_EQ(static_cast<std::uint64_t>((ticks.back() - ticks.front()) / kPeriod), 49 + loop.missed());
+  EXPECT_GE(loop.execution().max(), kPeriod * 3);
+  EXPECT_EQ(loop.lateness().count(), 50u);
+}
+
+TEST(MakeRealtime, SaysWhatWasRefused) {
+  const Grant grant = make_realtime({.priority = 0, .cpu = 100'000 % 1024});
+  EXPECT_FALSE(grant.pinned);
+  EXPECT_NE(grant.refused.find("pinning refused"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace pons::rt

@@ -1,0 +1,59 @@
+// A stream from one thread to one other: every element arrives, once, in order. Wait-free on both sides.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+
+#include "pons/core/realtime.hpp"
+
+namespace pons::rt {
+
+// Lamport's single-producer single-consumer queue (1983) with each side's last view of the other cached, so that a push or
+// pop touches the other side's cache line only when it must. T is copied; give it a copy that cannot throw.
+template <typename T, std::size_t Capacity>
+class SpscRing {
+  static_assert(Capacity > 0 && (Capacity & (Capacity - 1)) == 0, "a power of two");
+
+ public:
+  static constexpr std::size_t kCapacity = Capacity;
+
+  // Producer only. False when full: nothing was stored.
+  [[nodiscard]] bool push(const T& value) PONS_NONBLOCKING {
+    const std::size_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail - head_seen_ == Capacity) {
+      head_seen_ = head_.load(std::memory_order_acquire);  // its slots are free only after the consumer copied them out
+      if (tail - head_seen_ == Capacity) return false;
+    }
+    slots_[tail % Capacity] = value;
+    tail_.store(tail + 1, std::memory_order_release);
+    return true;
+  }
+
+  // Consumer only. False when empty: `value` is untouched.
+  [[nodiscard]] bool pop(T& value) PONS_NONBLOCKING {
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    if (head == tail_seen_) {
+      tail_seen_ = tail_.load(std::memory_order_acquire);  // pairs with push: the slot is written before it shows here
+      if (head == tail_seen_) return false;
+    }
+    value = slots_[head % Capacity];
+    head_.store(head + 1, std::memory_order_release);
+    return true;
+  }
+
+  // Producer only: how many elements push() is sure to take now.
+  [[nodiscard]] std::size_t free() const PONS_NONBLOCKING {
+    return Capacity - (tail_.load(std::memory_order_relaxed) - head_.load(std::memory_order_acquire));
+  }
+
+ private:
+  static constexpr std::size_t kCacheLine = 64;
+  alignas(kCacheLine) std::atomic<std::size_t> head_{0};  // next to pop; counts up for ever
+  alignas(kCacheLine) std::size_t tail_seen_ = 0;         // consumer's
+  alignas(kCacheLine) std::atomic<std::size_t> tail_{0};  // next to push
+  alignas(kCacheLine) std::size_t head_seen_ = 0;         // producer's
+  alignas(kCacheLine) std::array<T, Capacity> slots_{};
+};
+
+}  // namespace pons::rt

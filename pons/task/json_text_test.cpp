@@ -1,0 +1,82 @@
+#include "pons/task/json_text.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace pons::task {
+namespace {
+
+std::string nested(int depth) {
+  return std::string(static_cast<std::size_t>(depth), '[') + std::string(static_cast<std::size_t>(depth), ']');
+}
+
+TEST(ParseJson, GivesWhatTheTextSays) {
+  const auto json = parse_json(R"({"a":[1,-2.5,"ü",null,true]})");
+  ASSERT_TRUE(json);
+  EXPECT_EQ(*json, (Json{{"a", {1, -2.5, "ü", nullptr, true}}}));
+}
+
+TEST(ParseJson, TakesSixteenLevelsAndRefusesMore) {
+  EXPECT_TRUE(parse_json(nested(16)));
+  EXPECT_EQ(parse_json(nested(17)).error().what, "nested deeper than 16 levels");
+  EXPECT_FALSE(parse_json(std::string(60'000, '[')));
+  std::string objects;
+  for (int i = 0; i < 10'000; ++i) objects += R"({"a":)";
+  EXPECT_EQ(parse_json(objects).error().what, "nested deeper than 16 levels");
+}
+
+TEST(ParseJson, RefusesOneByteTooMany) {
+  const std::string full = '"' + std::string(kMaxJsonBytes - 2, 'a') + '"';
+  EXPECT_TRUE(parse_json(full));
+  EXPECT_EQ(parse_json(full + " ").error().what, "65537 bytes of JSON");
+}
+
+TEST(ParseJson, RefusesNamesThatComeTwice) {
+  EXPECT_EQ(parse_json(R"({"id":"a","id":"b"})").error().what, "the name 'id' comes twice in one object");
+  EXPECT_EQ(parse_json(R"({"id":"a","\u0069d":"b"})").error().what, "the name 'id' comes twice in one object");
+  EXPECT_TRUE(parse_json(R"({"a":{"id":1},"id":2,"b":[{"id":3},{"id":4}]})"));
+}
+
+TEST(ParseJson, RefusesWhatIsNotUtf8OrNotJson) {
+  for (const std::string text : {"\"\xff\"",
+                                 "\"\xc0\xaf\"",
+                                 "\"\xed\xa0\x80\"",
+                                 "\"\xf4\x90\x80\x80\"",
+                                 "\"\xe2\x82\"",
+                                 "",
+                                 " ",
+                                 "{",
+                                 "[1,]",
+                                 "{\"a\":}",
+                                 "nul",
+                                 "NaN",
+                                 "Infinity",
+                                 "1 2",
+                                 "[1]x",
+                                 "'a'",
+                                 "{a:1}",
+                                 "/*c*/1",
+                                 "\"\\ud800\"",
+                                 "01",
+                                 "+1",
+                                 "\"a\nb\""}) {
+    const auto json = parse_json(text);
+    ASSERT_FALSE(json) << text;
+    EXPECT_NE(json.error().what.find("at byte"), std::string::npos) << json.error().line();
+  }
+  EXPECT_FALSE(parse_json(std::string("1\0", 2)));
+}
+
+TEST(ParseJson, RefusesNumbersBeyondADouble) {
+  EXPECT_EQ(parse_json("[1e999]").error().what, "number out of range at byte 6");
+}
+
+TEST(Excerpt, CutsBetweenCharactersAndShowsControls) {
+  EXPECT_EQ(excerpt("abc"), "abc");
+  EXPECT_EQ(excerpt("aüb", 2), "a…");
+  EXPECT_EQ(excerpt("a\nb\x7f"), "a\\x0ab\\x7f");
+}
+
+}  // namespace
+}  // namespace pons::task

@@ -1,0 +1,64 @@
+// The schema of a task as a brain writes it. docs/schema/task.json is this text.
+#pragma once
+
+#include <string_view>
+
+namespace pons::task {
+
+inline constexpr std::size_t kMaxSteps = 32;
+
+inline constexpr std::string_view kTaskSchema = R"({
+  "$schema": "https://json-schema.org/draft/2020-12/schema",
+  "title": "task",
+  "description": "What a brain asks the bridge for: steps, run in order.",
+  "type": "object",
+  "required": ["id", "steps"],
+  "additionalProperties": false,
+  "properties": {
+    "id": {
+      "description": "Yours to choose and never used twice. Sending the same task again is harmless.",
+      "type": "string",
+      "minLength": 1,
+      "maxLength": 64,
+      "pattern": "^[A-Za-z0-9._:-]+$"
+    },
+    "priority": {
+      "description": "Higher goes first.",
+      "type": "integer",
+      "minimum": 0,
+      "maximum": 100,
+      "default": 50
+    },
+    "deadline_s": {
+      "description": "Seconds of run time. A task that could not start by then is of no use and fails.",
+      "type": "number",
+      "minimum": 0,
+      "maximum": 1000000000
+    },
+    "steps": {
+      "type": "array",
+      "minItems": 1,
+      "maxItems": 32,
+      "items": {
+        "type": "object",
+        "required": ["skill"],
+        "additionalProperties": false,
+        "properties": {
+          "skill": {
+            "description": "A name that `pons skills` lists.",
+            "type": "string",
+            "minLength": 1,
+            "maxLength": 64
+          },
+          "arguments": {
+            "description": "As the skill's own schema says.",
+            "type": "object"
+          }
+        }
+      }
+    }
+  }
+}
+)";
+
+}  // namespace pons::task
