@@ -26,11 +26,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   if (!journal) return std::unexpected(journal.error());
   self->journal = std::move(*journal);
 
-  self->bridge_end = std::make_unique<link::BridgeEnd>(self->link.bridge_end());
-  self->cerebellum_end = std::make_unique<link::CerebellumEnd>(self->link.cerebellum_end());
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{});
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
   self->perception = std::make_unique<perception::Perception>(self->world, model->copy());
-  self->cell = std::make_unique<skills::Cell>(*self->bridge_end, self->world, std::move(*model));
+  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model));
   skills::add_skills(self->registry, *self->cell);
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);
@@ -61,7 +59,7 @@ runner::Parts Assembly::parts() {
                     .finished = [this] { return simulation->finished(); },
                     .health = [this] { return simulation->health(); }},
           .cerebellum = cerebellum.get(),
-          .link = cerebellum_end.get(),
+          .link = &cerebellum_end,
           .bridge_side = bridge_side.get(),
           .crew = crew.get()};
 }

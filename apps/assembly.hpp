@@ -45,8 +45,8 @@ class Assembly {
   std::unique_ptr<sim::Simulation> simulation;
   std::unique_ptr<bridge::Journal> journal;
   link::Link link;
-  std::unique_ptr<link::BridgeEnd> bridge_end;
-  std::unique_ptr<link::CerebellumEnd> cerebellum_end;
+  link::BridgeEnd bridge_end{link};
+  link::CerebellumEnd cerebellum_end{link};
   std::unique_ptr<cerebellum::Cerebellum> cerebellum;
   std::unique_ptr<perception::Perception> perception;
   std::unique_ptr<skills::Cell> cell;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "apps/journal_json.hpp"
 #include "pons/gate/request.hpp"
 
 namespace pons::apps {
@@ -30,7 +31,7 @@ Json Desk::answer(const std::string& text, Time now) {
       const auto tasks = journal_.tasks();
       if (!tasks) return gate::refusal(tasks.error());
       Json list = Json::array();
-      for (const bridge::TaskRecord& record : *tasks) list.push_back(bridge::to_json(record));
+      for (const bridge::TaskRecord& record : *tasks) list.push_back(to_json(record));
       return {{"ok", true}, {"tasks", std::move(list)}};
     }
     case gate::Operation::kShow: {
@@ -38,8 +39,8 @@ Json Desk::answer(const std::string& text, Time now) {
       if (!history) return gate::refusal(history.error());
       if (!*history) return gate::refusal({"no task '" + asked->task + "'", "show", "pons task list shows those there are"});
       Json events = Json::array();
-      for (const bridge::Event& event : (*history)->events) events.push_back(bridge::to_json(event));
-      return {{"ok", true}, {"task", bridge::to_json((*history)->record)}, {"events", std::move(events)}};
+      for (const bridge::Event& event : (*history)->events) events.push_back(to_json(event));
+      return {{"ok", true}, {"task", to_json((*history)->record)}, {"events", std::move(events)}};
     }
   }
   return gate::refusal({"unknown operation", "request", "use submit, list or show"});

@@ -41,8 +41,8 @@ int skills(const std::string& name) {
   if (!world) return bad_input(world.error());
   auto model = model::RobotModel::load(world->robot);
   if (!model) return bad_input(model.error());
-  link::Link link;
-  link::BridgeEnd end = link.bridge_end();
+  const auto link = std::make_unique<link::Link>();
+  link::BridgeEnd end(*link);
   skills::Cell cell(end, *world, std::move(*model));
   task::SkillRegistry registry;
   skills::add_skills(registry, cell);
@@ -58,7 +58,7 @@ int skills(const std::string& name) {
   return kExitGood;
 }
 
-constexpr const char* kBash = R"(_pons() {
+constexpr const char* kBash = R"bash(_pons() {
   local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}
   case $before in
     --manifest|--journal|--report|--picture|--socket) COMPREPLY=($(compgen -f -- "$current")); return ;;
@@ -80,7 +80,7 @@ constexpr const char* kBash = R"(_pons() {
   fi
 }
 complete -F _pons pons
-)";
+)bash";
 
 }  // namespace
 

@@ -121,7 +121,8 @@ record::Report report_of(const RunOptions& options, const Assembly& cell, const 
   report.retries = cell.bridge->retries();
   const cerebellum::Statistics& loop = cell.cerebellum->statistics();
   report.limits = {.violations = static_cast<std::int64_t>(verdict.violations + loop.violations),
-                   .worst_ratio = std::max(verdict.worst_ratio, loop.worst_ratio())};
+                   .worst_ratio = std::max({verdict.worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
+                                            loop.commanded.jerk, loop.commanded.torque})};
   report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
                  .missed = static_cast<std::int64_t>(result.loop.missed),
                  .p50_us = result.loop.p50_us,
@@ -146,7 +147,7 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 const std::int64_t done = cell.bridge_side->done();
                 if (!options.quiet) progress.show({now, done, cell.bridge_side->succeeded(), cell.bridge->queue_length()});
                 // With something on the cups, halfway: that is what the cell looks like.
-                if (!options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
+                if (!options.realtime && !options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
                   pictured = take_picture(cell, options.picture).has_value();
                 }
               },

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "apps/commands.hpp"
+#include "apps/journal_json.hpp"
 #include "apps/paths.hpp"
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
@@ -73,15 +74,15 @@ Expected<Json> from_journal(const fs::path& file, const std::string& id) {
     const auto tasks = (*journal)->tasks();
     if (!tasks) return std::unexpected(tasks.error());
     answer["tasks"] = Json::array();
-    for (const bridge::TaskRecord& record : *tasks) answer["tasks"].push_back(bridge::to_json(record));
+    for (const bridge::TaskRecord& record : *tasks) answer["tasks"].push_back(to_json(record));
     return answer;
   }
   const auto history = (*journal)->task(id);
   if (!history) return std::unexpected(history.error());
   if (!*history) return fail("no task '" + id + "'", file.string(), "pons task list shows those there are");
-  answer["task"] = bridge::to_json((*history)->record);
+  answer["task"] = to_json((*history)->record);
   answer["events"] = Json::array();
-  for (const bridge::Event& event : (*history)->events) answer["events"].push_back(bridge::to_json(event));
+  for (const bridge::Event& event : (*history)->events) answer["events"].push_back(to_json(event));
   return answer;
 }
 

@@ -23,7 +23,7 @@ function(pons_wheel_library name file)
 endfunction()
 
 set(lib "${PONS_PREFIX}/lib")
-foreach(name pinocchio_default pinocchio_parsers pinocchio_collision coal urdfdom_model tinyxml2)
+foreach(name pinocchio_default pinocchio_parsers pinocchio_collision coal urdfdom_model console_bridge tinyxml2)
   pons_wheel_library(${name} "${lib}/lib${name}.so")
 endforeach()
 target_include_directories(pons_ext_pinocchio_default SYSTEM INTERFACE "${PONS_PREFIX}/include"
@@ -36,7 +36,7 @@ target_compile_definitions(pons_ext_pinocchio_default INTERFACE
 target_link_libraries(pons_ext_pinocchio_default INTERFACE ext::eigen)
 add_library(pons_pinocchio INTERFACE)
 target_link_libraries(pons_pinocchio INTERFACE ext::pinocchio_default ext::pinocchio_parsers ext::pinocchio_collision ext::coal
-  ext::urdfdom_model ext::eigen)
+  ext::urdfdom_model ext::console_bridge ext::eigen)
 target_link_options(pons_pinocchio INTERFACE "-Wl,-rpath-link,${lib}")
 add_library(ext::pinocchio ALIAS pons_pinocchio)
 target_include_directories(pons_ext_tinyxml2 SYSTEM INTERFACE "${PONS_PREFIX}/include")

@@ -6,9 +6,9 @@ add_library(pons_flags INTERFACE)
 target_compile_features(pons_flags INTERFACE cxx_std_23)
 # -ffp-contract=off: the same seed gives the same bytes whatever the compiler fuses.
 target_compile_options(pons_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion
-  -Wnon-virtual-dtor -Woverloaded-virtual -Werror -ffp-contract=off
+  -Wno-missing-field-initializers -Wnon-virtual-dtor -Woverloaded-virtual -Werror -ffp-contract=off
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-maybe-uninitialized>)
-target_include_directories(pons_flags INTERFACE "${PROJECT_SOURCE_DIR}" "${PROJECT_BINARY_DIR}/generated")
+target_include_directories(pons_flags INTERFACE "${PROJECT_SOURCE_DIR}")
 
 # pons_module(NAME [SOURCES ...] [TESTS ...] [USES modules ...] [LIBRARIES external targets ...] [TEST_LIBRARIES ...])
 #
@@ -37,6 +37,7 @@ function(pons_module name)
     target_link_libraries(pons_${name} INTERFACE pons_flags ${uses} ${ARG_LIBRARIES})
   endif()
   add_library(pons::${name} ALIAS pons_${name})
+  set_property(GLOBAL APPEND PROPERTY PONS_MODULES ${name})
 
   if(ARG_TESTS)
     pons_test(${name}_test SOURCES ${ARG_TESTS} LIBRARIES pons::${name} ${ARG_TEST_LIBRARIES})

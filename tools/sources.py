@@ -8,6 +8,8 @@ from pathlib import Path
 CPP = (".cpp", ".hpp")
 # Known-bad trees that prove the checkers fire; they break every rule on purpose.
 FIXTURES = "tests/fixtures/"
+# What building leaves behind, as .gitignore names it; for trees that are not a checkout.
+MADE = ("build/", ".venv/", "install/", "log/")
 
 
 @dataclass(frozen=True, order=True)
@@ -29,6 +31,7 @@ def files(root: Path) -> list[str]:
         found = {name for name in listed if name and (root / name).is_file()}
     else:
         found = {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
+        found = {name for name in found if not name.startswith(MADE)}
     return sorted(name for name in found if not name.startswith(FIXTURES))
 
 

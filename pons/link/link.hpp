@@ -1,5 +1,5 @@
-// The link inside one process: the only way from the bridge to the cerebellum. Commands go down through a ring (all of them,
-// in order), states come up through a triple buffer (the newest), and one word stops everything.
+// The link inside one process: the only way from the bridge to the cerebellum. Commands go down through a ring (all of
+// them, in order), states come up through a triple buffer (the newest), and one word stops everything.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,9 @@ class Link {
   void raise_emergency_stop() PONS_NONBLOCKING { emergency_.store(1, std::memory_order_release); }
   // Lets go of the word, as a person does who unlocks the button. The stop itself stays until kReset.
   void clear_emergency_stop() PONS_NONBLOCKING { emergency_.store(0, std::memory_order_release); }
-  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return emergency_.load(std::memory_order_acquire) != 0; }
+  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING {
+    return emergency_.load(std::memory_order_acquire) != 0;
+  }
 
  private:
   friend class BridgeEnd;
@@ -38,7 +40,8 @@ class BridgeEnd {
 
   // False when the ring is full (the cerebellum does not take commands): nothing was sent.
   [[nodiscard]] bool send(const Command& command) PONS_NONBLOCKING { return link_.commands_.push(command); }
-  // How many commands send() is sure to take now: look before sending the pieces of a motion, which are useless in part.
+  // How many commands send() is sure to take now: look before sending the pieces of a motion, which are useless in
+  // part.
   [[nodiscard]] std::size_t room() const PONS_NONBLOCKING { return link_.commands_.free(); }
   // The newest state; a default one (epoch 0) before the first tick. Valid until the next call.
   [[nodiscard]] const State& latest() PONS_NONBLOCKING { return link_.states_.read(); }

@@ -59,7 +59,8 @@ TEST(Link, AnybodyMayRaiseTheEmergencyWordAndItStays) {
 
 TEST(Message, EveryValueHasAName) {
   std::set<std::string_view> names;
-  for (int i = 0; i <= static_cast<int>(SafetyState::kEmergencyStop); ++i) names.insert(name(static_cast<SafetyState>(i)));
+  for (int i = 0; i <= static_cast<int>(SafetyState::kEmergencyStop); ++i)
+    names.insert(name(static_cast<SafetyState>(i)));
   EXPECT_EQ(names.size(), 5u);
   names.clear();
   for (int i = 0; i <= static_cast<int>(StopCause::kBodySilent); ++i) names.insert(name(static_cast<StopCause>(i)));

@@ -4,37 +4,56 @@ namespace pons::link {
 
 std::string_view name(SafetyState state) {
   switch (state) {
-    case SafetyState::kDisarmed: return "disarmed";
-    case SafetyState::kOperational: return "operational";
-    case SafetyState::kStopping: return "stopping";
-    case SafetyState::kProtectiveStop: return "protective stop";
-    case SafetyState::kEmergencyStop: return "emergency stop";
+    case SafetyState::kDisarmed:
+      return "disarmed";
+    case SafetyState::kOperational:
+      return "operational";
+    case SafetyState::kStopping:
+      return "stopping";
+    case SafetyState::kProtectiveStop:
+      return "protective stop";
+    case SafetyState::kEmergencyStop:
+      return "emergency stop";
   }
   return "unknown";
 }
 
 std::string_view name(StopCause cause) {
   switch (cause) {
-    case StopCause::kNone: return "none";
-    case StopCause::kCommanded: return "commanded";
-    case StopCause::kEmergencyWord: return "emergency stop raised";
-    case StopCause::kStopInput: return "stop input";
-    case StopCause::kHeartbeatLost: return "heartbeat lost";
-    case StopCause::kFollowingError: return "following error";
-    case StopCause::kLimit: return "limit";
-    case StopCause::kBadCommand: return "bad command";
-    case StopCause::kBodySilent: return "body silent";
+    case StopCause::kNone:
+      return "none";
+    case StopCause::kCommanded:
+      return "commanded";
+    case StopCause::kEmergencyWord:
+      return "emergency stop raised";
+    case StopCause::kStopInput:
+      return "stop input";
+    case StopCause::kHeartbeatLost:
+      return "heartbeat lost";
+    case StopCause::kFollowingError:
+      return "following error";
+    case StopCause::kLimit:
+      return "limit";
+    case StopCause::kBadCommand:
+      return "bad command";
+    case StopCause::kBodySilent:
+      return "body silent";
   }
   return "unknown";
 }
 
 std::string_view name(StopResult result) {
   switch (result) {
-    case StopResult::kNone: return "none";
-    case StopResult::kPending: return "pending";
-    case StopResult::kConfirmed: return "CONFIRMED";
-    case StopResult::kUncertain: return "UNCERTAIN";
-    case StopResult::kFailed: return "FAILED";
+    case StopResult::kNone:
+      return "none";
+    case StopResult::kPending:
+      return "pending";
+    case StopResult::kConfirmed:
+      return "CONFIRMED";
+    case StopResult::kUncertain:
+      return "UNCERTAIN";
+    case StopResult::kFailed:
+      return "FAILED";
   }
   return "unknown";
 }

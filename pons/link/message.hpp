@@ -56,7 +56,7 @@ enum class StopResult : std::uint8_t { kNone, kPending, kConfirmed, kUncertain, 
 
 // The cerebellum's view after a tick.
 struct State {
-  Time stamp;                       // of the measurement
+  Time stamp;  // of the measurement
   std::uint64_t tick = 0;
   std::uint32_t epoch = 0;          // put this into commands
   std::uint64_t last_sequence = 0;  // newest command taken in
@@ -64,11 +64,11 @@ struct State {
   SafetyState safety = SafetyState::kDisarmed;
   StopCause cause = StopCause::kNone;
   StopResult stop_result = StopResult::kNone;
-  Time motion_end;                  // when the queued motion ends; in the past when it is done
-  AxisState commanded;              // what the loop asks of the arm now
-  AxisVector position, speed;       // measured
-  AxisVector torque_nm;             // asked of the drives
-  std::array<double, 3> wrist_force_n{};   // flange frame, raw
+  Time motion_end;                        // when the queued motion ends; in the past when it is done
+  AxisState commanded;                    // what the loop asks of the arm now
+  AxisVector position, speed;             // measured
+  AxisVector torque_nm;                   // asked of the drives
+  std::array<double, 3> wrist_force_n{};  // flange frame, raw
   std::array<double, 3> wrist_torque_nm{};
   std::array<double, 8> cup_vacuum_kpa{};
   std::uint32_t vacuum_on = 0;

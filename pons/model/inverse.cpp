@@ -38,9 +38,7 @@ Vector6 pose_error(const Pose& target, const Pose& tip) {
   return error;
 }
 
-double determinant(const Jacobian& jacobian) {
-  return jacobian.cols() == 6 ? Matrix6(jacobian).determinant() : 0.0;
-}
+double determinant(const Jacobian& jacobian) { return jacobian.cols() == 6 ? Matrix6(jacobian).determinant() : 0.0; }
 
 // The damped least-squares step; `pull` (zero for arms that are not redundant) acts inside the null space only.
 AxisVector damped_step(const Jacobian& jacobian, const Vector6& error, const AxisVector& pull) {
@@ -72,7 +70,8 @@ AxisVector bounded_step(Jacobian jacobian, const Vector6& error, AxisVector pull
   return step;
 }
 
-Attempt refine(Chain& chain, const Pose& target, const AxisVector& start, const AxisVector& seed, double seed_determinant) {
+Attempt refine(Chain& chain, const Pose& target, const AxisVector& start, const AxisVector& seed,
+               double seed_determinant) {
   const AxisLimits& limits = chain.limits();
   Attempt attempt{.q = start};
   AxisVector q = start, pull = AxisVector::Zero(start.size());
@@ -92,11 +91,14 @@ Attempt refine(Chain& chain, const Pose& target, const AxisVector& start, const 
       ++since_best;
       if (best < kAccept) break;  // at the rounding floor
     }
-    if (determinant(jacobian) * seed_determinant < -kSingularShare * seed_determinant * seed_determinant) attempt.crossed = true;
+    if (determinant(jacobian) * seed_determinant < -kSingularShare * seed_determinant * seed_determinant)
+      attempt.crossed = true;
     if (best < kAimFor) break;
     if (q.size() > 6) {
-      if (worst > kPullAbove) pull = kPull * (seed - q);
-      else pull.setZero();
+      if (worst > kPullAbove)
+        pull = kPull * (seed - q);
+      else
+        pull.setZero();
     }
     q += bounded_step(jacobian, error, pull, q, limits);
     q = q.cwiseMax(limits.position_min).cwiseMin(limits.position_max);
@@ -114,17 +116,20 @@ double nearest_turn(double angle, double near, double low, double high) {
   return angle;
 }
 
-bool is_revolute(const Jacobian& jacobian, Eigen::Index axis) { return jacobian.col(axis).tail<3>().squaredNorm() > 0.5; }
+bool is_revolute(const Jacobian& jacobian, Eigen::Index axis) {
+  return jacobian.col(axis).tail<3>().squaredNorm() > 0.5;
+}
 
-// Turns the first axis until the tip faces the target, then the last until the tool does. Both keep the branch, so what is
-// left for the iterations is a short way.
+// Turns the first axis until the tip faces the target, then the last until the tool does. Both keep the branch, so what
+// is left for the iterations is a short way.
 AxisVector turned_towards(Chain& chain, const Pose& target, const AxisVector& seed) {
   const AxisLimits& limits = chain.limits();
   Pose tip;
   Jacobian jacobian;
   AxisVector q = seed;
   const auto turn = [&](Eigen::Index axis, double angle) {
-    const double turned = nearest_turn(q[axis] + angle, seed[axis], limits.position_min[axis], limits.position_max[axis]);
+    const double turned =
+        nearest_turn(q[axis] + angle, seed[axis], limits.position_min[axis], limits.position_max[axis]);
     if (turned >= limits.position_min[axis] && turned <= limits.position_max[axis]) q[axis] = turned;
   };
   chain.evaluate(q, tip, jacobian);

@@ -25,16 +25,17 @@ Eigen::Affine3d link(double q, double d, double a, double alpha) {
                          Eigen::AngleAxisd(alpha, Vector3::UnitX()));
 }
 
-// Where the branch (shoulder +, wrist of q5's sign) of the published parameters has the elbow for this pose: cos(q3), or
-// nothing in the way of reach when |cos(q3)| > 1. Analytic: q1 from the wrist's offset, q5 and q6 from the tool, then the
-// planar triangle.
+// Where the branch (shoulder +, wrist of q5's sign) of the published parameters has the elbow for this pose: cos(q3),
+// or nothing in the way of reach when |cos(q3)| > 1. Analytic: q1 from the wrist's offset, q5 and q6 from the tool,
+// then the planar triangle.
 double elbow_cosine(const Pose& base_from_flange, double shoulder, double q5_sign) {
   const Vector3 wrist = base_from_flange.translation() - 0.0996 * base_from_flange.linear().col(2);
   const double across = 0.1333 / std::hypot(wrist.x(), wrist.y());
   if (across > 1) return 2;
   const double q1 = std::atan2(wrist.y(), wrist.x()) + shoulder * std::acos(across) + kHalfPi;
   const Vector3 p = base_from_flange.translation();
-  const double q5 = q5_sign * std::acos(std::clamp((p.x() * std::sin(q1) - p.y() * std::cos(q1) - 0.1333) / 0.0996, -1.0, 1.0));
+  const double q5 =
+      q5_sign * std::acos(std::clamp((p.x() * std::sin(q1) - p.y() * std::cos(q1) - 0.1333) / 0.0996, -1.0, 1.0));
   const Eigen::Matrix3d r = base_from_flange.linear().transpose();
   const double q6 = std::atan2((-r(1, 0) * std::sin(q1) + r(1, 1) * std::cos(q1)) / std::sin(q5),
                                (r(0, 0) * std::sin(q1) - r(0, 1) * std::cos(q1)) / std::sin(q5));
@@ -87,15 +88,18 @@ TEST(Inverse, TenThousandToolDownPosesOnTheHomeBranch) {
     ASSERT_LT((reached.translation() - target.translation()).norm(), 1e-6);
     ASSERT_LT((reached.linear() - target.linear()).norm(), 2e-6);
     ASSERT_NEAR(std::cos((*q)[2]), cosine, 1e-4);
-    const bool same = std::sin((*q)[2]) * std::sin(robot.home[2]) > 0 && std::sin((*q)[4]) * std::sin(robot.home[4]) > 0;
+    const bool same =
+        std::sin((*q)[2]) * std::sin(robot.home[2]) > 0 && std::sin((*q)[4]) * std::sin(robot.home[4]) > 0;
     if (!same) ++tally.other_branch;
     for (int axis = 0; axis < 6; ++axis) {
       ASSERT_TRUE((*q)[axis] >= robot.limits.position_min[axis] && (*q)[axis] <= robot.limits.position_max[axis]);
     }
   }
-  std::printf("solved %d of %d, %d on another branch, %d unreachable ones solved; median %.1f us, 99 %% %.1f us, worst %.1f us\n",
-              tally.solved, tally.reachable, tally.other_branch, tally.false_solutions, tally.percentile(0.5), tally.percentile(0.99),
-              tally.percentile(1));
+  std::printf(
+      "solved %d of %d, %d on another branch, %d unreachable ones solved; median %.1f us, 99 %% %.1f us, worst %.1f "
+      "us\n",
+      tally.solved, tally.reachable, tally.other_branch, tally.false_solutions, tally.percentile(0.5),
+      tally.percentile(0.99), tally.percentile(1));
   EXPECT_GE(tally.solved, 9'990);
   EXPECT_EQ(tally.other_branch, 0);
   EXPECT_EQ(tally.false_solutions, 0);
@@ -140,19 +144,23 @@ TEST(Inverse, RefusesWhatIsOutOfReach) {
 
 // A seven-axis arm of the common kind (published parameters of a Panda), written out from its table.
 std::filesystem::path seven_axis_urdf() {
-  const double xyz[7][3] = {{0, 0, 0.333}, {0, 0, 0}, {0, -0.316, 0}, {0.0825, 0, 0}, {-0.0825, 0.384, 0}, {0, 0, 0}, {0.088, 0, 0}};
+  const double xyz[7][3] = {{0, 0, 0.333},       {0, 0, 0}, {0, -0.316, 0}, {0.0825, 0, 0},
+                            {-0.0825, 0.384, 0}, {0, 0, 0}, {0.088, 0, 0}};
   const double roll[7] = {0, -kHalfPi, kHalfPi, kHalfPi, -kHalfPi, kHalfPi, kHalfPi};
   const auto path = std::filesystem::path(testing::TempDir()) / "seven.urdf";
   std::ofstream file(path);
   file.precision(17);
   file << "<robot name='seven'><link name='l0'/>";
   for (int i = 0; i < 7; ++i) {
-    file << "<link name='l" << i + 1 << "'><inertial><mass value='2'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
-         << "iyz='0'/></inertial></link><joint name='j" << i + 1 << "' type='revolute'><parent link='l" << i << "'/><child link='l"
-         << i + 1 << "'/><origin xyz='" << xyz[i][0] << ' ' << xyz[i][1] << ' ' << xyz[i][2] << "' rpy='" << roll[i]
+    file << "<link name='l" << i + 1
+         << "'><inertial><mass value='2'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
+         << "iyz='0'/></inertial></link><joint name='j" << i + 1 << "' type='revolute'><parent link='l" << i
+         << "'/><child link='l" << i + 1 << "'/><origin xyz='" << xyz[i][0] << ' ' << xyz[i][1] << ' ' << xyz[i][2]
+         << "' rpy='" << roll[i]
          << " 0 0'/><axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='80' velocity='2'/></joint>";
   }
-  file << "<link name='flange'/><joint name='f' type='fixed'><parent link='l7'/><child link='flange'/><origin xyz='0 0 0.107'/>"
+  file << "<link name='flange'/><joint name='f' type='fixed'><parent link='l7'/><child link='flange'/><origin xyz='0 0 "
+          "0.107'/>"
        << "</joint></robot>";
   return path;
 }
@@ -165,7 +173,8 @@ world::Robot seven_axis_arm() {
   robot.home = axis_vector({0, -0.785, 0, -2.356, 0, 1.571, 0.785});
   robot.limits.position_min = axis_vector({-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973});
   robot.limits.position_max = axis_vector({2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973});
-  for (auto* list : {&robot.limits.speed_rad_s, &robot.limits.acceleration_rad_s2, &robot.limits.jerk_rad_s3, &robot.limits.torque_nm}) {
+  for (auto* list : {&robot.limits.speed_rad_s, &robot.limits.acceleration_rad_s2, &robot.limits.jerk_rad_s3,
+                     &robot.limits.torque_nm}) {
     *list = AxisVector::Constant(7, 10);
   }
   return robot;
@@ -188,12 +197,13 @@ TEST(Inverse, RedundantArmStaysInsideItsLimitsAndNearItsSeed) {
     if (!q) continue;
     ++solved;
     EXPECT_LT((model.world_from_tip(*q).translation() - target.translation()).norm(), 1e-6);
-    EXPECT_TRUE(((*q - robot.limits.position_min).array() >= 0).all() && ((robot.limits.position_max - *q).array() >= 0).all());
+    EXPECT_TRUE(((*q - robot.limits.position_min).array() >= 0).all() &&
+                ((robot.limits.position_max - *q).array() >= 0).all());
     farthest = std::max(farthest, (*q - robot.home).tail(5).head(4).cwiseAbs().maxCoeff());
   }
   std::sort(microseconds.begin(), microseconds.end());
-  std::printf("seven axes: solved %d of %d, middle axes at most %.2f rad from home, median %.1f us\n", solved, asked, farthest,
-              microseconds[microseconds.size() / 2]);
+  std::printf("seven axes: solved %d of %d, middle axes at most %.2f rad from home, median %.1f us\n", solved, asked,
+              farthest, microseconds[microseconds.size() / 2]);
   EXPECT_GE(solved, 1990);
   EXPECT_LT(farthest, 1.6);
 }

@@ -10,6 +10,7 @@
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/parsers/urdf.hpp>
 
+#include <cmath>
 #include <exception>
 #include <filesystem>
 #include <string>
@@ -71,21 +72,28 @@ struct RobotModel::Impl final : Chain {
       : robot(std::move(robot_in)), model(std::move(model_in)), data(model) {
     base_from_world = robot.world_from_base.inverse();
     model.gravity.linear() = base_from_world.linear() * Vector3(0, 0, -kGravityMS2);
+    model.armature.setConstant(kRotorInertiaKgM2);
     flange = model.getFrameId(robot.flange_link);
     last_joint = model.frames[flange].parentJoint;
     last_joint_from_flange = model.frames[flange].placement;
     last_joint_from_tip = last_joint_from_flange * se3_of(robot.tool.flange_from_tip);
-    last_inertia = model.inertias[last_joint] + last_joint_from_flange.act(point_mass(robot.tool.mass_kg, robot.tool.com_m));
+    last_inertia =
+        model.inertias[last_joint] + last_joint_from_flange.act(point_mass(robot.tool.mass_kg, robot.tool.com_m));
     model.inertias[last_joint] = last_inertia;
-    for (const auto& capsule : robot.capsules) capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
+    for (const auto& capsule : robot.capsules)
+      capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
     q = v = a = tau = Eigen::VectorXd::Zero(model.nv);
   }
 
-  // The payload is a point mass rigid to the flange: it joins the inertia of the last moving link.
+  // The payload joins the inertia of the last moving link.
   void carry(const Payload& payload) PONS_NONBLOCKING {
     const Vector3 com(payload.com_m[0], payload.com_m[1], payload.com_m[2]);
     model.inertias[last_joint] = last_inertia;
-    if (payload.mass_kg > 0) model.inertias[last_joint] += last_joint_from_flange.act(point_mass(payload.mass_kg, com));
+    if (payload.mass_kg <= 0) return;
+    constexpr double kDensityKgM3 = 600;
+    const double side_m = std::cbrt(payload.mass_kg / kDensityKgM3);
+    const Eigen::Matrix3d cube = Eigen::Matrix3d::Identity() * (payload.mass_kg * side_m * side_m / 6);
+    model.inertias[last_joint] += last_joint_from_flange.act(pinocchio::Inertia(payload.mass_kg, com, cube));
   }
 
   void evaluate(const AxisVector& at, Pose& world_from_tip, Jacobian& jacobian) override {
@@ -116,15 +124,18 @@ namespace {
 // The first thing about `model` that this program cannot work with.
 Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
   const std::string where = robot.urdf.string();
-  if (model.nv == 0) return fail("the robot has no moving joint", where, "give at least one joint type revolute or prismatic");
+  if (model.nv == 0)
+    return fail("the robot has no moving joint", where, "give at least one joint type revolute or prismatic");
   if (model.nq != model.nv) {
     return fail("a joint is continuous, floating or spherical", where, "make it revolute with limits, or fixed");
   }
   if (model.nv > static_cast<int>(kMaxAxes)) {
-    return fail(fmt::format("{} moving joints, at most {} are supported", model.nv, kMaxAxes), where, "fix some of them");
+    return fail(fmt::format("{} moving joints, at most {} are supported", model.nv, kMaxAxes), where,
+                "fix some of them");
   }
   if (!model.existFrame(robot.flange_link, pinocchio::BODY)) {
-    return fail(fmt::format("no link named '{}'", robot.flange_link), where, "name the flange link of this URDF in the robot file");
+    return fail(fmt::format("no link named '{}'", robot.flange_link), where,
+                "name the flange link of this URDF in the robot file");
   }
   const auto parent = model.frames[model.getFrameId(robot.flange_link)].parentJoint;
   if (parent != static_cast<pinocchio::JointIndex>(model.njoints) - 1) {
@@ -133,14 +144,18 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
   }
   for (const auto& capsule : robot.capsules) {
     if (!model.existFrame(capsule.link, pinocchio::BODY)) {
-      return fail(fmt::format("a capsule hangs on '{}', which is no link", capsule.link), where, "correct the capsule's link");
+      return fail(fmt::format("a capsule hangs on '{}', which is no link", capsule.link), where,
+                  "correct the capsule's link");
     }
   }
   const auto& limits = robot.limits;
-  const std::pair<const char*, const AxisVector*> lists[] = {
-      {"home", &robot.home},          {"position_min", &limits.position_min},         {"position_max", &limits.position_max},
-      {"speed", &limits.speed_rad_s}, {"acceleration", &limits.acceleration_rad_s2}, {"jerk", &limits.jerk_rad_s3},
-      {"torque", &limits.torque_nm}};
+  const std::pair<const char*, const AxisVector*> lists[] = {{"home", &robot.home},
+                                                             {"position_min", &limits.position_min},
+                                                             {"position_max", &limits.position_max},
+                                                             {"speed", &limits.speed_rad_s},
+                                                             {"acceleration", &limits.acceleration_rad_s2},
+                                                             {"jerk", &limits.jerk_rad_s3},
+                                                             {"torque", &limits.torque_nm}};
   for (const auto& [name, list] : lists) {
     if (list->size() == model.nv) continue;
     return fail(fmt::format("'{}' has {} values, the URDF {} moving joints", name, list->size(), model.nv), robot.name,
@@ -161,8 +176,8 @@ Expected<RobotModel> RobotModel::load(const world::Robot& robot) {
   try {
     pinocchio::urdf::buildModel(robot.urdf.string(), model);
   } catch (const std::exception& error) {
-    return fail(fmt::format("broken URDF: {}", messages.first.empty() ? error.what() : messages.first), robot.urdf.string(),
-                "mend the XML there");
+    return fail(fmt::format("broken URDF: {}", messages.first.empty() ? error.what() : messages.first),
+                robot.urdf.string(), "mend the XML there");
   }
   if (auto checked = check(robot, model); !checked) return std::unexpected(checked.error());
   return RobotModel(std::make_unique<Impl>(robot, std::move(model)));
@@ -206,7 +221,8 @@ void RobotModel::place_capsules(const AxisVector& q, std::vector<PlacedCapsule>&
   for (std::size_t i = 0; i < impl_->robot.capsules.size(); ++i) {
     const auto& capsule = impl_->robot.capsules[i];
     const auto& frame = impl_->model.frames[impl_->capsule_frames[i]];
-    const Pose world_from_link = impl_->robot.world_from_base * pose_of(impl_->data.oMi[frame.parentJoint] * frame.placement);
+    const Pose world_from_link =
+        impl_->robot.world_from_base * pose_of(impl_->data.oMi[frame.parentJoint] * frame.placement);
     capsules.push_back({world_from_link * capsule.from, world_from_link * capsule.to, capsule.radius_m});
   }
 }
@@ -226,7 +242,8 @@ void RobotModel::forward_dynamics(const AxisVector& q, const AxisVector& speed, 
   impl_->q = q;
   impl_->v = speed;
   impl_->tau = torque_nm;
-  acceleration = pinocchio::aba(impl_->model, impl_->data, impl_->q, impl_->v, impl_->tau, pinocchio::Convention::LOCAL);
+  acceleration =
+      pinocchio::aba(impl_->model, impl_->data, impl_->q, impl_->v, impl_->tau, pinocchio::Convention::LOCAL);
 }
 
 }  // namespace pons::model

@@ -16,7 +16,11 @@ namespace pons::model {
 
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, static_cast<int>(kMaxAxes)>;
 
-// What the tool carries, as a point mass rigid to the flange.
+// Of every joint's drive, about the joint: what its rotor adds behind the gears. A URDF has no place for it.
+inline constexpr double kRotorInertiaKgM2 = 0.01;
+
+// What the tool carries, rigid to the flange. Its own rotational inertia is taken for that of a cube of 600 kg/m³:
+// denser than parcels are, because too much inertia in the model makes the loop nervous, too little only softer.
 struct Payload {
   double mass_kg = 0;
   std::array<double, 3> com_m{};  // flange frame
@@ -52,11 +56,11 @@ class RobotModel {
   void place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules);
 
   // Torques (N·m) for the asked acceleration at (q, speed), tool and payload included: recursive Newton-Euler.
-  void inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration, const Payload& payload,
-                        AxisVector& torque_nm) PONS_NONBLOCKING;
+  void inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration,
+                        const Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING;
   // The reverse: the acceleration that these torques cause, by the articulated-body algorithm (Featherstone 1983).
-  void forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm, const Payload& payload,
-                        AxisVector& acceleration) PONS_NONBLOCKING;
+  void forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm,
+                        const Payload& payload, AxisVector& acceleration) PONS_NONBLOCKING;
 
  private:
   struct Impl;

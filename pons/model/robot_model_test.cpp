@@ -59,7 +59,8 @@ TEST(RobotModel, JacobianIsTheDerivativeOfTheTip) {
   }
 }
 
-// At rest the torques must balance the weight of every part: tau = -sum(J_com^T m g), and a known load adds J_load^T m g.
+// At rest the torques must balance the weight of every part: tau = -sum(J_com^T m g), and a known load adds J_load^T m
+// g.
 TEST(RobotModel, PayloadAddsExactlyItsWeight) {
   const auto robot = hanging_arm();
   auto model = RobotModel::load(robot).value();
@@ -93,7 +94,8 @@ TEST(RobotModel, FirstAxisOfAHangingArmCarriesNoWeight) {
   }
 }
 
-// The pendulum of the last two links about the shoulder, by hand: only the second axis accelerates, arm stretched level.
+// The pendulum of the last two links about the shoulder, by hand: only the second axis accelerates, arm stretched
+// level.
 TEST(RobotModel, StretchedArmWeighsWhatItsPartsWeigh) {
   auto model = RobotModel::load(hanging_arm()).value();
   AxisVector torque;

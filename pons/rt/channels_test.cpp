@@ -48,8 +48,10 @@ TEST(SpscRing, EveryElementArrivesOnceInOrderBetweenThreads) {
   const auto ring = std::make_unique<SpscRing<Wide, 64>>();
   std::thread producer([&] {
     for (std::uint64_t i = 0; i < kCount;) {
-      if (ring->push(Wide(i))) ++i;
-      else std::this_thread::yield();
+      if (ring->push(Wide(i)))
+        ++i;
+      else
+        std::this_thread::yield();
     }
   });
   bool sound = true;

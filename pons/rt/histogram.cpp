@@ -36,7 +36,8 @@ Duration Histogram::mean() const {
 Duration Histogram::percentile(double percent) const {
   if (count_ == 0) return Duration{0};
   const double share = std::clamp(percent, 0.0, 100.0) / 100.0;
-  const auto wanted = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_))));
+  const auto wanted =
+      std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_))));
   std::uint64_t seen = 0;
   for (std::size_t i = 0; i < kBuckets; ++i) {
     seen += counts_[i];

@@ -19,7 +19,8 @@ class Histogram {
   [[nodiscard]] Duration min() const { return count_ ? min_ : Duration{0}; }
   [[nodiscard]] Duration max() const { return max_; }
   [[nodiscard]] Duration mean() const;
-  // The smallest recorded step that `percent` (0…100) of all values do not exceed: its upper edge, at most max(). 0 when empty.
+  // The smallest recorded step that `percent` (0…100) of all values do not exceed: its upper edge, at most max(). 0
+  // when empty.
   [[nodiscard]] Duration percentile(double percent) const;
   void add(const Histogram& other);
 

@@ -31,7 +31,8 @@ Grant make_realtime(const LoopSettings& settings) {
     const sched_param param{.sched_priority = settings.priority};
     const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
     grant.fifo = error == 0;
-    if (error != 0) note(grant, "SCHED_FIFO", error, "needs CAP_SYS_NICE or an rtprio limit, and a budget in its cgroup");
+    if (error != 0)
+      note(grant, "SCHED_FIFO", error, "needs CAP_SYS_NICE or an rtprio limit, and a budget in its cgroup");
   }
   if (settings.cpu >= 0) {
     cpu_set_t cpus;

@@ -30,8 +30,8 @@ struct LoopSettings {
 // Touches 256 KiB of stack, so that no page fault comes later.
 [[nodiscard]] Grant make_realtime(const LoopSettings& settings);
 
-// Runs a tick at start + k·period by absolute deadlines on CLOCK_MONOTONIC. A tick whose time has passed when it would begin is
-// skipped and counted, never replayed. One thread owns it.
+// Runs a tick at start + k·period by absolute deadlines on CLOCK_MONOTONIC. A tick whose time has passed when it would
+// begin is skipped and counted, never replayed. One thread owns it.
 class PeriodicLoop {
  public:
   PeriodicLoop(const MonotonicClock& clock, Duration period) : clock_(clock), period_(period) {}
@@ -41,8 +41,8 @@ class PeriodicLoop {
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }
-  [[nodiscard]] const Histogram& lateness() const { return lateness_; }      // from schedule to the tick's begin
-  [[nodiscard]] const Histogram& execution() const { return execution_; }    // from the tick's begin to its end
+  [[nodiscard]] const Histogram& lateness() const { return lateness_; }    // from schedule to the tick's begin
+  [[nodiscard]] const Histogram& execution() const { return execution_; }  // from the tick's begin to its end
 
  private:
   const MonotonicClock& clock_;

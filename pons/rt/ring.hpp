@@ -9,8 +9,8 @@
 
 namespace pons::rt {
 
-// Lamport's single-producer single-consumer queue (1983) with each side's last view of the other cached, so that a push or
-// pop touches the other side's cache line only when it must. T is copied; give it a copy that cannot throw.
+// Lamport's single-producer single-consumer queue (1983) with each side's last view of the other cached, so that a push
+// or pop touches the other side's cache line only when it must. T is copied; give it a copy that cannot throw.
 template <typename T, std::size_t Capacity>
 class SpscRing {
   static_assert(Capacity > 0 && (Capacity & (Capacity - 1)) == 0, "a power of two");

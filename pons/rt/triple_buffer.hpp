@@ -21,7 +21,8 @@ class TripleBuffer {
   void write(const T& value) PONS_NONBLOCKING {
     slots_[mine_] = value;
     // acq_rel: the value is written before it is handed over; the slot got back was read before it came back.
-    mine_ = static_cast<std::uint8_t>(between_.exchange(static_cast<std::uint8_t>(mine_ | kFresh), std::memory_order_acq_rel) & kSlot);
+    mine_ = static_cast<std::uint8_t>(
+        between_.exchange(static_cast<std::uint8_t>(mine_ | kFresh), std::memory_order_acq_rel) & kSlot);
   }
 
   // Reader only: the newest value, the first one before any write. Valid until the next read().

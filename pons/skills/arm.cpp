@@ -48,10 +48,13 @@ Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().en
 Time Arm::splice_time(Time now) { return now + kSpliceLead; }
 
 Expected<void> Arm::stream(const motion::Trajectory& trajectory) {
+  // Half a motion would end moving, so all of it goes or nothing.
+  if (link_.room() < trajectory.size()) {
+    return fail("the link to the cerebellum is full", "arm", "the loop has stopped taking commands");
+  }
   bool first = true;
   for (const Segment& segment : trajectory) {
-    link::Command command{.kind = link::CommandKind::kMotion, .splice = first, .segment = segment};
-    if (!send(command)) return fail("the link to the cerebellum is full", "arm", "the loop has stopped taking commands");
+    send({.kind = link::CommandKind::kMotion, .splice = first, .segment = segment});
     first = false;
   }
   if (!trajectory.empty()) {

@@ -60,6 +60,10 @@ Expected<Json> parse_json(std::string_view text) {
   if (text.size() > kMaxJsonBytes) {
     return fail(fmt::format("{} bytes of JSON", text.size()), {}, fmt::format("send at most {} bytes", kMaxJsonBytes));
   }
+  // The parser takes a zero byte for the end of the text.
+  if (const auto zero = text.find('\0'); zero != text.npos) {
+    return fail(fmt::format("not JSON in UTF-8 at byte {}", zero + 1), {}, "send one JSON value (RFC 8259)");
+  }
   Bounds bounds;
   if (!Json::sax_parse(text, &bounds)) return fail(bounds.problem, {}, "send one JSON value (RFC 8259)");
   return Json::parse(text);

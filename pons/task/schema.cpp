@@ -27,7 +27,8 @@ bool is_type(const Json& value, std::string_view type) {
   if (type == "number") return value.is_number();
   if (type == "string") return value.is_string();
   if (!value.is_number()) return false;
-  return value.is_number_integer() || std::trunc(value.get<double>()) == value.get<double>();
+  const auto number = value.get<double>();
+  return value.is_number_integer() || (std::isfinite(number) && std::trunc(number) == number);
 }
 
 std::size_t characters(const std::string& utf8) {
@@ -51,9 +52,7 @@ std::string child(std::string_view parent, std::string_view name) {
   return path;
 }
 
-std::string listed(const std::vector<std::string>& words) {
-  return fmt::format("{}", fmt::join(words, ", "));
-}
+std::string listed(const std::vector<std::string>& words) { return fmt::format("{}", fmt::join(words, ", ")); }
 
 }  // namespace
 

@@ -8,9 +8,7 @@
 namespace pons::task {
 namespace {
 
-Schema compiled(std::string_view text) {
-  return Schema::compile(Json::parse(text)).value();
-}
+Schema compiled(std::string_view text) { return Schema::compile(Json::parse(text)).value(); }
 
 TEST(Schema, RefusesKeywordsItDoesNotCheck) {
   for (const std::string_view text :

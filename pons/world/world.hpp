@@ -1,5 +1,5 @@
-// A world's files as validated structs. A world is data: robot, scene, places, resources, cameras, arrivals, rules. Pure
-// after load(); nothing here changes while a run goes on.
+// A world's files as validated structs. A world is data: robot, scene, places, resources, cameras, arrivals, rules.
+// Pure after load(); nothing here changes while a run goes on.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,23 @@ namespace pons::world {
 
 // A capsule rigid in a link's frame; self-filter of the cameras and coarse collision shape.
 struct Capsule {
-  std::string link;                        // a link of the URDF
+  std::string link;                                      // a link of the URDF
   Vector3 from = Vector3::Zero(), to = Vector3::Zero();  // m, link frame
   double radius_m = 0;
 };
 
 // The suction tool. Frames: flange = last link of the URDF; tip = where the cups touch, z pointing out of the tool.
 struct Tool {
-  std::filesystem::path mjcf;       // attached to the flange in simulation
+  std::filesystem::path mjcf;  // attached to the flange in simulation
   double mass_kg = 0;
   Vector3 com_m = Vector3::Zero();  // flange frame
   Pose flange_from_tip = Pose::Identity();
-  std::vector<Vector3> cups_m;      // cup centres, tip frame
+  std::vector<Vector3> cups_m;  // cup centres, tip frame
   double cup_radius_m = 0;
-  double stroke_m = 0;              // how far a bellows gives way
-  double cup_force_n = 0;           // what one sealed cup holds
-  double sealed_kpa = 0;            // vacuum at or above this means sealed
-  int cups_to_lift = 0;             // lift only with at least so many sealed
+  double stroke_m = 0;     // how far a bellows gives way
+  double cup_force_n = 0;  // what one sealed cup holds
+  double sealed_kpa = 0;   // vacuum at or above this means sealed
+  int cups_to_lift = 0;    // lift only with at least so many sealed
 };
 
 struct Robot {
@@ -41,16 +41,16 @@ struct Robot {
   std::filesystem::path urdf;
   std::string flange_link;
   Pose world_from_base = Pose::Identity();
-  AxisVector home;                  // rad; also the seed branch of inverse kinematics
+  AxisVector home;  // rad; also the seed branch of inverse kinematics
   AxisLimits limits;
-  double payload_kg = 0;            // at the flange, tool included
+  double payload_kg = 0;  // at the flange, tool included
   Tool tool;
   std::vector<Capsule> capsules;
 };
 
 enum class PlaceKind : std::uint8_t { kChute, kException, kTray, kRegion };
 
-// A named box of space. For a chute `center` is the middle of its mouth, at the rim.
+// A named box of space. For a chute `center` is the middle of its mouth, at the rim, and size z the depth to its floor.
 struct Place {
   std::string name;
   PlaceKind kind = PlaceKind::kRegion;
@@ -61,48 +61,51 @@ struct Place {
 // Runs along +x of the world.
 struct Belt {
   double x_start_m = 0, x_end_m = 0, y_center_m = 0, width_m = 0, surface_z_m = 0;
-  double speed_m_s = 0;             // nominal
-  double speed_variation = 0;       // 0.3: ± 30 %
-  double speed_period_s = 0;        // how quickly it wanders
+  double speed_m_s = 0;                       // nominal
+  double speed_variation = 0;                 // 0.3: ± 30 %
+  double speed_period_s = 0;                  // how quickly it wanders
   double pick_x_min_m = 0, pick_x_max_m = 0;  // where the arm may take hold
 };
 
 struct CameraSpec {
   std::string name;
-  std::string watches;              // "belt" or a place's name
+  std::string watches;  // "belt" or a place's name
   Pose world_from_optical = Pose::Identity();
-  int width = 0, height = 0;        // px
-  double fovy_rad = 0;              // vertical
+  int width = 0, height = 0;                        // px
+  double fovy_rad = 0;                              // vertical
   double period_s = 0, phase_s = 0, latency_s = 0;  // one frame every period, the first at phase; arrives latency later
-  double depth_noise_m = 0;         // 1 σ at 1 m, growing with the square of the distance
-  double depth_dropout = 0;         // share of pixels without a reading, more at edges
+  double depth_noise_m = 0;                         // 1 σ at 1 m, growing with the square of the distance
+  double depth_dropout = 0;                         // share of pixels without a reading, more at edges
   bool reads_labels = false;
 };
 
+// Overweight parcels that are drawn weigh at least this much more than the rule allows.
+inline constexpr double kOverweightFactor = 1.1;
+
 // What arrives. Shares are of all parcels.
 struct Arrivals {
-  double touching = 0;       // share that touches, overlaps or leans on a neighbour
-  double unreadable = 0;     // label down, unreadable or unknown
-  double overweight = 0;     // heavier than rules.max_mass_kg, up to max_mass_kg below
-  double oversize = 0;       // larger than rules.max_size_m
+  double touching = 0;                            // share that touches, overlaps or leans on a neighbour
+  double unreadable = 0;                          // label down, unreadable or unknown
+  double overweight = 0;                          // heavier than rules.max_mass_kg, up to max_mass_kg below
+  double oversize = 0;                            // larger than rules.max_size_m
   double box = 0, mailer = 0, tube = 0, bag = 0;  // shares of the kinds; sum 1
-  double express = 0;        // share with high priority
+  double express = 0;                             // share with high priority
   double length_min_m = 0, length_max_m = 0, mass_min_kg = 0, mass_max_kg = 0, max_mass_kg = 0;
-  double label_m = 0;        // side of the square label, quiet zone included
-  int waiting = 0;           // the feeder keeps so many parcels on the belt ahead of the pick zone's end
+  double label_m = 0;                   // side of the square label, quiet zone included
+  int waiting = 0;                      // the feeder keeps so many parcels on the belt ahead of the pick zone's end
   double gap_min_m = 0, gap_max_m = 0;  // free belt between arrivals that do not touch
 };
 
 // What a parcel must be for the robot to sort it.
 struct Rules {
   double max_mass_kg = 0;
-  double max_size_m = 0;     // longest side
-  double max_press_n = 0;    // damaged above this
-  double max_drop_m = 0;     // damaged when dropped further
+  double max_size_m = 0;   // longest side
+  double max_press_n = 0;  // damaged above this
+  double max_drop_m = 0;   // damaged when dropped further
 };
 
 struct Resource {
-  std::string name;          // "arm"
+  std::string name;  // "arm"
 };
 
 struct World {
@@ -123,7 +126,8 @@ struct World {
 };
 
 // Worlds live in folders under `root`, each with a world.yaml.
-// Errors name file, line and key: no such world (with the names that exist), broken YAML, missing, unknown or impossible value.
+// Errors name file, line and key: no such world (with the names that exist), broken YAML, missing, unknown or
+// impossible value.
 [[nodiscard]] Expected<World> load(const std::filesystem::path& root, std::string_view name);
 [[nodiscard]] std::vector<std::string> list(const std::filesystem::path& root);
 

@@ -1,0 +1,71 @@
+# The face for people. Everything below is a line or two of CMake that you can also run yourself.
+.DEFAULT_GOAL := help
+JOBS ?= $(shell nproc)
+WORLD ?= parcel_cell
+PARCELS ?= 200
+SEED ?= 1
+SOURCES = git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
+# What reads bytes from outside or handles memory by hand; the rest runs under the sanitizers with make asan.
+ASAN_QUICK = record_test task_test world_test link_test
+
+.PHONY: help setup build demo test check format asan asan-quick tsan bench clean
+
+help: ## what there is
+	@echo "Pons: the bridge between a robot's brain and its body."
+	@echo
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@echo
+	@echo "  JOBS=$(JOBS) WORLD=$(WORLD) PARCELS=$(PARCELS) SEED=$(SEED): set them as in make demo SEED=7"
+
+setup: ## install what is needed (Debian packages, wheels in .venv)
+	@tools/setup
+
+build: setup ## set up and build everything into build/release
+	cmake --preset release
+	cmake --build --preset release --parallel $(JOBS)
+
+demo: setup ## set up, build, and sort 200 parcels; report and picture land in build/
+	cmake --preset release
+	cmake --build --preset release --parallel $(JOBS) --target pons
+	build/release/apps/pons run $(WORLD) --parcels $(PARCELS) --seed $(SEED) --lockstep \
+	  --report build/demo.json --picture build/demo.png
+
+test: build ## set up, build, and run all tests
+	ctest --preset release --parallel 2 --no-tests=error
+
+check: ## format, clang-tidy, layers, style, then all tests
+	@tools/setup --check
+	cmake --preset release
+	$(SOURCES) | xargs clang-format-19 --dry-run -Werror
+	tools/check_layers
+	tools/check_style
+	cmake --build --preset release --parallel $(JOBS)
+	tools/tidy build/release
+	ctest --preset release --parallel 2 --no-tests=error
+
+format: ## rewrite the sources as .clang-format says
+	@tools/setup --check
+	$(SOURCES) | xargs clang-format-19 -i
+
+asan: setup ## all tests under the address and undefined-behaviour sanitizers
+	cmake --preset asan
+	cmake --build --preset asan --parallel $(JOBS)
+	ctest --preset asan --parallel 2 --no-tests=error
+
+asan-quick: setup ## the tests of what reads bytes from outside, under the same sanitizers
+	cmake --preset asan
+	cmake --build --preset asan --parallel $(JOBS) --target $(ASAN_QUICK)
+	for name in $(ASAN_QUICK); do build/asan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; done
+
+tsan: setup ## all tests under the thread sanitizer
+	cmake --preset tsan
+	cmake --build --preset tsan --parallel $(JOBS)
+	ctest --preset tsan --parallel 2 --no-tests=error
+
+bench: build ## run the benchmarks; docs/figures.md says which figure is whose
+	@found=0; for program in build/release/bench/*_bench; do \
+	  [ -x "$$program" ] || continue; found=1; echo "== $$program"; "$$program" || exit 1; done; \
+	  [ $$found = 1 ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }
+
+clean: ## remove what was built (keeps .venv)
+	rm -rf build install log

@@ -1,0 +1,142 @@
+#include "pons/brain/dispatcher.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace pons::brain {
+namespace {
+
+constexpr int kFramesToTrust = 3;
+constexpr double kSizeMargin_m = 0.01;  // a measured size is not the true one
+
+// Where a camera's downstream edge meets the belt, over its whole width; nothing when it does not look at the belt.
+std::optional<double> view_end_m(const world::CameraSpec& camera, const world::Belt& belt) {
+  const double up = std::tan(camera.fovy_rad / 2);
+  const double side = up * camera.width / camera.height;
+  std::array<double, 4> x_m{};
+  std::size_t corner = 0;
+  for (const double x : {-side, side}) {
+    for (const double y : {-up, up}) {
+      const Vector3 ray = camera.world_from_optical.linear() * Vector3(x, y, 1);
+      const Vector3 eye = camera.world_from_optical.translation();
+      if (ray.z() >= 0 || eye.z() <= belt.surface_z_m) return std::nullopt;
+      x_m[corner++] = eye.x() + ray.x() * (belt.surface_z_m - eye.z()) / ray.z();
+    }
+  }
+  std::sort(x_m.begin(), x_m.end());
+  return x_m[2];  // the nearer of the two downstream corners
+}
+
+double label_view_end_m(const world::World& world) {
+  std::optional<double> end;
+  for (const world::CameraSpec& camera : world.cameras) {
+    if (camera.watches != "belt" || !camera.reads_labels) continue;
+    if (const auto edge = view_end_m(camera, world.belt)) end = std::max(end.value_or(*edge), *edge);
+  }
+  return end.value_or(world.belt.pick_x_max_m);
+}
+
+// For how long after a frame its label may still be on the way to us.
+double reading_delay_s(const world::World& world) {
+  double delay_s = 0;
+  for (const world::CameraSpec& camera : world.cameras) {
+    if (camera.reads_labels) delay_s = std::max(delay_s, camera.latency_s + camera.period_s);
+  }
+  return delay_s;
+}
+
+double speed_m_s(const ObjectBelief& belief, const world::Belt& belt) {
+  const double seen = belief.velocity_m_s.x();
+  return std::max(seen > 0 ? seen : belt.speed_m_s, belt.speed_m_s * (1 - belt.speed_variation));
+}
+
+}  // namespace
+
+Dispatcher::Dispatcher(Orders orders, const world::World& world)
+    : orders_(std::move(orders)), world_(world), label_view_end_m_(brain::label_view_end_m(world)) {}
+
+void Dispatcher::already(std::string_view id) { already_.emplace(id); }
+
+void Dispatcher::heard(std::string_view id, task::Outcome outcome) {
+  const auto found = known_.find(id);
+  if (found != known_.end() && outcome == task::Outcome::kSucceeded) found->second.sorted = true;
+}
+
+Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now) {
+  std::set<std::uint32_t> live;
+  for (const ObjectBelief& belief : beliefs) live.insert(belief.track);
+  Decisions decisions;
+  for (const ObjectBelief& belief : beliefs) {
+    if (!decided_.contains(belief.track)) decide(belief, live, now, decisions);
+  }
+  return decisions;
+}
+
+void Dispatcher::decide(const ObjectBelief& belief, const std::set<std::uint32_t>& live, Time now,
+                        Decisions& decisions) {
+  const double x_m = belief.world_from_top.translation().x();
+  const bool in_reach = x_m <= world_.belt.pick_x_max_m;
+  if (belief.code.empty()) {
+    if (in_reach && !past_label_view(belief)) return;
+    return ride(belief, kRideUnreadable, decisions);
+  }
+  if (in_reach && belief.frames_seen < kFramesToTrust) return;
+
+  const auto order = orders_.find(belief.code);
+  if (order == orders_.end()) return ride(belief, kRideUnknown, decisions);
+  const auto [known, first] = known_.try_emplace(belief.code, Known{belief.track, false});
+  if (!first) {
+    if (live.contains(known->second.track) || known->second.sorted) return ride(belief, kRideTwice, decisions);
+    // The earlier track was lost, not the parcel: its task stands.
+    known->second.track = belief.track;
+    decided_.insert(belief.track);
+    return;
+  }
+  if (already_.contains(belief.code)) return ride(belief, kRideTwice, decisions);
+  if (too_large(belief)) return ride(belief, kRideTooLarge, decisions);
+  if (!in_reach) return ride(belief, kRideLate, decisions);
+  decided_.insert(belief.track);
+  decisions.tasks.push_back(task_for(belief, order->second, now));
+}
+
+bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
+  const double half_m = std::max(belief.size_m.x(), belief.size_m.y()) / 2;
+  const double on_the_way_m = reading_delay_s(world_) * speed_m_s(belief, world_.belt);
+  return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
+}
+
+bool Dispatcher::too_large(const ObjectBelief& belief) const {
+  return belief.size_m.maxCoeff() > world_.rules.max_size_m + kSizeMargin_m;
+}
+
+Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, Time now) const {
+  const world::Belt& belt = world_.belt;
+  const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / speed_m_s(belief, belt);
+  // The same for all, so that it keeps their order: what a belt that slows down may add.
+  const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
+                         (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));
+  return {{"id", belief.code},
+          {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
+          {"deadline_s", now.s() + left_s + slack_s},
+          {"steps",
+           {{{"skill", "pick"}, {"arguments", {{"object", belief.code}}}},
+            {{"skill", "place"}, {"arguments", {{"place", order.destination}, {"object", belief.code}}}}}}};
+}
+
+void Dispatcher::ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions) {
+  decided_.insert(belief.track);
+  decisions.rides.push_back({belief.track, belief.code, std::string(reason)});
+}
+
+std::vector<std::string> Dispatcher::unseen() const {
+  std::vector<std::string> codes;
+  for (const auto& [code, order] : orders_) {
+    if (!known_.contains(code)) codes.push_back(code);
+  }
+  return codes;
+}
+
+}  // namespace pons::brain

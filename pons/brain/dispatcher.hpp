@@ -1,0 +1,87 @@
+// A brain that holds the day's orders, as a warehouse system would: turns what perception believes into tasks, and says
+// why it lets the rest ride into the exception chute.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/core/time.hpp"
+#include "pons/task/task.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::brain {
+
+using task::Json;
+
+struct Order {
+  std::string destination;  // a place's name
+  int priority = 0;         // 0 … 100; express is kExpressPriority and above
+};
+using Orders = std::map<std::string, Order, std::less<>>;  // by the label's code
+
+inline constexpr int kExpressPriority = 80;
+inline constexpr int kOrdinaryPriority = 50;  // among ordinary parcels the one that leaves first goes first
+
+// Something that will not be asked for. `code` is empty when none was read.
+struct Ride {
+  std::uint32_t track = 0;
+  std::string code;
+  std::string reason;  // one of the kRide… texts
+};
+
+inline constexpr std::string_view kRideUnreadable = "label unreadable";
+inline constexpr std::string_view kRideUnknown = "unknown code";
+inline constexpr std::string_view kRideTooLarge = "too large";
+inline constexpr std::string_view kRideTwice = "code seen twice";
+inline constexpr std::string_view kRideLate = "identified out of reach";
+
+struct Decisions {
+  std::vector<Json> tasks;  // to submit, in this order; an id comes once in the dispatcher's life
+  std::vector<Ride> rides;  // a track comes once
+};
+
+// Pure and deterministic; one thread.
+class Dispatcher {
+ public:
+  // `world` must outlive it.
+  Dispatcher(Orders orders, const world::World& world);
+
+  // This id is in the journal already: never ask for it.
+  void already(std::string_view id);
+  // `beliefs` are all live tracks, predicted to `now`.
+  [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now);
+  // The outcome of a task that it asked for; others are ignored.
+  void heard(std::string_view id, task::Outcome outcome);
+
+  // Orders whose code was never seen, in their order.
+  [[nodiscard]] std::vector<std::string> unseen() const;
+  // Where, along the belt, labels can no longer be read (m).
+  [[nodiscard]] double label_view_end_m() const { return label_view_end_m_; }
+
+ private:
+  struct Known {
+    std::uint32_t track = 0;  // that carries the code now
+    bool sorted = false;      // its task succeeded: whoever else shows the code is a copy
+  };
+
+  void decide(const ObjectBelief& belief, const std::set<std::uint32_t>& live, Time now, Decisions& decisions);
+  [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
+  [[nodiscard]] bool too_large(const ObjectBelief& belief) const;
+  [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, Time now) const;
+  void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);
+
+  Orders orders_;
+  const world::World& world_;
+  double label_view_end_m_;
+  std::map<std::string, Known, std::less<>> known_;  // codes seen on some track
+  std::set<std::string, std::less<>> already_;
+  std::set<std::uint32_t> decided_;  // tracks
+};
+
+}  // namespace pons::brain

@@ -1,0 +1,290 @@
+#include "pons/bridge/bridge.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge {
+namespace {
+
+// Events between the durable moments of a task may wait this long for the disk.
+constexpr Duration kCommitPeriod = std::chrono::seconds(1);
+
+std::vector<std::string> names(const std::vector<world::Resource>& resources) {
+  std::vector<std::string> result;
+  for (const world::Resource& resource : resources) result.push_back(resource.name);
+  return result;
+}
+
+std::string_view word(task::Status status) {
+  switch (status) {
+    case task::Status::kRunning:
+      return "running";
+    case task::Status::kSucceeded:
+      return "succeeded";
+    case task::Status::kRetry:
+      return "retry";
+    case task::Status::kFailed:
+      return "failed";
+    case task::Status::kException:
+      return "exception";
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+struct Bridge::Open {
+  task::Task task;
+  Time accepted;
+  tree::Observer observer;  // the tree refers to it
+  tree::NodePtr root;       // empty while queued
+  Time give_up_at;          // by then every step has had its timeout, and grace to leave the world safe
+  bool cancelled = false;
+  std::string cancel_reason;
+  int attempts = 0;
+  Json steps = Json::array();  // what each step that ended had to tell
+};
+
+Bridge::Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world)
+    : journal_(journal), skills_(skills), review_(skills, names(world.resources)), arbiter_(names(world.resources)) {}
+
+Bridge::~Bridge() = default;
+
+void Bridge::add_reviewer(Reviewer reviewer) { review_.add(std::move(reviewer)); }
+
+// ---- in ----
+
+Expected<std::size_t> Bridge::recover(Time now) {
+  const auto records = journal_.tasks();
+  if (!records) return std::unexpected(records.error());
+  std::size_t queued = 0;
+  for (const TaskRecord& record : *records) {
+    if (record.outcome || open_.contains(record.task.id)) continue;
+    std::string_view reason;
+    if (record.started) reason = "interrupted: the bridge ended while it ran";
+    if (!record.started && record.task.deadline) reason = "its deadline was in an earlier run";
+    if (!reason.empty()) {
+      auto written = journal_.outcome(record.task.id, task::Outcome::kFailed, reason, now);
+      if (!written) return std::unexpected(written.error());
+      outcomes_.push_back({record.task.id, task::Outcome::kFailed, std::string(reason), Json::object()});
+    } else if (auto good = review_.check(record.task, now); !good) {
+      const std::string why = "no longer possible: " + good.error().line();
+      auto written = journal_.outcome(record.task.id, task::Outcome::kFailed, why, now);
+      if (!written) return std::unexpected(written.error());
+      outcomes_.push_back({record.task.id, task::Outcome::kFailed, why, Json::object()});
+    } else {
+      enqueue(record.task, now);
+      ++queued;
+    }
+  }
+  return queued;
+}
+
+Expected<Admission> Bridge::submit(std::string_view json, Time now) {
+  auto admission = admit(json, now);
+  if (!admission) ++refused_;
+  return admission;
+}
+
+Expected<Admission> Bridge::admit(std::string_view json, Time now) {
+  if (fault_) return fail("the bridge has stopped: " + fault_->line(), {}, "start it again");
+  auto task = Review::parse(json);
+  if (!task) return std::unexpected(task.error());
+  // Before everything that may have changed since: a sender that asks again hears the same answer.
+  const auto held = journal_.holds(*task);
+  if (!held) return std::unexpected(held.error());
+  if (*held) return Admission{task->id, Accepted::kAlready};
+  if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
+  if (auto good = review_.check(*task, now); !good) return std::unexpected(good.error());
+  if (queue_length() >= kMaxQueue) {
+    return fail(fmt::format("{} tasks are waiting already", queue_length()), {}, "submit it again later");
+  }
+  const auto accepted = journal_.accept(*task, now);
+  if (!accepted) {
+    set_fault(accepted.error());
+    return std::unexpected(accepted.error());
+  }
+  std::string id = task->id;
+  enqueue(std::move(*task), now);
+  return Admission{std::move(id), *accepted};
+}
+
+void Bridge::enqueue(task::Task task, Time now) {
+  std::vector<std::string> resources;
+  for (const task::Step& step : task.steps) {
+    const auto& needs = skills_.find(step.skill)->resources;
+    resources.insert(resources.end(), needs.begin(), needs.end());
+  }
+  arbiter_.add(task.id, task.priority, task.deadline, resources);
+  auto open = std::make_unique<Open>();
+  open->accepted = now;
+  std::string id = task.id;
+  open->task = std::move(task);
+  open_.emplace(std::move(id), std::move(open));
+}
+
+Expected<void> Bridge::cancel(std::string_view id, Time now, std::string_view reason) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) return fail(fmt::format("there is no open task '{}'", task::excerpt(id)), {}, "");
+  const std::string name = found->first;
+  if (arbiter_.remove(name)) {
+    finish(name, task::Outcome::kCancelled, std::string(reason), Json::object(), now);
+  } else {
+    cancel_running(*found->second, now, reason);
+  }
+  return {};
+}
+
+void Bridge::stop(Time now, std::string_view reason) {
+  stopping_ = true;
+  for (const std::string& id : arbiter_.queue()) {
+    arbiter_.remove(id);
+    finish(id, task::Outcome::kCancelled, std::string(reason), Json::object(), now);
+  }
+  for (auto& [id, open] : open_) cancel_running(*open, now, reason);
+}
+
+void Bridge::cancel_running(Open& open, Time now, std::string_view reason) {
+  if (!open.root || open.cancelled) return;
+  open.cancelled = true;
+  open.cancel_reason = reason;
+  open.give_up_at = std::min(open.give_up_at, now + kCancelGrace);
+  keep(journal_.event(open.task.id, now, "cancelling", {{"reason", open.cancel_reason}}));
+  open.root->cancel(now);
+}
+
+// ---- a tick ----
+
+void Bridge::tick(Time now) {
+  // Who ends frees resources for who starts in the same tick.
+  tick_trees(running(), now);
+  expire(now);
+  tick_trees(start_granted(now), now);
+  if (now - last_commit_ >= kCommitPeriod) {
+    last_commit_ = now;
+    keep(journal_.commit());
+  }
+  if (!fault_) return;
+  for (auto& [id, open] : open_) cancel_running(*open, now, "the bridge has stopped: " + fault_->what);
+  for (const std::string& id : arbiter_.queue()) {
+    arbiter_.remove(id);
+    open_.erase(id);
+  }
+}
+
+void Bridge::expire(Time now) {
+  for (const std::string& id : arbiter_.take_expired(now)) {
+    finish(id, task::Outcome::kFailed, "its deadline passed before it could start", Json::object(), now);
+  }
+}
+
+std::vector<std::string> Bridge::start_granted(Time now) {
+  if (held() || fault_) return {};
+  std::vector<std::string> granted = arbiter_.grant();
+  if (granted.empty()) return granted;
+  for (const std::string& id : granted) {
+    Open& open = *open_.find(id)->second;
+    keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
+    open.observer = [this, id](const tree::Attempt& attempt, Time when) { journal_attempt(id, attempt, when); };
+    open.root = tree::from_steps(open.task.steps, skills_, open.observer);
+    open.give_up_at = now;
+    for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
+  }
+  // Before anything moves: after a crash nobody may take these for tasks that have not begun.
+  last_commit_ = now;
+  keep(journal_.commit());
+  return granted;
+}
+
+void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
+  for (const std::string& id : ids) {
+    Open& open = *open_.find(id)->second;
+    // Never begun, and the journal could not say that it would.
+    if (fault_ && open.attempts == 0) cancel_running(open, now, "the bridge has stopped: " + fault_->what);
+    const task::Progress progress = open.root->tick(now);
+    if (progress.status != task::Status::kRunning) {
+      conclude(id, open, progress, now);
+    } else if (give_up(open, now)) {
+      conclude(id, open, {task::Status::kFailed, "a skill did not end when it was told to", Json::object()}, now);
+    }
+  }
+}
+
+bool Bridge::give_up(Open& open, Time now) {
+  if (now < open.give_up_at) return false;
+  set_fault(
+      {fmt::format("a skill of task '{}' did not end within {} s of being cancelled", open.task.id, to_s(kCancelGrace)),
+       "bridge", "stop the robot and mend the skill"});
+  return true;
+}
+
+void Bridge::conclude(const std::string& id, Open& open, const task::Progress& progress, Time now) {
+  auto outcome = task::Outcome::kFailed;
+  std::string reason = progress.reason;
+  if (progress.status == task::Status::kSucceeded) {
+    outcome = task::Outcome::kSucceeded;
+    reason.clear();
+  } else if (progress.status == task::Status::kException) {
+    outcome = task::Outcome::kException;
+  } else if (open.cancelled) {
+    outcome = task::Outcome::kCancelled;
+    reason = fmt::format("{} ({})", open.cancel_reason, progress.reason);
+  }
+  Json detail{{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
+  arbiter_.release(id);
+  finish(id, outcome, std::move(reason), std::move(detail), now);
+}
+
+void Bridge::finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now) {
+  const std::string name = id;  // `id` may live in what is erased
+  open_.erase(open_.find(name));
+  const auto written = journal_.outcome(name, outcome, reason, now, detail);
+  keep(written);
+  if (written) outcomes_.push_back({name, outcome, std::move(reason), std::move(detail)});
+}
+
+void Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {
+  Open& open = *open_.find(id)->second;
+  Json detail{{"step", attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};
+  if (attempt.ended == nullptr) {
+    ++open.attempts;
+    if (attempt.number > 1) ++retries_;
+    keep(journal_.event(id, now, "attempt", detail));
+    return;
+  }
+  open.steps.push_back(
+      {{"skill", attempt.skill}, {"status", word(attempt.ended->status)}, {"detail", attempt.ended->detail}});
+  detail["status"] = word(attempt.ended->status);
+  detail["reason"] = attempt.ended->reason;
+  detail["detail"] = attempt.ended->detail;
+  keep(journal_.event(id, now, "attempt_ended", detail));
+}
+
+// ---- out ----
+
+void Bridge::note(std::string_view kind, const Json& detail, Time now) { keep(journal_.event("", now, kind, detail)); }
+
+std::vector<OutcomeReport> Bridge::take_outcomes() { return std::exchange(outcomes_, {}); }
+
+std::vector<std::string> Bridge::running() const {
+  std::vector<std::string> ids;
+  for (const auto& [id, open] : open_) {
+    if (open->root) ids.push_back(id);
+  }
+  return ids;
+}
+
+void Bridge::keep(const Expected<void>& written) {
+  if (!written) set_fault(written.error());
+}
+
+void Bridge::set_fault(Error error) {
+  if (!fault_) fault_ = std::move(error);
+}
+
+}  // namespace pons::bridge

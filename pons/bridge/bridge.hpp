@@ -1,0 +1,115 @@
+// The bridge: admits tasks, journals them, waits for their resources, runs their trees, and writes exactly one outcome
+// for each. It knows skills only by their contract.
+//
+// One thread. Call tick() every 10 ms. Nobody hears of an acceptance or an outcome before the journal holds it; a task
+// is journalled as started before its first skill may move anything.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/review/review.hpp"
+#include "pons/bridge/schedule/arbiter.hpp"
+#include "pons/bridge/tree/tree.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
+#include "pons/task/skill.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::bridge {
+
+inline constexpr std::size_t kMaxQueue = 10'000;
+// A skill that was cancelled, or ran out of time, and has not ended after this long is given up: see Bridge::fault().
+inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
+
+struct Admission {
+  std::string id;
+  Accepted accepted = Accepted::kNew;  // kAlready: the same task was accepted earlier, nothing was queued
+};
+
+struct OutcomeReport {
+  std::string id;
+  task::Outcome outcome = task::Outcome::kFailed;
+  std::string reason;            // empty when it succeeded
+  Json detail = Json::object();  // {"attempts":…, "steps":[{"skill":…,"detail":…}]}
+};
+
+class Bridge {
+ public:
+  // All three must outlive it; `skills` must not change.
+  Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world);
+  ~Bridge();
+
+  void add_reviewer(Reviewer reviewer);
+
+  // What earlier runs left without an outcome: a task that had not started is queued again if it has no deadline (run
+  // time begins at zero in every run); every other one ends as FAILED, for nobody knows how far it came. Call once,
+  // before the first tick. Returns how many were queued again.
+  [[nodiscard]] Expected<std::size_t> recover(Time now);
+
+  // Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge is stopping, or
+  // the journal cannot be written. An error leaves nothing behind.
+  [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);
+  void tick(Time now);
+  // Queued: ends as CANCELLED at once. Running: the skill leaves the world safe first. Error: no such open task.
+  [[nodiscard]] Expected<void> cancel(std::string_view id, Time now, std::string_view reason);
+  // Cancels everything and refuses what comes; tick() on until idle().
+  void stop(Time now, std::string_view reason);
+  // Held, it starts no task (protective stop); running ones go on being ticked.
+  enum class Hold : std::uint8_t { kOff, kOn };
+  void hold(Hold hold) { hold_ = hold; }
+
+  // A journal entry of no task.
+  void note(std::string_view kind, const Json& detail, Time now);
+
+  // Since the last call, in the order of their writing.
+  [[nodiscard]] std::vector<OutcomeReport> take_outcomes();
+
+  [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
+  [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
+  [[nodiscard]] std::vector<std::string> running() const;  // in the order of their ids
+  [[nodiscard]] bool idle() const { return open_.empty(); }
+  [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
+  [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
+  [[nodiscard]] std::int64_t refused() const { return refused_; }  // submissions
+  // Set for good when the journal cannot be written or a skill did not end when told to: nothing is admitted or started
+  // any more, running tasks are cancelled. Outcomes that could not be written are not reported and stay open in the
+  // journal.
+  [[nodiscard]] const std::optional<Error>& fault() const { return fault_; }
+
+ private:
+  struct Open;  // an accepted task without an outcome
+
+  [[nodiscard]] Expected<Admission> admit(std::string_view json, Time now);
+  void enqueue(task::Task task, Time now);
+  void expire(Time now);
+  [[nodiscard]] std::vector<std::string> start_granted(Time now);
+  void tick_trees(const std::vector<std::string>& ids, Time now);
+  [[nodiscard]] bool give_up(Open& open, Time now);
+  void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
+  void cancel_running(Open& open, Time now, std::string_view reason);
+  void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
+  void journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
+  void keep(const Expected<void>& written);
+  void set_fault(Error error);
+
+  Journal& journal_;
+  const task::SkillRegistry& skills_;
+  Review review_;
+  Arbiter arbiter_;
+  std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
+  std::vector<OutcomeReport> outcomes_;
+  std::optional<Error> fault_;
+  Time last_commit_;
+  std::int64_t retries_ = 0, refused_ = 0;
+  Hold hold_ = Hold::kOff;
+  bool stopping_ = false;
+};
+
+}  // namespace pons::bridge

@@ -1,0 +1,322 @@
+#include "pons/bridge/bridge.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "pons/bridge/test_kit.hpp"
+#include "pons/core/random.hpp"
+
+namespace pons::bridge {
+namespace {
+
+using task::Outcome;
+
+class BridgeTest : public testing::Test {
+ protected:
+  BridgeTest() {
+    world_.resources = {{"arm"}};
+    skills_.add(pick_.type(3));
+    skills_.add(place_.type());
+    skills_.add(slow_.type(1, from_s(5)));
+    skills_.add(deaf_.type(1, from_s(5)));
+    skills_.add(heavy_.type());
+    reopen();
+  }
+  void reopen() {
+    bridge_.reset();
+    journal_.reset();
+    journal_ = std::move(*Journal::open(folder_ / "day.db"));
+    bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
+  }
+  Expected<Admission> submit(const std::string& id, const std::string& skill, const std::string& rest = "") {
+    return bridge_->submit(fmt::format(R"({{"id":"{}","steps":[{{"skill":"{}"}}]{}}})", id, skill, rest), now_);
+  }
+  // Ticks until idle, or for `longest_s`.
+  std::vector<OutcomeReport> run(double longest_s = 60) {
+    std::vector<OutcomeReport> all;
+    const Time end = now_ + from_s(longest_s);
+    for (; now_ < end && !bridge_->idle(); now_ += from_s(0.01)) {
+      bridge_->tick(now_);
+      for (OutcomeReport& report : bridge_->take_outcomes()) all.push_back(std::move(report));
+    }
+    return all;
+  }
+  std::vector<std::string> kinds(const std::string& id) {
+    std::vector<std::string> result;
+    for (const Event& event : journal_->events(id).value()) result.push_back(event.kind);
+    return result;
+  }
+  std::optional<OutcomeRecord> recorded(const std::string& id) {
+    return journal_->task(id).value().value().record.outcome;
+  }
+
+  Actor pick_{"pick", {{.ticks = 5, .end = ends(Status::kSucceeded, "", {{"mass_kg", 1.5}})}}};
+  Actor place_{"place", {{.ticks = 5}}};
+  Actor slow_{"slow", {{.ticks = 1'000'000, .ticks_after_cancel = 3}}};
+  Actor deaf_{"deaf", {{.ticks = 1'000'000, .ticks_after_cancel = 1'000'000}}};
+  Actor heavy_{"heavy", {{.end = ends(Status::kException, "too heavy", {{"mass_kg", 7}})}}};
+  TemporaryFolder folder_;
+  world::World world_;
+  task::SkillRegistry skills_;
+  std::unique_ptr<Journal> journal_;
+  std::unique_ptr<Bridge> bridge_;
+  Time now_;
+};
+
+TEST_F(BridgeTest, RunsATaskFromSubmissionToOutcome) {
+  const std::string text = R"({"id":"P1","steps":[{"skill":"pick","arguments":{"object":"P1"}},{"skill":"place"}]})";
+  const auto admission = bridge_->submit(text, now_);
+  ASSERT_TRUE(admission) << admission.error().line();
+  EXPECT_EQ(admission->id, "P1");
+  EXPECT_EQ(admission->accepted, Accepted::kNew);
+  EXPECT_EQ(bridge_->queue_length(), 1u);
+  bridge_->tick(now_);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"P1"});
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 1u);
+  EXPECT_EQ(reports[0].outcome, Outcome::kSucceeded);
+  EXPECT_EQ(reports[0].reason, "");
+  EXPECT_EQ(reports[0].detail.at("steps").at(0).at("detail").at("mass_kg"), 1.5);
+  EXPECT_EQ(recorded("P1")->outcome, Outcome::kSucceeded);
+  EXPECT_EQ(recorded("P1")->detail, reports[0].detail);
+  EXPECT_EQ(kinds("P1"), (std::vector<std::string>{"started", "attempt", "attempt_ended", "attempt", "attempt_ended"}));
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_EQ(bridge_->submit(text, now_)->accepted, Accepted::kAlready);
+  EXPECT_TRUE(bridge_->idle());
+}
+
+TEST_F(BridgeTest, OneTaskHoldsTheArmAndTheNextStartsInTheTickThatFreesIt) {
+  ASSERT_TRUE(submit("a", "pick"));
+  ASSERT_TRUE(submit("b", "pick"));
+  ASSERT_TRUE(submit("c", "pick", R"(,"priority":90)"));
+  bridge_->tick(now_);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"c"});
+  EXPECT_EQ(bridge_->queue(), (std::vector<std::string>{"a", "b"}));
+  for (int i = 1; i < 5; ++i) bridge_->tick(now_ += from_s(0.01));
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"a"});
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 3u);
+  EXPECT_EQ(reports[0].id + reports[1].id + reports[2].id, "cab");
+}
+
+TEST_F(BridgeTest, CountsAndJournalsRetries) {
+  Actor misses("misses", {{.end = ends(Status::kRetry, "no vacuum")}, {.end = ends(Status::kRetry, "no vacuum")}, {}});
+  skills_.add(misses.type(3));
+  reopen();
+  ASSERT_TRUE(submit("a", "misses"));
+  EXPECT_EQ(run().at(0).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(bridge_->retries(), 2);
+  const auto events = journal_->events("a").value();
+  ASSERT_EQ(events.size(), 7u);
+  EXPECT_EQ(events[2].detail.at("reason"), "no vacuum");
+  EXPECT_EQ(events[5].detail.at("attempt"), 3);
+}
+
+TEST_F(BridgeTest, FailuresAndExceptionsHaveTheirReasons) {
+  ASSERT_TRUE(submit("a", "heavy"));
+  ASSERT_TRUE(submit("b", "slow"));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2u);
+  EXPECT_EQ(reports[0].outcome, Outcome::kException);
+  EXPECT_EQ(reports[0].reason, "too heavy");
+  EXPECT_EQ(reports[1].outcome, Outcome::kFailed);
+  EXPECT_EQ(reports[1].reason, "timed out after 5 s: broken off");
+}
+
+TEST_F(BridgeTest, ATaskWhoseDeadlinePassesInTheQueueFailsAndARunningOneGoesOn) {
+  ASSERT_TRUE(submit("a", "slow", R"(,"deadline_s":1)"));
+  ASSERT_TRUE(submit("b", "pick", R"(,"deadline_s":2)"));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2u);
+  EXPECT_EQ(reports[0].id, "b");
+  EXPECT_EQ(reports[0].reason, "its deadline passed before it could start");
+  EXPECT_EQ(reports[1].reason, "timed out after 5 s: broken off");
+  EXPECT_TRUE(pick_.log.started.empty());
+  EXPECT_EQ(submit("b", "pick", R"(,"deadline_s":2)")->accepted, Accepted::kAlready);
+  EXPECT_FALSE(submit("c", "pick", R"(,"deadline_s":2)"));
+}
+
+TEST_F(BridgeTest, CancelsQueuedTasksAtOnceAndRunningOnesSafely) {
+  ASSERT_TRUE(submit("a", "slow"));
+  ASSERT_TRUE(submit("b", "pick"));
+  bridge_->tick(now_);
+  EXPECT_TRUE(bridge_->cancel("b", now_, "not wanted"));
+  EXPECT_EQ(recorded("b")->outcome, Outcome::kCancelled);
+  EXPECT_TRUE(bridge_->cancel("a", now_, "not wanted"));
+  EXPECT_FALSE(recorded("a"));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2u);
+  EXPECT_EQ(reports[1].outcome, Outcome::kCancelled);
+  EXPECT_EQ(reports[1].reason, "not wanted (broken off)");
+  EXPECT_EQ(slow_.log.cancels, 1);
+  EXPECT_FALSE(bridge_->cancel("a", now_, "again"));
+  EXPECT_FALSE(bridge_->cancel("z", now_, "unknown"));
+}
+
+TEST_F(BridgeTest, StopsWholeAndTakesNothingMore) {
+  ASSERT_TRUE(submit("a", "slow"));
+  ASSERT_TRUE(submit("b", "pick"));
+  bridge_->tick(now_);
+  bridge_->stop(now_, "Ctrl-C");
+  bridge_->stop(now_, "Ctrl-C");
+  EXPECT_FALSE(submit("c", "pick"));
+  EXPECT_EQ(submit("b", "pick")->accepted, Accepted::kAlready);
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2u);
+  for (const OutcomeReport& report : reports) EXPECT_EQ(report.outcome, Outcome::kCancelled);
+  EXPECT_EQ(journal_->counts().value().open, 0);
+}
+
+TEST_F(BridgeTest, HeldItStartsNothingButGoesOnWithWhatRuns) {
+  ASSERT_TRUE(submit("a", "pick"));
+  bridge_->tick(now_);
+  ASSERT_TRUE(submit("b", "pick"));
+  bridge_->hold(Bridge::Hold::kOn);
+  EXPECT_EQ(run(2).size(), 1u);
+  EXPECT_EQ(bridge_->queue_length(), 1u);
+  bridge_->hold(Bridge::Hold::kOff);
+  EXPECT_EQ(run().size(), 1u);
+}
+
+TEST_F(BridgeTest, ASkillThatDoesNotEndIsGivenUpAndStopsTheBridge) {
+  ASSERT_TRUE(submit("a", "deaf"));
+  ASSERT_TRUE(submit("b", "pick"));
+  bridge_->tick(now_);
+  ASSERT_TRUE(bridge_->cancel("a", now_, "not wanted"));
+  const auto reports = run(31);
+  ASSERT_EQ(reports.size(), 1u);
+  EXPECT_EQ(reports[0].reason, "not wanted (a skill did not end when it was told to)");
+  ASSERT_TRUE(bridge_->fault());
+  EXPECT_TRUE(pick_.log.started.empty());
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_FALSE(submit("c", "pick"));
+}
+
+TEST_F(BridgeTest, StartedIsInTheJournalBeforeTheSkillMoves) {
+  bool was_started = false;
+  task::SkillType type = pick_.type();
+  type.name = "looks";
+  type.start = [this, &was_started, start = pick_.type().start](const Json& arguments, Time now) {
+    was_started = journal_->task("a").value()->record.started;
+    return start(arguments, now);
+  };
+  skills_.add(type);
+  reopen();
+  ASSERT_TRUE(submit("a", "looks"));
+  run();
+  EXPECT_TRUE(was_started);
+}
+
+TEST_F(BridgeTest, RecoversWhatAnEarlierRunLeft) {
+  ASSERT_TRUE(submit("running", "slow"));
+  ASSERT_TRUE(submit("queued", "pick"));
+  ASSERT_TRUE(submit("due", "pick", R"(,"deadline_s":500)"));
+  bridge_->tick(now_);
+  reopen();
+  EXPECT_EQ(bridge_->recover(now_).value(), 1u);
+  EXPECT_EQ(bridge_->recover(now_).value(), 0u);
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 3u);
+  EXPECT_EQ(reports[0].reason, "interrupted: the bridge ended while it ran");
+  EXPECT_EQ(reports[1].reason, "its deadline was in an earlier run");
+  EXPECT_EQ(reports[2].id, "queued");
+  EXPECT_EQ(reports[2].outcome, Outcome::kSucceeded);
+  EXPECT_EQ(journal_->counts().value().open, 0);
+}
+
+TEST_F(BridgeTest, RefusesAFullQueueAndForgetsWhatItRefused) {
+  journal_ = std::move(*Journal::open(":memory:"));
+  bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
+  bridge_->hold(Bridge::Hold::kOn);
+  for (std::size_t i = 0; i < kMaxQueue; ++i) ASSERT_TRUE(submit(fmt::format("t{}", i), "pick"));
+  EXPECT_EQ(submit("more", "pick").error().what, "10000 tasks are waiting already");
+  EXPECT_EQ(journal_->counts().value().accepted, static_cast<std::int64_t>(kMaxQueue));
+  bridge_->hold(Bridge::Hold::kOff);
+  bridge_->tick(now_);
+  EXPECT_TRUE(submit("more", "pick"));
+}
+
+TEST_F(BridgeTest, NotesAreEventsOfNoTask) {
+  bridge_->note("ride", {{"reason", "label unreadable"}}, now_);
+  EXPECT_EQ(kinds(""), std::vector<std::string>{"ride"});
+}
+
+// Random edits of a good submission: an error is one readable line, an acceptance is in the journal, nothing else
+// happens.
+std::string mutated(const std::string& text, Random& random) {
+  static const std::vector<std::string> kPieces{"{",
+                                                "}",
+                                                "[",
+                                                "]",
+                                                ",",
+                                                ":",
+                                                "\"",
+                                                "\\",
+                                                "\\u0000",
+                                                "1e999",
+                                                "-0",
+                                                "null",
+                                                "\xff",
+                                                "\xc3\x28",
+                                                "\"id\":\"x\",",
+                                                "9999999999999999999",
+                                                "\n",
+                                                "{\"a\":"};
+  std::string result = text;
+  const std::uint64_t edits = 1 + random.below(4);
+  for (std::uint64_t i = 0; i < edits && !result.empty(); ++i) {
+    const std::size_t place = random.below(result.size());
+    const std::size_t length = std::min<std::size_t>(random.below(12), result.size() - place);
+    switch (random.below(5)) {
+      case 0:
+        result[place] = static_cast<char>(random.below(256));
+        break;
+      case 1:
+        result.erase(place, length);
+        break;
+      case 2:
+        result.insert(place, result.substr(place, length));
+        break;
+      case 3:
+        result.insert(place, kPieces[random.below(kPieces.size())]);
+        break;
+      case 4:
+        result.resize(place);
+        break;
+    }
+  }
+  return result;
+}
+
+TEST_F(BridgeTest, SurvivesAHostileBrain) {
+  journal_ = std::move(*Journal::open(":memory:"));
+  bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
+  const std::string good =
+      R"({"id":"P1","priority":50,"deadline_s":100.5,"steps":[{"skill":"pick","arguments":{"object":"P1"}},{"skill":"place"}]})";
+  Random random(11);
+  std::int64_t accepted = 0, refused = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const auto admission = bridge_->submit(mutated(good, random), now_);
+    if (admission) {
+      accepted += admission->accepted == Accepted::kNew ? 1 : 0;
+    } else {
+      ++refused;
+      const std::string line = admission.error().line();
+      ASSERT_FALSE(line.empty());
+      ASSERT_LT(line.size(), 1000u);
+      ASSERT_EQ(line.find('\n'), line.npos);
+      ASSERT_NO_THROW((void)Json(line).dump());
+    }
+    ASSERT_FALSE(bridge_->fault());
+  }
+  EXPECT_GT(accepted, 50);
+  EXPECT_GT(refused, 10'000);
+  EXPECT_EQ(bridge_->refused(), refused);
+  EXPECT_EQ(journal_->counts().value().accepted, accepted);
+  EXPECT_EQ(bridge_->queue_length(), static_cast<std::size_t>(accepted));
+  run(1000);
+  EXPECT_EQ(journal_->counts().value().open, 0);
+}
+
+}  // namespace
+}  // namespace pons::bridge

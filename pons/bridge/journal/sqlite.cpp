@@ -1,0 +1,151 @@
+#include "pons/bridge/journal/sqlite.hpp"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include <cassert>
+#include <utility>
+
+namespace pons::bridge {
+namespace {
+
+// One clear line for each way a file can be wrong.
+std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
+  const int code = sqlite3_errcode(database);
+  switch (code & 0xff) {
+    case SQLITE_NOTADB:
+    case SQLITE_FORMAT:
+      return fail("this file is not a journal", file, "name another file, or move this one away");
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return fail("the journal is in use by another process", file, "end that one, or name another file");
+    case SQLITE_CANTOPEN:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+      return fail("the journal cannot be opened", file, "check that the folder exists and may be written");
+    case SQLITE_READONLY:
+      return fail("the journal cannot be written", file, "check the permissions of file and folder");
+    case SQLITE_FULL:
+      return fail("no space is left for the journal", file, "free some space on the disk");
+    case SQLITE_CORRUPT:
+      return fail("the journal is damaged", file, "restore a copy, or name another file");
+    default:
+      return fail(fmt::format("the journal failed: {}", sqlite3_errmsg(database)), file, "check the disk");
+  }
+}
+
+}  // namespace
+
+Statement::Statement(Statement&& other) noexcept
+    : statement_(std::exchange(other.statement_, nullptr)), file_(std::move(other.file_)), bound_(other.bound_) {}
+
+Statement& Statement::operator=(Statement&& other) noexcept {
+  std::swap(statement_, other.statement_);
+  std::swap(file_, other.file_);
+  std::swap(bound_, other.bound_);
+  return *this;
+}
+
+Statement::~Statement() { sqlite3_finalize(statement_); }
+
+Statement& Statement::bind(std::int64_t value) {
+  [[maybe_unused]] const int code = sqlite3_bind_int64(statement_, ++bound_, value);
+  assert(code == SQLITE_OK);
+  return *this;
+}
+
+Statement& Statement::bind(std::string_view value) {
+  // A null pointer would bind NULL.
+  const char* data = value.empty() ? "" : value.data();
+  [[maybe_unused]] const int code =
+      sqlite3_bind_text64(statement_, ++bound_, data, value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+  assert(code == SQLITE_OK);
+  return *this;
+}
+
+Statement& Statement::bind_null() {
+  [[maybe_unused]] const int code = sqlite3_bind_null(statement_, ++bound_);
+  assert(code == SQLITE_OK);
+  return *this;
+}
+
+Expected<bool> Statement::step() {
+  const int code = sqlite3_step(statement_);
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE) return false;
+  return failure(sqlite3_db_handle(statement_), file_);
+}
+
+Expected<void> Statement::run() {
+  Reading reading(*this);
+  for (;;) {
+    const auto row = step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return {};
+  }
+}
+
+void Statement::reset() {
+  sqlite3_reset(statement_);
+  sqlite3_clear_bindings(statement_);
+  bound_ = 0;
+}
+
+std::int64_t Statement::integer(int column) const { return sqlite3_column_int64(statement_, column); }
+
+std::string Statement::text(int column) const {
+  const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  return data == nullptr ? std::string()
+                         : std::string(data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)));
+}
+
+bool Statement::is_null(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
+
+Database::~Database() { sqlite3_close(database_); }
+
+Expected<void> Database::open(const std::string& file, Mode mode) {
+  file_ = file;
+  const int flags = mode == Mode::kCreate ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
+  if (sqlite3_open_v2(file.c_str(), &database_, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK) {
+    return failure(database_, file_);
+  }
+  return {};
+}
+
+Expected<Statement> Database::prepare(std::string_view sql) const {
+  Statement statement;
+  statement.file_ = file_;
+  const int code =
+      sqlite3_prepare_v2(database_, sql.data(), static_cast<int>(sql.size()), &statement.statement_, nullptr);
+  if (code != SQLITE_OK) return failure(database_, file_);
+  return statement;
+}
+
+Expected<void> Database::execute(const char* sql) const {
+  if (sqlite3_exec(database_, sql, nullptr, nullptr, nullptr) != SQLITE_OK) return failure(database_, file_);
+  return {};
+}
+
+Expected<std::int64_t> Database::integer(std::string_view sql) const {
+  auto statement = prepare(sql);
+  if (!statement) return std::unexpected(statement.error());
+  const auto row = statement->step();
+  if (!row) return std::unexpected(row.error());
+  return *row ? statement->integer(0) : 0;
+}
+
+Expected<std::string> Database::text(std::string_view sql) const {
+  auto statement = prepare(sql);
+  if (!statement) return std::unexpected(statement.error());
+  const auto row = statement->step();
+  if (!row) return std::unexpected(row.error());
+  return *row ? statement->text(0) : std::string();
+}
+
+bool Database::read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
+
+bool Database::in_transaction() const { return sqlite3_get_autocommit(database_) == 0; }
+
+std::int64_t Database::changes() const { return sqlite3_changes64(database_); }
+
+}  // namespace pons::bridge

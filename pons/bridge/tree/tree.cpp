@@ -1,0 +1,183 @@
+#include "pons/bridge/tree/tree.hpp"
+
+#include <fmt/format.h>
+
+#include <cassert>
+#include <optional>
+#include <utility>
+
+namespace pons::bridge::tree {
+namespace {
+
+Progress broken_off() { return {Status::kFailed, "cancelled before it started", Json::object()}; }
+
+// Ticks its children one after the other; `goes_on` says after which status the next one is tried.
+class Series final : public Node {
+ public:
+  Series(std::vector<NodePtr> children, bool (*goes_on)(Status)) : children_(std::move(children)), goes_on_(goes_on) {
+    assert(!children_.empty());
+  }
+
+  Progress tick(Time now) override {
+    for (;;) {
+      Progress progress = children_[current_]->tick(now);
+      if (progress.status == Status::kRunning || !goes_on_(progress.status)) return progress;
+      if (current_ + 1 == children_.size()) return progress;
+      if (cancelled_) return progress.status == Status::kSucceeded ? broken_off() : progress;
+      ++current_;
+    }
+  }
+  void cancel(Time now) override {
+    cancelled_ = true;
+    children_[current_]->cancel(now);
+  }
+  void reset() override {
+    for (NodePtr& child : children_) child->reset();
+    current_ = 0;
+    cancelled_ = false;
+  }
+
+ private:
+  std::vector<NodePtr> children_;
+  bool (*goes_on_)(Status);
+  std::size_t current_ = 0;
+  bool cancelled_ = false;
+};
+
+class Retry final : public Node {
+ public:
+  Retry(int attempts, NodePtr child) : attempts_(attempts), child_(std::move(child)) { assert(attempts_ >= 1); }
+
+  Progress tick(Time now) override {
+    Progress progress = child_->tick(now);
+    if (progress.status != Status::kRetry) return progress;
+    ++done_;
+    if (done_ < attempts_ && !cancelled_) {
+      child_->reset();
+      return {};
+    }
+    progress.status = Status::kFailed;
+    if (done_ > 1) progress.reason = fmt::format("{}; gave up after {} attempts", progress.reason, done_);
+    return progress;
+  }
+  void cancel(Time now) override {
+    cancelled_ = true;
+    child_->cancel(now);
+  }
+  void reset() override {
+    child_->reset();
+    done_ = 0;
+    cancelled_ = false;
+  }
+
+ private:
+  int attempts_;
+  NodePtr child_;
+  int done_ = 0;
+  bool cancelled_ = false;
+};
+
+class Timeout final : public Node {
+ public:
+  Timeout(Duration limit, NodePtr child) : limit_(limit), child_(std::move(child)) {}
+
+  Progress tick(Time now) override {
+    if (!started_) started_ = now;
+    Progress progress = child_->tick(now);
+    if (progress.status == Status::kRunning) {
+      if (!expired_ && now - *started_ >= limit_) {
+        expired_ = true;
+        child_->cancel(now);
+      }
+      return progress;
+    }
+    if (!expired_ || progress.status == Status::kSucceeded || progress.status == Status::kException) return progress;
+    progress.status = Status::kFailed;
+    progress.reason = fmt::format("timed out after {} s: {}", to_s(limit_), progress.reason);
+    return progress;
+  }
+  void cancel(Time now) override { child_->cancel(now); }
+  void reset() override {
+    child_->reset();
+    started_.reset();
+    expired_ = false;
+  }
+
+ private:
+  Duration limit_;
+  NodePtr child_;
+  std::optional<Time> started_;
+  bool expired_ = false;
+};
+
+class Action final : public Node {
+ public:
+  Action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer)
+      : type_(type), arguments_(std::move(arguments)), step_(step), observer_(observer) {}
+
+  Progress tick(Time now) override {
+    if (!skill_) {
+      if (cancelled_) return broken_off();
+      observer_({step_, type_.name, ++attempts_, nullptr}, now);
+      skill_ = type_.start(arguments_, now);
+      if (!skill_) return end({Status::kFailed, "the skill did not start", Json::object()}, now);
+    }
+    Progress progress = skill_->tick(now);
+    return progress.status == Status::kRunning ? progress : end(std::move(progress), now);
+  }
+  void cancel(Time now) override {
+    if (skill_ && !cancelled_) skill_->cancel(now);
+    cancelled_ = true;
+  }
+  // Attempts go on counting: a retry is the same step.
+  void reset() override {
+    skill_.reset();
+    cancelled_ = false;
+  }
+
+ private:
+  Progress end(Progress progress, Time now) {
+    observer_({step_, type_.name, attempts_, &progress}, now);
+    return progress;
+  }
+
+  const task::SkillType& type_;
+  Json arguments_;
+  std::size_t step_;
+  const Observer& observer_;
+  std::unique_ptr<task::Skill> skill_;
+  int attempts_ = 0;
+  bool cancelled_ = false;
+};
+
+}  // namespace
+
+NodePtr sequence(std::vector<NodePtr> children) {
+  return std::make_unique<Series>(std::move(children), [](Status status) { return status == Status::kSucceeded; });
+}
+
+NodePtr fallback(std::vector<NodePtr> children) {
+  return std::make_unique<Series>(std::move(children),
+                                  [](Status status) { return status == Status::kFailed || status == Status::kRetry; });
+}
+
+NodePtr retry(int attempts, NodePtr child) { return std::make_unique<Retry>(attempts, std::move(child)); }
+
+NodePtr timeout(Duration limit, NodePtr child) { return std::make_unique<Timeout>(limit, std::move(child)); }
+
+NodePtr action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer) {
+  return std::make_unique<Action>(type, std::move(arguments), step, observer);
+}
+
+NodePtr from_steps(const std::vector<task::Step>& steps, const task::SkillRegistry& skills, const Observer& observer) {
+  std::vector<NodePtr> children;
+  for (const task::Step& step : steps) {
+    const task::SkillType* type = skills.find(step.skill);
+    assert(type != nullptr);
+    children.push_back(
+        timeout(type->timeout, retry(type->attempts, action(*type, step.arguments, children.size(), observer))));
+  }
+  return sequence(std::move(children));
+}
+
+}  // namespace pons::bridge::tree

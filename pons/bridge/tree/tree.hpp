@@ -1,0 +1,65 @@
+// Behaviour trees: what a task runs as. A node is ticked until it ends; nodes are allocated when the tree is built, and
+// a tick visits each at most once per step that ends in it.
+//
+// | status     | Sequence            | Fallback            | Retry                    | Timeout |
+// |------------|---------------------|---------------------|--------------------------|---------|
+// | kRunning   | runs                | runs                | runs                     | runs; on expiry cancels its
+// child | | kSucceeded | next child, or ends | ends                | ends                     | ends    | | kRetry |
+// fails               | next child, or fails | starts the child again, or fails | passed up | | kFailed    | fails |
+// next child, or fails     | fails                    | fails   | | kException | ends                | ends | ends |
+// ends |
+//
+// Cancelling: cancel() reaches the running leaf, and the tree goes on being ticked until that has ended. Nothing new is
+// started afterwards. A leaf that nevertheless ends with kSucceeded counts as done.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pons/core/time.hpp"
+#include "pons/task/skill.hpp"
+
+namespace pons::bridge::tree {
+
+using task::Json;
+using task::Progress;
+using task::Status;
+
+class Node {
+ public:
+  virtual ~Node() = default;
+  // Not to be called again after it said something else than kRunning, until reset().
+  [[nodiscard]] virtual Progress tick(Time now) = 0;
+  // At most once between resets has an effect.
+  virtual void cancel(Time now) = 0;
+  // As newly built. Not while it runs.
+  virtual void reset() = 0;
+};
+
+using NodePtr = std::unique_ptr<Node>;
+
+// What an Action tells of one attempt.
+struct Attempt {
+  std::size_t step = 0;  // from 0
+  std::string_view skill;
+  int number = 0;                   // from 1
+  const Progress* ended = nullptr;  // nullptr when it starts
+};
+using Observer = std::function<void(const Attempt& attempt, Time now)>;
+
+[[nodiscard]] NodePtr sequence(std::vector<NodePtr> children);
+[[nodiscard]] NodePtr fallback(std::vector<NodePtr> children);
+// The child is started again on the tick after its kRetry, `attempts` times in all; then it has failed.
+[[nodiscard]] NodePtr retry(int attempts, NodePtr child);
+// From the first tick. When the child, cancelled, ends with anything but kSucceeded or kException, it has failed.
+[[nodiscard]] NodePtr timeout(Duration limit, NodePtr child);
+// `type` and `observer` must outlive the node.
+[[nodiscard]] NodePtr action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer);
+
+// A task's steps: Sequence of Timeout(Retry(Action)). Every step's skill must be in `skills`.
+[[nodiscard]] NodePtr from_steps(const std::vector<task::Step>& steps, const task::SkillRegistry& skills,
+                                 const Observer& observer);
+
+}  // namespace pons::bridge::tree

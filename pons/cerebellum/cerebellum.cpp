@@ -1,0 +1,323 @@
+#include "pons/cerebellum/cerebellum.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+namespace pons::cerebellum {
+namespace {
+
+using link::CommandKind;
+using link::SafetyState;
+using link::StopCause;
+using link::StopResult;
+
+// A burst longer than this waits for the next tick, so that a tick stays short whatever a bridge sends.
+constexpr int kCommandsPerTick = 64;
+// Armed a little outside its limits (by sagging or by hand), the arm is taken to stand on the limit.
+constexpr double kArmTolerance = 0.01;  // rad
+
+AxisState at_rest(const AxisVector& position) {
+  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
+}
+
+}  // namespace
+
+Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time start)
+    : settings_(settings),
+      tracker_(std::move(model), settings.gains),
+      limit_watch_(tracker_.robot_model().robot().limits),
+      stepped_(start),
+      fresh_at_(start),
+      heard_at_(start) {
+  const AxisVector zero = AxisVector::Zero(tracker_.robot_model().axes());
+  commanded_ = before_ = at_rest(zero);
+  measured_position_ = measured_speed_ = position_now_ = speed_now_ = zero;
+  state_.commanded = commanded_;
+  state_.position = state_.speed = state_.torque_nm = zero;
+  state_.epoch = 1;  // a command that nobody gave an epoch is an old one
+  queue_.rest(zero, start);
+}
+
+const AxisLimits& Cerebellum::limits() const { return tracker_.robot_model().robot().limits; }
+
+void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
+                      body::SetPoints& set_points) PONS_NONBLOCKING {
+  if (now <= stepped_) return;  // no time has passed: what was written stays in force
+  dt_s_ = to_s(now - stepped_);
+  ++state_.tick;
+  take_measurement(now, sensors);
+  watch(now, link);
+  take_commands(now, link);
+  advance(now);
+  judge_stop(now);
+  control(now, set_points);
+  stepped_ = now;
+  publish(link, sensors, set_points);
+}
+
+void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
+  stop_input_ = sensors.stop_input;
+  const Eigen::Index axes = commanded_.position.size();
+  const bool good = sensors.position.size() == axes && sensors.speed.size() == axes && sensors.position.allFinite() &&
+                    sensors.speed.allFinite() && (!seen_ || sensors.stamp > measured_stamp_);
+  if (good) {
+    const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(limits().speed_rad_s);
+    statistics_.measured_speed = std::max(statistics_.measured_speed, share.maxCoeff());
+    if (share.maxCoeff() > 1) ++statistics_.measured_overspeed;
+    if (seen_) {
+      const AxisVector rate = (sensors.speed - measured_speed_) / to_s(sensors.stamp - measured_stamp_);
+      statistics_.measured_acceleration = std::max(
+          statistics_.measured_acceleration, rate.cwiseAbs().cwiseQuotient(limits().acceleration_rad_s2).maxCoeff());
+    }
+    measured_position_ = sensors.position;
+    measured_speed_ = sensors.speed;
+    measured_stamp_ = sensors.stamp;
+    fresh_at_ = now;
+    seen_ = true;
+    const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
+    if (still && !is_still_) still_since_ = now;
+    is_still_ = still;
+  }
+  // The plant may step slower than this loop: carry the measurement on to now, else its age reads as an error.
+  const double age_s = to_s(std::clamp(now - measured_stamp_, Duration{0}, settings_.silence_timeout));
+  const bool carries = seen_ && powered_;
+  position_now_ = measured_position_;
+  speed_now_ = measured_speed_;
+  if (carries) {
+    position_now_ += age_s * (measured_speed_ + age_s / 2 * commanded_.acceleration);
+    speed_now_ += age_s * commanded_.acceleration;
+  }
+}
+
+bool Cerebellum::is_silent(Time now) const { return !seen_ || now - fresh_at_ >= settings_.silence_timeout; }
+
+bool Cerebellum::is_standing(Time now) const {
+  return !is_silent(now) && is_still_ && now - still_since_ >= settings_.standstill_time;
+}
+
+void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
+  word_raised_ = link.emergency_stop_raised();
+  if (word_raised_) stop(StopKind::kEmergency, StopCause::kEmergencyWord, now);
+  if (powered_ && is_silent(now)) stop(StopKind::kEmergency, StopCause::kBodySilent, now);
+  if (stop_input_) stop(StopKind::kProtective, StopCause::kStopInput, now);
+  watch_following(now);
+}
+
+void Cerebellum::watch_following(Time now) {
+  if (!powered_) {
+    strays_ = false;
+    return;
+  }
+  // commanded_ is still the last step's: compare it with where the arm was then.
+  const AxisVector then = position_now_ - dt_s_ * speed_now_;
+  const double error = (commanded_.position - then).cwiseAbs().maxCoeff();
+  statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
+  const bool strays = error > settings_.following_error_rad;
+  if (strays && !strays_) strays_since_ = now;
+  strays_ = strays;
+  if (strays && now - strays_since_ >= settings_.following_time) {
+    stop(StopKind::kProtective, StopCause::kFollowingError, now);
+  }
+}
+
+void Cerebellum::take_commands(Time now, link::CerebellumEnd& link) {
+  for (int i = 0; i < kCommandsPerTick && link.receive(command_); ++i) {
+    heard_at_ = now;
+    state_.last_sequence = std::max(state_.last_sequence, command_.sequence);
+    if (!take(command_, now)) ++state_.dropped;
+  }
+  if (state_.safety == SafetyState::kOperational && now - heard_at_ >= settings_.heartbeat_timeout) {
+    stop(StopKind::kProtective, StopCause::kHeartbeatLost, now);
+  }
+}
+
+bool Cerebellum::take(const link::Command& command, Time now) {
+  // These two are never too old: one says that somebody lives, the other asks for less.
+  if (command.kind == CommandKind::kHeartbeat) return true;
+  if (command.kind == CommandKind::kProtectiveStop) {
+    stop(StopKind::kProtective, StopCause::kCommanded, now);
+    return true;
+  }
+  if (command.epoch != state_.epoch) return false;
+  const bool operational = state_.safety == SafetyState::kOperational;
+  switch (command.kind) {
+    case CommandKind::kMotion:
+      return operational && take_motion(command, now);
+    case CommandKind::kVacuum:
+      if (operational) vacuum_on_ = command.vacuum_on;
+      return operational;
+    case CommandKind::kPayload:
+      return take_payload(command, now);
+    case CommandKind::kReset:
+      return is_standing(now) && reset();
+    case CommandKind::kArm:
+      return is_standing(now) && arm(now);
+    default:
+      return false;
+  }
+}
+
+bool Cerebellum::take_motion(const link::Command& command, Time now) {
+  if (queue_.append(command.segment, command.splice, stepped_) == Refusal::kNone) return true;
+  stop(StopKind::kProtective, StopCause::kBadCommand, now);
+  return false;
+}
+
+bool Cerebellum::take_payload(const link::Command& command, Time now) {
+  const auto& com = command.payload_com_m;
+  const bool near = std::all_of(com.begin(), com.end(), [](double x) { return std::abs(x) <= 2; });
+  if (!(command.payload_kg >= 0) || !(command.payload_kg <= settings_.max_payload_kg) || !near) {
+    stop(StopKind::kProtective, StopCause::kBadCommand, now);
+    return false;
+  }
+  tracker_.carry({command.payload_kg, com});
+  return true;
+}
+
+bool Cerebellum::reset() {
+  const bool stopped = state_.safety == SafetyState::kProtectiveStop || state_.safety == SafetyState::kEmergencyStop;
+  if (!stopped || !is_released()) return false;
+  state_.safety = SafetyState::kDisarmed;
+  state_.cause = StopCause::kNone;
+  state_.stop_result = StopResult::kNone;
+  emergency_ = false;
+  return true;
+}
+
+bool Cerebellum::arm(Time now) {
+  if (state_.safety != SafetyState::kDisarmed || !is_released()) return false;
+  const AxisVector inside = measured_position_.cwiseMax(limits().position_min).cwiseMin(limits().position_max);
+  if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance) return false;
+  if (!powered_) tracker_.reset();
+  powered_ = true;
+  commanded_ = before_ = at_rest(inside);
+  queue_.rest(inside, stepped_);
+  heard_at_ = now;
+  state_.safety = SafetyState::kOperational;
+  return true;
+}
+
+void Cerebellum::stop(StopKind kind, StopCause cause, Time now) {
+  const bool stopped = state_.safety == SafetyState::kStopping || state_.safety == SafetyState::kProtectiveStop ||
+                       state_.safety == SafetyState::kEmergencyStop;
+  const bool overtakes = kind == StopKind::kEmergency && !emergency_;
+  if (stopped && !overtakes) return;
+  ++statistics_.stops;
+  if (overtakes) {
+    emergency_ = true;
+    ++state_.epoch;
+  }
+  state_.cause = cause;
+  state_.stop_result = StopResult::kPending;
+  if (state_.safety != SafetyState::kStopping) {
+    motion::plan_stop(commanded_, limits(),
+                      std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
+    double longest = 0;
+    for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
+      longest = std::max(longest, stop_profiles_[static_cast<std::size_t>(i)].duration_s());
+    }
+    stop_began_ = stepped_;
+    stop_ends_ = std::max(now, stop_began_ + from_s(longest));
+    queue_.rest(commanded_.position, stop_ends_);
+  }
+  state_.safety = SafetyState::kStopping;
+}
+
+void Cerebellum::advance(Time now) {
+  before_ = commanded_;
+  if (!powered_) {
+    commanded_ = before_ = at_rest(seen_ ? measured_position_ : commanded_.position);
+    return;
+  }
+  if (state_.safety == SafetyState::kOperational) follow(now);
+  if (state_.safety == SafetyState::kStopping) sample_stop(now);
+  limit_watch_.record(before_, commanded_, dt_s_, statistics_);
+}
+
+void Cerebellum::follow(Time now) {
+  AxisState next = commanded_;
+  const Phase phase = queue_.sample(now, next);
+  if (phase == Phase::kEndedMoving) {
+    stop(StopKind::kProtective, StopCause::kBadCommand, now);
+  } else if (!limit_watch_.allows(commanded_, next, dt_s_)) {
+    ++statistics_.refused;
+    stop(StopKind::kProtective, StopCause::kLimit, now);
+  } else {
+    commanded_ = next;
+  }
+}
+
+void Cerebellum::sample_stop(Time now) {
+  const double t = to_s(now - stop_began_);
+  for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
+    const motion::AxisPoint point = stop_profiles_[static_cast<std::size_t>(i)].at(t);
+    commanded_.position[i] = point.position;
+    commanded_.speed[i] = point.speed;
+    commanded_.acceleration[i] = point.acceleration;
+  }
+}
+
+void Cerebellum::judge_stop(Time now) {
+  const bool at_end = state_.safety == SafetyState::kStopping && now >= stop_ends_;
+  const bool unsure = state_.stop_result == StopResult::kUncertain || state_.stop_result == StopResult::kFailed;
+  if (!at_end && !unsure) return;
+  const bool standing = is_standing(now) && (unsure || now - stop_ends_ >= settings_.standstill_time || !powered_);
+  if (standing) {
+    state_.stop_result = StopResult::kConfirmed;
+  } else if (at_end && powered_ && is_silent(now)) {
+    state_.stop_result = StopResult::kFailed;
+  } else if (at_end && now - stop_ends_ >= settings_.confirm_within) {
+    state_.stop_result = StopResult::kUncertain;
+  }
+  if (!at_end || state_.stop_result == StopResult::kPending) return;
+  state_.safety = emergency_ ? SafetyState::kEmergencyStop : SafetyState::kProtectiveStop;
+  if (emergency_) {
+    powered_ = false;
+  } else if (state_.cause == StopCause::kFollowingError) {
+    // Something holds the arm off: holding the commanded place would go on pressing.
+    commanded_ = at_rest(measured_position_);
+    tracker_.reset();
+  }
+  queue_.rest(commanded_.position, now);
+}
+
+void Cerebellum::control(Time now, body::SetPoints& set_points) {
+  set_points.power = powered_;
+  set_points.vacuum_on = vacuum_on_;
+  if (!powered_) {
+    set_points.torque_nm = AxisVector::Zero(commanded_.position.size());
+    return;
+  }
+  AxisVector& torque = set_points.torque_nm;
+  if (is_silent(now))
+    tracker_.track_blind(commanded_, torque);
+  else
+    tracker_.track(commanded_, position_now_, speed_now_, dt_s_, torque);
+  const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
+  const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
+  statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));
+  statistics_.commanded.torque = std::max(statistics_.commanded.torque, share(clamped));
+  if (clamped != torque) ++statistics_.saturated;
+  torque = clamped;
+}
+
+void Cerebellum::publish(link::CerebellumEnd& link, const body::Sensors& sensors, const body::SetPoints& set_points) {
+  state_.stamp = measured_stamp_;
+  state_.motion_end = queue_.end();
+  state_.commanded = commanded_;
+  state_.position = measured_position_;
+  state_.speed = measured_speed_;
+  state_.torque_nm = set_points.torque_nm;
+  state_.wrist_force_n = sensors.wrist_force_n;
+  state_.wrist_torque_nm = sensors.wrist_torque_nm;
+  state_.cup_vacuum_kpa = sensors.cup_vacuum_kpa;
+  state_.vacuum_on = vacuum_on_;
+  state_.belt_travel_m = sensors.belt_travel_m;
+  state_.belt_speed_m_s = sensors.belt_speed_m_s;
+  state_.photo_eye_blocked = sensors.photo_eye_blocked;
+  link.publish(state_);
+}
+
+}  // namespace pons::cerebellum

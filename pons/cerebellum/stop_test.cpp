@@ -1,0 +1,244 @@
+// Every cause stops the arm along its limits, from full motion and from rest; and only the right acts leave a stop.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "pons/cerebellum/test_bench.hpp"
+
+namespace pons::cerebellum {
+namespace {
+
+using namespace std::chrono_literals;
+using link::CommandKind;
+using link::SafetyState;
+using link::StopCause;
+using link::StopResult;
+
+AxisVector away(double by) { return bench_robot().home.array() + by; }
+
+// Some 300 ms into a fast motion of every axis.
+void get_moving(Bench& bench) {
+  bench.arm();
+  bench.move(away(0.8));
+  bench.run(300ms);
+  ASSERT_TRUE(bench.operational());
+}
+
+// The shortest possible time from this state to rest.
+double shortest_stop_s(const AxisState& state) {
+  const AxisLimits& limits = bench_robot().limits;
+  double longest = 0;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const motion::AxisBounds bounds{limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i]};
+    const motion::AxisPoint point{state.position[i], state.speed[i], state.acceleration[i]};
+    longest = std::max(longest, motion::plan_to_speed(point, 0, bounds).duration_s());
+  }
+  return longest;
+}
+
+struct StopCase {
+  const char* name;
+  StopCause cause;
+  bool emergency;
+  std::function<void(Bench&)> trigger;
+  std::function<void(Bench&)> release;
+};
+
+void nothing(Bench&) {}
+
+const StopCase kCases[] = {
+    {"Commanded", StopCause::kCommanded, false, [](Bench& b) { b.send(plain_command(CommandKind::kProtectiveStop)); },
+     nothing},
+    {"EmergencyWord", StopCause::kEmergencyWord, true, [](Bench& b) { b.link->raise_emergency_stop(); },
+     [](Bench& b) { b.link->clear_emergency_stop(); }},
+    {"StopInput", StopCause::kStopInput, false, [](Bench& b) { b.plant.sensors.stop_input = true; },
+     [](Bench& b) { b.plant.sensors.stop_input = false; }},
+    {"HeartbeatLost", StopCause::kHeartbeatLost, false, [](Bench& b) { b.mute = true; },
+     [](Bench& b) { b.mute = false; }},
+    {"FollowingError", StopCause::kFollowingError, false, [](Bench& b) { b.plant.blocked = true; },
+     [](Bench& b) { b.plant.blocked = false; }},
+    {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing},
+};
+
+class Stop : public testing::TestWithParam<StopCase> {};
+
+TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
+  Bench bench;
+  get_moving(bench);
+  GetParam().trigger(bench);
+  AxisState before = bench.state().commanded;
+  int ticks = 0;
+  while (bench.operational() && ++ticks < 250) {
+    before = bench.state().commanded;
+    bench.tick();
+  }
+  ASSERT_EQ(bench.state().safety, SafetyState::kStopping);
+  EXPECT_EQ(bench.state().cause, GetParam().cause);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kPending);
+  const Time began = bench.now - 1ms;
+  // The very tick in which it stopped decelerates, or lets go of acceleration, along the fastest axis.
+  Eigen::Index fastest = 0;
+  before.speed.cwiseAbs().maxCoeff(&fastest);
+  const double along = before.speed[fastest] > 0 ? 1 : -1;
+  EXPECT_LT(along * bench.state().commanded.acceleration[fastest], along * before.acceleration[fastest]);
+  while (bench.state().safety == SafetyState::kStopping && !is_at_rest(bench.state().commanded)) bench.tick();
+  EXPECT_LE(to_s(bench.now - began), shortest_stop_s(before) + 2e-3);
+  bench.run(600ms);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+  EXPECT_EQ(bench.state().safety, GetParam().emergency ? SafetyState::kEmergencyStop : SafetyState::kProtectiveStop);
+  EXPECT_EQ(bench.plant.set_points.power, !GetParam().emergency);
+  EXPECT_EQ(bench.state().epoch, GetParam().emergency ? 2u : 1u);
+  EXPECT_EQ(bench.cerebellum.statistics().violations, 0u);
+  EXPECT_LE(bench.cerebellum.statistics().commanded.jerk, 1 + 1e-5);
+}
+
+TEST_P(Stop, OnlyResetAndArmLeaveItAndNeitherMovesAnything) {
+  Bench bench;
+  get_moving(bench);
+  GetParam().trigger(bench);
+  bench.run(1500ms);
+  ASSERT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+  const AxisVector stood = bench.plant.sensors.position;
+  // Motion and arming are refused in a stop.
+  bench.move(away(0.3));
+  bench.send(plain_command(CommandKind::kArm));
+  bench.run(50ms);
+  EXPECT_EQ(bench.state().safety, GetParam().emergency ? SafetyState::kEmergencyStop : SafetyState::kProtectiveStop);
+  GetParam().release(bench);
+  bench.run(50ms);
+  EXPECT_NE(bench.state().safety, SafetyState::kDisarmed);
+  bench.send(plain_command(CommandKind::kReset));
+  bench.run(50ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kDisarmed);
+  EXPECT_EQ(bench.state().cause, StopCause::kNone);
+  bench.send(plain_command(CommandKind::kArm));
+  bench.run(50ms);
+  EXPECT_TRUE(bench.operational());
+  EXPECT_LT((bench.plant.sensors.position - stood).cwiseAbs().maxCoeff(), 1e-3);
+  bench.move(bench_robot().home);
+  bench.run(2s);
+  EXPECT_TRUE(bench.operational());
+  EXPECT_LT((bench.plant.sensors.position - bench_robot().home).cwiseAbs().maxCoeff(), 1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(Causes, Stop, testing::ValuesIn(kCases), [](const auto& c) { return c.param.name; });
+
+TEST(StopLatch, ResetIsRefusedWhileTheWordOrTheInputIsHeld) {
+  Bench bench;
+  bench.arm();
+  bench.link->raise_emergency_stop();
+  bench.run(200ms);
+  ASSERT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  bench.send(plain_command(CommandKind::kReset));
+  bench.run(10ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  bench.link->clear_emergency_stop();
+  bench.plant.sensors.stop_input = true;
+  bench.send(plain_command(CommandKind::kReset));
+  bench.run(10ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  bench.plant.sensors.stop_input = false;
+  bench.send(plain_command(CommandKind::kReset));
+  bench.tick();
+  EXPECT_EQ(bench.state().safety, SafetyState::kDisarmed);
+  EXPECT_FALSE(bench.plant.set_points.power);
+}
+
+TEST(StopLatch, AnEmergencyOvertakesAProtectiveStop) {
+  Bench bench;
+  get_moving(bench);
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  bench.run(20ms);
+  ASSERT_EQ(bench.state().safety, SafetyState::kStopping);
+  bench.link->raise_emergency_stop();
+  bench.tick();
+  EXPECT_EQ(bench.state().epoch, 2u);
+  bench.run(600ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().cause, StopCause::kEmergencyWord);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  EXPECT_EQ(bench.cerebellum.statistics().violations, 0u);
+}
+
+TEST(StopLatch, HoldsItsPlaceUnderAProtectiveStop) {
+  Bench bench;
+  get_moving(bench);
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  bench.run(1s);
+  const AxisVector stood = bench.plant.sensors.position;
+  bench.mute = true;  // nobody needs to live for that
+  bench.run(5s);
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+  EXPECT_LT((bench.plant.sensors.position - stood).cwiseAbs().maxCoeff(), 1e-4);
+}
+
+TEST(BodySilence, StopsBlindAndSaysFailedThenPowersOff) {
+  Bench bench;
+  get_moving(bench);
+  bench.plant.silent = true;
+  bench.run(17ms);
+  EXPECT_TRUE(bench.operational());
+  bench.run(5ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kStopping);
+  EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kFailed);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  EXPECT_EQ(bench.cerebellum.statistics().violations, 0u);
+  bench.send(plain_command(CommandKind::kReset));
+  bench.tick();
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  bench.plant.silent = false;
+  bench.run(50ms);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+}
+
+TEST(BodySilence, MeasurementsThatRepeatOrAreNotFiniteAreNone) {
+  Bench bench;
+  bench.arm();
+  bench.run(100ms);
+  bench.plant.silent = true;
+  for (int i = 0; i < 25; ++i) {
+    bench.plant.sensors.stamp = bench.now + 1ms;
+    bench.plant.sensors.position[1] = std::numeric_limits<double>::quiet_NaN();
+    bench.tick();
+    ASSERT_TRUE(bench.plant.set_points.torque_nm.allFinite());
+  }
+  EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
+}
+
+TEST(StopResultTest, IsUncertainWhenTheArmWillNotStandStill) {
+  Bench bench;
+  get_moving(bench);
+  bench.link->raise_emergency_stop();
+  // Somebody shakes it.
+  for (int i = 0; i < 1200; ++i) {
+    bench.plant.extra_torque_nm[5] = (i / 10) % 2 == 0 ? 25 : -25;
+    bench.tick();
+    if (bench.state().safety == SafetyState::kEmergencyStop) break;
+  }
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kUncertain);
+  EXPECT_FALSE(bench.plant.set_points.power);  // category 0 when standstill is not confirmed in time
+  bench.run(100ms);                            // the brakes do
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+}
+
+TEST(Heartbeat, AnyCommandCountsAndOneHundredMillisecondsAreEnough) {
+  Bench bench;
+  bench.arm();
+  bench.mute = true;
+  bench.run(99ms);
+  EXPECT_TRUE(bench.operational());
+  bench.send(plain_command(CommandKind::kVacuum));
+  bench.run(99ms);
+  EXPECT_TRUE(bench.operational());
+  bench.run(3ms);
+  EXPECT_EQ(bench.state().cause, StopCause::kHeartbeatLost);
+}
+
+}  // namespace
+}  // namespace pons::cerebellum

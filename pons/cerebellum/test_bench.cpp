@@ -1,0 +1,193 @@
+#include "pons/cerebellum/test_bench.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <regex>
+
+namespace pons::cerebellum {
+namespace {
+
+world::Robot make_robot() {
+  constexpr double kPi = std::numbers::pi;
+  world::Robot robot;
+  robot.name = "ur5e";
+  robot.urdf = "worlds/robots/ur5e/ur5e.urdf";
+  robot.flange_link = "tool0";
+  robot.world_from_base.translation() = Vector3(0, -0.30, 1.70);
+  robot.world_from_base.linear() = Eigen::AngleAxisd(kPi, Vector3::UnitX()).toRotationMatrix();
+  robot.home = AxisVector(6);
+  robot.home << kPi / 2, 0.4, -1.97, kPi / 2 + 1.57, -kPi / 2, 0;
+  robot.limits.position_min = AxisVector::Constant(6, -2 * kPi);
+  robot.limits.position_max = AxisVector::Constant(6, 2 * kPi);
+  robot.limits.speed_rad_s = AxisVector::Constant(6, 3.14);
+  robot.limits.acceleration_rad_s2 = AxisVector::Constant(6, 20);
+  robot.limits.jerk_rad_s3 = AxisVector::Constant(6, 400);
+  robot.limits.torque_nm = AxisVector(6);
+  robot.limits.torque_nm << 150, 150, 150, 28, 28, 28;
+  robot.tool.mass_kg = 0.9;
+  robot.tool.com_m = Vector3(0, 0, 0.06);
+  return robot;
+}
+
+std::string scaled(const std::string& number, double by) { return std::to_string(std::stod(number) * by); }
+
+// The URDF with every mass and inertia scaled, written where tests may write.
+std::filesystem::path scaled_urdf(const std::filesystem::path& urdf, double by) {
+  std::ifstream in(urdf);
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::regex figure(R"re((mass value|i[xyz][xyz])="([-0-9.e]+)")re");
+  std::string out;
+  auto rest = text.cbegin();
+  for (std::sregex_iterator it(text.begin(), text.end(), figure), last; it != last; ++it) {
+    out.append(rest, (*it)[0].first);
+    out += (*it)[1].str() + "=\"" + scaled((*it)[2].str(), by) + "\"";
+    rest = (*it)[0].second;
+  }
+  out.append(rest, text.cend());
+  const auto path = std::filesystem::path(testing::TempDir()) / ("scaled_" + std::to_string(by) + ".urdf");
+  std::ofstream(path) << out;
+  return path;
+}
+
+}  // namespace
+
+const world::Robot& bench_robot() {
+  static const world::Robot robot = make_robot();
+  return robot;
+}
+
+model::RobotModel bench_model(double masses) {
+  world::Robot robot = bench_robot();
+  if (masses != 1) {
+    robot.urdf = scaled_urdf(robot.urdf, masses);
+    robot.tool.mass_kg *= masses;
+  }
+  return model::RobotModel::load(robot).value();
+}
+
+Plant::Plant(const PlantSettings& settings, const AxisVector& position)
+    : extra_torque_nm(AxisVector::Zero(position.size())),
+      settings_(settings),
+      model_(bench_model(settings.masses)),
+      position_(position),
+      speed_(AxisVector::Zero(position.size())) {
+  sensors.position = position_;
+  sensors.speed = speed_;
+}
+
+void Plant::advance_to(Time time) {
+  AxisVector acceleration;
+  const double dt = to_s(settings_.step);
+  while (time_ + settings_.step <= time) {
+    time_ += settings_.step;
+    if (set_points.power && !blocked) {
+      model_.forward_dynamics(position_, speed_, set_points.torque_nm + extra_torque_nm, settings_.payload,
+                              acceleration);
+      speed_ += dt * acceleration;
+      position_ += dt * speed_;
+    } else {
+      speed_.setZero();
+    }
+    if (silent) continue;
+    sensors.stamp = time_;
+    sensors.position = position_;
+    sensors.speed = speed_;
+  }
+}
+
+Bench::Bench(const PlantSettings& plant_settings, const Settings& settings)
+    : cerebellum(bench_model(), settings, Time{}), plant(plant_settings, bench_robot().home) {}
+
+void Bench::tick() {
+  now += std::chrono::milliseconds(1);
+  plant.advance_to(now);
+  if (!mute && now.ns() % 10'000'000 == 0) send(plain_command(link::CommandKind::kHeartbeat));
+  cerebellum.step(now, plant.sensors, end, plant.set_points);
+  if (operational()) worst_error_rad = std::max(worst_error_rad, error_rad());
+}
+
+void Bench::run(Duration duration) {
+  for (const Time end_of_run = now + duration; now < end_of_run;) tick();
+}
+
+double Bench::error_rad() const {
+  const double age = to_s(now - plant.sensors.stamp);
+  const AxisVector position = plant.sensors.position + age * plant.sensors.speed;
+  return (state().commanded.position - position).cwiseAbs().maxCoeff();
+}
+
+void Bench::send(link::Command command) {
+  command.sequence = ++sequence_;
+  command.epoch = state().epoch;
+  ASSERT_TRUE(bridge.send(command));
+}
+
+void Bench::send_old(link::Command command) {
+  command.sequence = ++sequence_;
+  command.epoch = state().epoch - 1;
+  ASSERT_TRUE(bridge.send(command));
+}
+
+void Bench::move(const AxisVector& to) {
+  const AxisState rest{state().commanded.position, AxisVector::Zero(6), AxisVector::Zero(6)};
+  move(point_to_point(rest, now + std::chrono::milliseconds(20), to, bench_robot().limits));
+}
+
+void Bench::move(const std::vector<Segment>& motion) {
+  bool first = true;
+  for (const Segment& segment : motion) {
+    send(motion_command(segment, first));
+    first = false;
+  }
+}
+
+void Bench::arm() {
+  run(std::chrono::milliseconds(30));
+  send(plain_command(link::CommandKind::kArm));
+  tick();
+  ASSERT_TRUE(operational());
+}
+
+std::vector<Segment> point_to_point(const AxisState& start, Time at, const AxisVector& to, const AxisLimits& limits) {
+  const auto axes = static_cast<std::size_t>(to.size());
+  std::vector<motion::AxisProfile> profiles(axes);
+  const auto point = [&](Eigen::Index i) {
+    return motion::AxisPoint{start.position[i], start.speed[i], start.acceleration[i]};
+  };
+  const auto bounds = [&](Eigen::Index i) {
+    return motion::AxisBounds{limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i]};
+  };
+  double duration = 0;
+  for (Eigen::Index i = 0; i < to.size(); ++i) {
+    duration = std::max(duration, motion::plan_to_position(point(i), to[i], 0, bounds(i)).duration_s());
+  }
+  std::vector<double> knots{0};
+  for (Eigen::Index i = 0; i < to.size(); ++i) {
+    auto& profile = profiles[static_cast<std::size_t>(i)];
+    profile = motion::plan_in_time(point(i), to[i], 0, duration, bounds(i));
+    for (std::size_t k = 1; k <= profile.phases(); ++k) knots.push_back(profile.begin_s(k));
+  }
+  std::sort(knots.begin(), knots.end());
+  std::vector<Segment> segments;
+  for (std::size_t k = 0; k + 1 < knots.size(); ++k) {
+    Segment segment;
+    segment.start = at + from_s(knots[k]);
+    segment.duration = at + from_s(knots[k + 1]) - segment.start;
+    if (segment.duration <= std::chrono::nanoseconds(10)) continue;
+    if (!segments.empty()) segments.back().duration = segment.start - segments.back().start;
+    for (std::size_t i = 0; i < axes; ++i) {
+      const auto p = profiles[i].at(knots[k]);
+      segment.coefficients[i] = {
+          p.position, p.speed, p.acceleration / 2, profiles[i].jerk_at((knots[k] + knots[k + 1]) / 2) / 6, 0, 0};
+    }
+    segments.push_back(segment);
+  }
+  return segments;
+}
+
+}  // namespace pons::cerebellum

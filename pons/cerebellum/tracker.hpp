@@ -1,0 +1,43 @@
+// From the commanded motion and the measurement to torques: computed torque with a PID in acceleration space.
+#pragma once
+
+#include "pons/core/axes.hpp"
+#include "pons/core/realtime.hpp"
+#include "pons/model/robot_model.hpp"
+
+namespace pons::cerebellum {
+
+// Per unit of inertia, the same for every axis. The defaults put three poles at 40 rad/s: (s + 40)³.
+struct Gains {
+  double position_1_s2 = 4800;
+  double speed_1_s = 120;
+  double integral_1_s3 = 64'000;
+  double integral_max_rad_s2 = 30;  // what the integral may ask for, so that it cannot wind up against an obstacle
+};
+
+// tau = ID(q_d, v_d, a_d + Kp e + Kd ė + Ki ∫e) with the model at the commanded state (Luh, Walker, Paul 1980): without
+// a measurement the same torques minus the correction go on. Allocates nothing in track().
+class Tracker {
+ public:
+  Tracker(model::RobotModel model, const Gains& gains);
+
+  // Torques for now, not clamped. `position` and `speed` as measured, for the same moment as `commanded`.
+  void track(const AxisState& commanded, const AxisVector& position, const AxisVector& speed, double dt_s,
+             AxisVector& torque_nm) PONS_NONBLOCKING;
+  // The same without a measurement: feed-forward alone.
+  void track_blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING;
+  // Forgets the integral.
+  void reset() PONS_NONBLOCKING { integral_.setZero(); }
+  void carry(const model::Payload& payload) PONS_NONBLOCKING { payload_ = payload; }
+
+  [[nodiscard]] const model::RobotModel& robot_model() const { return model_; }
+
+ private:
+  model::RobotModel model_;
+  Gains gains_;
+  model::Payload payload_;
+  AxisVector integral_;  // rad/s²: its share of the acceleration
+  AxisVector wanted_;    // scratch
+};
+
+}  // namespace pons::cerebellum

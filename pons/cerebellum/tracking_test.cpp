@@ -1,0 +1,179 @@
+// How well the arm follows, how long a step takes, and that it allocates nothing.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+
+#include "pons/cerebellum/test_bench.hpp"
+#include "pons/core/random.hpp"
+
+namespace {
+// Counted on this thread while switched on. The other tests of this program are not affected.
+thread_local bool counting = false;
+thread_local std::uint64_t allocations = 0;
+void* counted(std::size_t size) {
+  if (counting) ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+// NOLINTBEGIN: replacing the global operators is how allocations are seen.
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+// NOLINTEND
+
+namespace pons::cerebellum {
+namespace {
+
+using namespace std::chrono_literals;
+
+AxisVector somewhere(Random& random) {
+  AxisVector q = bench_robot().home;
+  for (auto& angle : q) angle += random.uniform(-1.2, 1.2);
+  return q;
+}
+
+// Ten moves at full limits; returns the worst following error.
+double follow_moves(Bench& bench) {
+  bench.arm();
+  Random random(5);
+  for (int i = 0; i < 10; ++i) {
+    bench.move(somewhere(random));
+    bench.run(1700ms);
+    EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
+    EXPECT_TRUE(bench.state().motion_end < bench.now);
+  }
+  return bench.worst_error_rad;
+}
+
+struct PlantCase {
+  const char* name;
+  PlantSettings plant;
+  double most_rad;
+};
+
+class Tracking : public testing::TestWithParam<PlantCase> {};
+
+TEST_P(Tracking, StaysWithinAMilliradian) {
+  Bench bench(GetParam().plant);
+  const double worst = follow_moves(bench);
+  const Statistics& statistics = bench.cerebellum.statistics();
+  std::printf(
+      "%s: worst error %.3f mrad; commanded speed %.4f, acceleration %.4f, jerk %.4f, torque %.2f of the limits\n",
+      GetParam().name, 1e3 * worst, statistics.commanded.speed, statistics.commanded.acceleration,
+      statistics.commanded.jerk, statistics.asked_torque);
+  EXPECT_LT(worst, GetParam().most_rad);
+  EXPECT_EQ(statistics.violations, 0u);
+  EXPECT_LE(statistics.commanded.speed, 1 + 1e-6);
+  EXPECT_LE(statistics.commanded.acceleration, 1 + 1e-6);
+  EXPECT_LE(statistics.commanded.jerk, 1 + 1e-5);
+  EXPECT_GT(statistics.commanded.jerk, 0.99);
+}
+
+INSTANTIATE_TEST_SUITE_P(Plants, Tracking,
+                         testing::Values(PlantCase{"exact masses, 1 ms", {.step = 1ms}, 1e-3},
+                                         PlantCase{"exact masses, 2 ms", {.step = 2ms}, 1e-3},
+                                         PlantCase{"masses 5 % heavier, 1 ms", {.step = 1ms, .masses = 1.05}, 1e-3},
+                                         PlantCase{"masses 5 % heavier, 2 ms", {.step = 2ms, .masses = 1.05}, 1e-3},
+                                         PlantCase{"masses 5 % lighter, 2 ms", {.step = 2ms, .masses = 0.95}, 1e-3}),
+                         [](const auto& c) { return "Case" + std::to_string(c.index); });
+
+// One fast move of every axis with `carried` on the flange; the worst error.
+double move_with(const model::Payload& carried, const model::Payload& told) {
+  Bench bench({.payload = carried});
+  link::Command command = plain_command(link::CommandKind::kPayload);
+  command.payload_kg = told.mass_kg;
+  command.payload_com_m = told.com_m;
+  bench.send(command);
+  bench.arm();
+  bench.move(AxisVector(bench_robot().home.array() - 0.7));
+  bench.run(1500ms);
+  EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
+  return bench.worst_error_rad;
+}
+
+TEST(Payload, IsCarriedToTheMilliradianWhenItWasTold) {
+  const model::Payload payload{.mass_kg = 1.5, .com_m = {0.01, 0, 0.2}};
+  const double told = move_with(payload, payload), untold = move_with(payload, {});
+  std::printf("payload of 1.5 kg: worst error %.2f mrad when told, %.2f mrad when not\n", 1e3 * told, 1e3 * untold);
+  EXPECT_LT(told, 1e-3);
+  EXPECT_LT(untold, 0.05);
+}
+
+TEST(Step, AllocatesNothingFromStartToEmergencyStop) {
+  Bench bench;
+  bench.plant.advance_to(bench.now);
+  const auto counted_step = [&] {
+    bench.now += 1ms;
+    bench.plant.advance_to(bench.now);
+    if (bench.now.ns() % 10'000'000 == 0) bench.send(plain_command(link::CommandKind::kHeartbeat));
+    counting = true;
+    bench.cerebellum.step(bench.now, bench.plant.sensors, bench.end, bench.plant.set_points);
+    counting = false;
+  };
+  allocations = 0;
+  for (int i = 0; i < 50; ++i) counted_step();
+  bench.send(plain_command(link::CommandKind::kArm));
+  AxisVector to = bench_robot().home;
+  to.array() += 0.8;
+  counted_step();
+  bench.move(to);
+  for (int i = 0; i < 300; ++i) counted_step();
+  bench.send(plain_command(link::CommandKind::kProtectiveStop));  // in full motion
+  for (int i = 0; i < 500; ++i) counted_step();
+  EXPECT_EQ(bench.state().safety, link::SafetyState::kProtectiveStop);
+  bench.send(plain_command(link::CommandKind::kReset));
+  bench.send(plain_command(link::CommandKind::kArm));
+  counted_step();
+  EXPECT_TRUE(bench.operational());
+  bench.move(bench_robot().home);
+  for (int i = 0; i < 200; ++i) counted_step();
+  bench.link->raise_emergency_stop();
+  for (int i = 0; i < 500; ++i) counted_step();
+  EXPECT_EQ(bench.state().safety, link::SafetyState::kEmergencyStop);
+  EXPECT_EQ(allocations, 0u);
+  // The counter counts.
+  counting = true;
+  delete new int(1);
+  counting = false;
+  EXPECT_GE(allocations, 1u);
+}
+
+TEST(Step, TakesMicroseconds) {
+  Bench bench;
+  bench.arm();
+  AxisVector to = bench_robot().home;
+  std::vector<double> microseconds;
+  for (int i = 0; i < 6; ++i) {
+    to.array() += i % 2 == 0 ? 1.0 : -1.0;
+    bench.move(to);
+    for (int tick = 0; tick < 1200; ++tick) {
+      bench.now += 1ms;
+      bench.plant.advance_to(bench.now);
+      bench.send(plain_command(link::CommandKind::kHeartbeat));
+      const auto begin = std::chrono::steady_clock::now();
+      bench.cerebellum.step(bench.now, bench.plant.sensors, bench.end, bench.plant.set_points);
+      const auto end = std::chrono::steady_clock::now();
+      microseconds.push_back(1e-3 * static_cast<double>((end - begin).count()));
+    }
+  }
+  std::sort(microseconds.begin(), microseconds.end());
+  const auto at = [&](double share) {
+    return microseconds[static_cast<std::size_t>(share * static_cast<double>(microseconds.size() - 1))];
+  };
+  std::printf("step: median %.2f us, 99 %% %.2f us, worst %.2f us\n", at(0.5), at(0.99), at(1));
+#ifdef NDEBUG
+  EXPECT_LT(at(0.5), 20);
+#endif
+}
+
+}  // namespace
+}  // namespace pons::cerebellum

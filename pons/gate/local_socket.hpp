@@ -1,0 +1,60 @@
+// A Unix-domain socket for people and programs on this machine: one JSON value a line, one line back for each.
+//
+// Only the owner of the process may connect (mode 0600). A thread of its own accepts, reads and writes; it touches
+// nothing but its buffers. The runner fetches what came with poll() and answers when it likes.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "pons/core/error.hpp"
+
+namespace pons::gate {
+
+using Json = nlohmann::json;
+
+// One line from a client, as it came (not parsed, not trusted). reply() may be called once, from any thread, also after
+// the client or the socket has gone; the client's next line is read after it.
+struct Request {
+  std::string text;
+  std::function<void(const Json&)> reply;
+};
+
+struct SocketLimits {
+  std::size_t line_bytes = 64 * 1024;          // a longer line: an error line back, and the end of the connection
+  std::size_t clients = 32;                    // one more is told so and closed
+  std::size_t reply_bytes = 16 * 1024 * 1024;  // waiting for one client; more ends the connection
+  std::chrono::milliseconds patience{10'000};  // for half a line, and for a client to read what waits for it
+};
+
+class LocalSocket {
+ public:
+  // A socket file that nobody listens on is replaced; any other file at `path` is left and refused.
+  // Errors: path too long, directory missing, in use, not a socket, not permitted.
+  [[nodiscard]] static Expected<std::unique_ptr<LocalSocket>> listen(const std::filesystem::path& path,
+                                                                     SocketLimits limits = {});
+  // Ends the thread, closes every connection, removes the file.
+  ~LocalSocket();
+  LocalSocket(const LocalSocket&) = delete;
+  LocalSocket& operator=(const LocalSocket&) = delete;
+
+  // What came since the last call, in the order of arrival; does not wait. At most one a client.
+  [[nodiscard]] std::vector<Request> poll();
+
+ private:
+  struct Server;
+  explicit LocalSocket(std::unique_ptr<Server> server);
+  std::unique_ptr<Server> server_;
+};
+
+// Sends one request and waits for its answer. Errors: nobody listens, no answer in time, an answer that is not JSON.
+[[nodiscard]] Expected<Json> ask(const std::filesystem::path& path, const Json& request,
+                                 std::chrono::milliseconds patience = std::chrono::seconds(10));
+
+}  // namespace pons::gate

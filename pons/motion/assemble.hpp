@@ -1,0 +1,39 @@
+// Inside motion: what move, move_through and stop share.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "pons/motion/axis_piece.hpp"
+#include "pons/motion/motion.hpp"
+
+namespace pons::motion {
+
+// Less than the limits by what rounding switching times to nanoseconds may add, so that the result holds the limits.
+[[nodiscard]] AxisBounds inner_bounds(const AxisLimits& limits, Eigen::Index axis);
+
+// Errors: vectors of different lengths, not finite, limits not positive, start or end outside the limits.
+[[nodiscard]] Expected<void> check_limits(const AxisLimits& limits, Eigen::Index axes);
+[[nodiscard]] Expected<void> check_start(const AxisState& start, const AxisLimits& limits);
+[[nodiscard]] Expected<void> check_waypoint(const Waypoint& waypoint, const char* name, const AxisLimits& limits);
+
+// One piece of a motion, all axes in one duration.
+struct Piece {
+  std::array<AxisPiece, kMaxAxes> axes;
+  std::size_t count = 0;
+};
+
+// The shortest common duration in whole nanoseconds, as seconds; infinite if there is none.
+[[nodiscard]] double common_duration_s(const Piece& piece);
+
+// All axes in `duration_s`. Error: an axis leaves its position limits on the way.
+[[nodiscard]] Expected<void> plan(const Piece& piece, double duration_s, const AxisLimits& limits,
+                                  std::span<AxisProfile> profiles);
+
+// Appends the profiles as segments from `at` on, for `duration`.
+void append(std::span<const AxisProfile> profiles, Time at, Duration duration, Trajectory& trajectory);
+
+// Up to whole nanoseconds.
+[[nodiscard]] Duration ceil_ns(double seconds);
+
+}  // namespace pons::motion

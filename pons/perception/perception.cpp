@@ -1,0 +1,100 @@
+#include "pons/perception/perception.hpp"
+
+#include <algorithm>
+#include <map>
+#include <opencv2/core/utility.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "pons/perception/label_reader.hpp"
+#include "pons/perception/segmentation.hpp"
+#include "pons/perception/self_filter.hpp"
+#include "pons/perception/top_face.hpp"
+#include "pons/perception/top_view.hpp"
+#include "pons/perception/tracker.hpp"
+#include "pons/perception/tray_watch.hpp"
+
+namespace pons::perception {
+
+struct Perception::Impl {
+  const world::World& world;
+  SelfFilter self_filter;
+  Segmenter segmenter;
+  LabelReader label_reader;
+  Tracker tracker;
+  std::map<std::string, TopViewer, std::less<>> viewers;    // by camera
+  std::map<std::string, TrayWatch, std::less<>> watches;    // by place
+
+  Impl(const world::World& the_world, model::RobotModel model)
+      : world(the_world), self_filter(std::move(model)), tracker(the_world.belt) {
+    for (const auto& camera : world.cameras) {
+      const world::Place* const place = world.place(camera.watches);
+      if (place != nullptr) watches.try_emplace(place->name, *place);
+    }
+  }
+
+  void see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment);
+  void read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
+                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks);
+};
+
+void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment) {
+  auto viewer = viewers.find(frame.camera);
+  if (viewer == viewers.end() || !viewer->second.fits(frame)) {
+    viewer = viewers.insert_or_assign(frame.camera, TopViewer(frame, world.belt)).first;
+  }
+  const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
+  const TopView& view = viewer->second.build(frame, robot);
+  const Segments& segments = segmenter.segment(view);
+  const std::vector<Sighting> sightings = measure(view, segments);
+  const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
+  if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks);
+}
+
+void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
+                                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks) {
+  std::vector<std::size_t> wanted;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    if (tracks[i] == 0) continue;
+    if (sightings[i].complete && !sightings[i].covered) tracker.label_attempt(tracks[i]);
+    if (tracker.wants_label(tracks[i])) wanted.push_back(i);
+  }
+  for (const LabelRead& read : label_reader.read(frame, view, segmenter.texture(), segments, sightings, wanted)) {
+    tracker.label_read(tracks[read.sighting], read.code);
+  }
+}
+
+Perception::Perception(const world::World& world, model::RobotModel model) {
+  // One thread is what the caller was promised; the library would start its own.
+  cv::setNumThreads(1);
+  impl_ = std::make_unique<Impl>(world, std::move(model));
+}
+
+Perception::~Perception() = default;
+
+void Perception::process(const RgbdFrame& frame, const Moment& moment) {
+  const auto camera = std::ranges::find(impl_->world.cameras, frame.camera, &world::CameraSpec::name);
+  if (camera == impl_->world.cameras.end()) return;
+  if (camera->watches == "belt") {
+    impl_->see_belt(*camera, frame, moment);
+    return;
+  }
+  const auto watch = impl_->watches.find(camera->watches);
+  if (watch == impl_->watches.end()) return;
+  const Sampling sampling(frame.intrinsics);
+  watch->second.process(frame, sampling, impl_->self_filter.mask(frame, sampling, moment.joint_position));
+}
+
+std::vector<ObjectBelief> Perception::beliefs(Time now, double belt_travel_m) const {
+  return impl_->tracker.beliefs(now, belt_travel_m);
+}
+
+void Perception::forget(std::uint32_t track) { impl_->tracker.forget(track); }
+
+int Perception::occupancy(std::string_view place) const {
+  const auto watch = impl_->watches.find(place);
+  return watch == impl_->watches.end() ? 0 : watch->second.occupancy();
+}
+
+}  // namespace pons::perception

@@ -1,0 +1,55 @@
+// Which cells of a top view belong to one object.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "pons/perception/splitter.hpp"
+#include "pons/perception/top_view.hpp"
+
+namespace pons::perception {
+
+// Shares are of the outline's cells.
+struct Region {
+  int label = 0;                  // in Segments::labels
+  std::vector<cv::Point> cells;   // all, row by row
+  std::vector<cv::Point> core;    // those away from steps in height
+  double hidden_share = 0;        // towards the camera nothing was seen: something nearer hides the rest
+  double below_share = 0;         // adjoins something higher
+  bool crowded = false;           // another object within about 8 mm
+  bool near_robot = false;        // beside or under the robot, or in its hand
+  bool at_border = false;         // cut by the picture or the belt's limits
+  std::vector<int> higher;        // labels of the higher neighbours, ascending
+};
+
+struct Segments {
+  cv::Mat1i labels;  // 0: no object
+  std::vector<Region> regions;  // regions[i].label == i + 1
+};
+
+class Segmenter {
+ public:
+  // The result is good until the next call.
+  const Segments& segment(const TopView& view);
+  // Cells with fine print (a label's modules), of the last call.
+  [[nodiscard]] const cv::Mat1b& texture() const { return splitter_.texture(); }
+
+ private:
+  void find_cores(const TopView& view);
+  void grow(const TopView& view);
+  void collect();
+  void split(const TopView& view);
+  void describe(const TopView& view, Region& region) const;
+  void cut(std::size_t region, const Line& line);
+  void drop_small(const TopView& view);
+
+  Splitter splitter_;
+  cv::Mat1b foreground_, flat_;
+  cv::Mat1w high_, low_;
+  std::vector<cv::Point> front_;
+  cv::Mat1b in_core_;
+  Segments segments_;
+};
+
+}  // namespace pons::perception

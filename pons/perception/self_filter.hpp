@@ -1,0 +1,45 @@
+// Which pixels see the robot itself, from its own capsules at the joint positions of the shutter's moment.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "pons/core/image.hpp"
+#include "pons/model/robot_model.hpp"
+
+namespace pons::perception {
+
+// A picture read every `step` pixels: sample (row, column) is pixel (row · step, column · step).
+struct Sampling {
+  int step = 1;
+  int width = 0, height = 0;              // samples
+  double fx = 0, fy = 0, cx = 0, cy = 0;  // of the sampled picture
+
+  explicit Sampling(const Intrinsics& full, int wanted_width = 800);
+  [[nodiscard]] float depth(const RgbdFrame& frame, int row, int column) const {
+    return frame.depth_m[static_cast<std::size_t>(row * step) * static_cast<std::size_t>(frame.intrinsics.width) +
+                         static_cast<std::size_t>(column * step)];
+  }
+};
+
+class SelfFilter {
+ public:
+  static constexpr std::uint8_t kRobot = 255;  // sees the robot
+  static constexpr std::uint8_t kNear = 128;   // within about 1.5 cm of such a pixel
+
+  // How far beyond its capsules the robot may reach: fingers of hoses, calibration, the bellows' play.
+  explicit SelfFilter(model::RobotModel model, double margin_m = 0.025);
+
+  // Good until the next call. One value a sample.
+  const cv::Mat1b& mask(const RgbdFrame& frame, const Sampling& sampling, const AxisVector& joint_position);
+
+ private:
+  void paint(const RgbdFrame& frame, const Sampling& sampling, const model::PlacedCapsule& capsule);
+
+  model::RobotModel model_;
+  double margin_m_;
+  std::vector<model::PlacedCapsule> capsules_;
+  cv::Mat1b robot_, mask_;
+};
+
+}  // namespace pons::perception

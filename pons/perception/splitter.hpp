@@ -1,0 +1,52 @@
+// Where to cut a patch of equal height that is more than one object. Two convex things that do not overlap can always be
+// told apart by a straight line, so lines are all it looks for.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "pons/perception/top_view.hpp"
+
+namespace pons::perception {
+
+// In cells: the points with normal · p > offset lie beyond it.
+struct Line {
+  cv::Point2d normal;
+  double offset = 0;
+  [[nodiscard]] bool beyond(cv::Point2d point) const { return normal.dot(point) > offset; }
+};
+
+class Splitter {
+ public:
+  // Call once a view: marks fine print, whose colours say nothing about the object's own.
+  void prepare(const TopView& view);
+  [[nodiscard]] const cv::Mat1b& texture() const { return texture_; }
+
+  // A line between two plain colours with a sharp edge. Maximises the variance between both sides (Otsu 1979).
+  [[nodiscard]] std::optional<Line> by_colour(const TopView& view, const std::vector<cv::Point>& cells);
+  // A line through an inward corner of the outline that leaves two better rectangles and cuts no print; the shortest of
+  // nearly equal ones.
+  [[nodiscard]] std::optional<Line> by_outline(const std::vector<cv::Point>& cells) const;
+
+ private:
+  struct Sample {
+    cv::Point2f at;
+    cv::Vec3f colour;
+  };
+  struct Cut {
+    double angle_rad = 0, offset = 0;
+    double explained = 0;  // share of the colour's variance
+    double contrast = 0;   // distance between the two sides' means
+  };
+  [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance) const;
+  [[nodiscard]] bool sharp(const Cut& cut) const;
+
+  cv::Mat1b texture_, grey_, brightest_, darkest_;
+  std::vector<Sample> samples_;
+};
+
+// The share of its smallest enclosing rectangle that a set of cells fills.
+[[nodiscard]] double rectangle_fill(const std::vector<cv::Point>& cells);
+
+}  // namespace pons::perception

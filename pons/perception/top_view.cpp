@@ -1,0 +1,174 @@
+#include "pons/perception/top_view.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace pons::perception {
+namespace {
+
+constexpr double kOverhang_m = 0.06;      // how far a parcel may stick out over the belt's sides and still be measured whole
+constexpr double kTallest_m = 0.6;        // above the belt; what is higher does not lie on it
+constexpr double kFinestCell_m = 0.002;
+constexpr int kSameSurface = 80;          // 8 mm: readings of one cell that far below its highest are of what lies behind
+constexpr std::size_t kSurrounded = 5;    // of 8 neighbours: along the edge of hidden belt there are 3
+constexpr int kBorder = 2;                // samples
+
+}  // namespace
+
+TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling_(frame.intrinsics), belt_(belt) {
+  const Pose& pose = frame.world_from_optical;
+  const Pose optical_from_world = pose.inverse();
+  double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
+  for (const double x : {belt.x_start_m, belt.x_end_m}) {
+    for (const double side : {-0.5, 0.5}) {
+      for (const double z : {0.0, kTallest_m}) {
+        const double y = belt.y_center_m + side * (belt.width_m + 2 * kOverhang_m);
+        const Vector3 point = optical_from_world * Vector3(x, y, belt.surface_z_m + z);
+        const double depth = std::max(0.05, point.z());
+        const double u = sampling_.cx + sampling_.fx * point.x() / depth, v = sampling_.cy + sampling_.fy * point.y() / depth;
+        left = std::min(left, u), right = std::max(right, u), top = std::min(top, v), bottom = std::max(bottom, v);
+      }
+    }
+  }
+  const auto within = [](double value, int count) { return static_cast<int>(std::clamp(value, 0.0, double(count))); };
+  window_.x = within(left, sampling_.width);
+  window_.y = within(top, sampling_.height);
+  window_.width = within(right + 1, sampling_.width) - window_.x;
+  window_.height = within(bottom + 1, sampling_.height) - window_.y;
+
+  const Eigen::Matrix3d rotation = pose.linear();
+  rays_.reserve(static_cast<std::size_t>(window_.area()));
+  double x_min = 1e9, x_max = -1e9;
+  for (int row = window_.y; row < window_.br().y; ++row) {
+    for (int column = window_.x; column < window_.br().x; ++column) {
+      const Vector3 ray =
+          rotation * Vector3((column - sampling_.cx) / sampling_.fx, (row - sampling_.cy) / sampling_.fy, 1.0);
+      rays_.push_back(ray.cast<float>());
+      if (ray.z() > -0.05) continue;  // at or above the horizon
+      const double x = pose.translation().x() + ray.x() * (belt.surface_z_m - pose.translation().z()) / ray.z();
+      x_min = std::min(x_min, x), x_max = std::max(x_max, x);
+    }
+  }
+  const double distance_m = std::abs(pose.translation().z() - belt.surface_z_m);
+  view_.cell_m = std::max(kFinestCell_m, 1.25 * distance_m / std::min(sampling_.fx, sampling_.fy));
+  view_.x0_m = std::max(belt.x_start_m, x_min);
+  view_.y0_m = belt.y_center_m - 0.5 * belt.width_m - kOverhang_m;
+  view_.surface_z_m = belt.surface_z_m;
+  view_.camera_m = pose.translation();
+  const int columns = std::max(8, static_cast<int>((std::min(belt.x_end_m, x_max) - view_.x0_m) / view_.cell_m));
+  const int rows = std::max(8, static_cast<int>((belt.width_m + 2 * kOverhang_m) / view_.cell_m));
+  for (cv::Mat1w* map : {&highest_, &raw_}) map->create(rows, columns);
+  sum_.create(rows, columns), count_.create(rows, columns);
+  view_.colour.create(rows, columns), view_.flags.create(rows, columns);
+  cell_of_.resize(rays_.size()), height_of_.resize(rays_.size());
+}
+
+bool TopViewer::fits(const RgbdFrame& frame) const {
+  const Sampling other(frame.intrinsics);
+  return other.width == sampling_.width && other.height == sampling_.height && other.fx == sampling_.fx &&
+         other.fy == sampling_.fy && other.cx == sampling_.cx && other.cy == sampling_.cy && other.step == sampling_.step &&
+         (frame.world_from_optical.translation() - view_.camera_m).norm() < 1e-9;
+}
+
+void TopViewer::project(const RgbdFrame& frame) {
+  const auto inverse_cell = static_cast<float>(1 / view_.cell_m);
+  const auto from_x = static_cast<float>(view_.camera_m.x() - view_.x0_m);
+  const auto from_y = static_cast<float>(view_.camera_m.y() - view_.y0_m);
+  const auto from_z = static_cast<float>(view_.camera_m.z() - view_.surface_z_m);
+  const float limit_x = static_cast<float>(highest_.cols), limit_y = static_cast<float>(highest_.rows);
+  std::size_t i = 0;
+  for (int row = window_.y; row < window_.br().y; ++row) {
+    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
+      const float depth = sampling_.depth(frame, row, column);
+      const Eigen::Vector3f& ray = rays_[i];
+      const float x = (from_x + depth * ray.x()) * inverse_cell, y = (from_y + depth * ray.y()) * inverse_cell;
+      const float z = from_z + depth * ray.z();
+      const bool inside = depth > 0 && x >= 0 && y >= 0 && x < limit_x && y < limit_y && z > -0.4F && z < 3.0F;
+      cell_of_[i] = inside ? static_cast<int>(y) * highest_.cols + static_cast<int>(x) : -1;
+      height_of_[i] = inside ? static_cast<std::uint16_t>(static_cast<float>(TopView::kLevel) + z * 1e4F + 0.5F)
+                             : TopView::kUnknown;
+    }
+  }
+}
+
+void TopViewer::accumulate(const RgbdFrame& frame, const cv::Mat1b& robot) {
+  highest_.setTo(0), sum_.setTo(0), count_.setTo(0);
+  view_.flags.setTo(0);
+  auto* const highest = highest_.ptr<std::uint16_t>();
+  auto* const sum = sum_.ptr<int>();
+  auto* const count = count_.ptr<int>();
+  auto* const colour = view_.colour.ptr<cv::Vec3b>();
+  auto* const flags = view_.flags.ptr<std::uint8_t>();
+  std::size_t i = 0;
+  for (int row = window_.y; row < window_.br().y; ++row) {
+    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
+    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
+      if (cell_of_[i] < 0) continue;
+      if (seen[column] == SelfFilter::kRobot) {
+        cell_of_[i] = -1;
+        continue;
+      }
+      highest[cell_of_[i]] = std::max(highest[cell_of_[i]], height_of_[i]);
+    }
+  }
+  i = 0;
+  const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
+  for (int row = window_.y; row < window_.br().y; ++row) {
+    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
+    const bool border_row = row < kBorder || row >= sampling_.height - kBorder;
+    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
+      const int cell = cell_of_[i];
+      if (cell < 0 || height_of_[i] + kSameSurface < highest[cell]) continue;
+      sum[cell] += height_of_[i];
+      ++count[cell];
+      const std::size_t pixel = 3 * (static_cast<std::size_t>(row * sampling_.step) * stride +
+                                     static_cast<std::size_t>(column * sampling_.step));
+      colour[cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
+      if (seen[column] == SelfFilter::kNear) flags[cell] |= TopView::kNearRobot;
+      if (border_row || column < kBorder || column >= sampling_.width - kBorder) flags[cell] |= TopView::kAtBorder;
+    }
+  }
+}
+
+// Lost readings leave single empty cells; hidden belt leaves wide ones, which must stay unknown.
+void TopViewer::fill_pinholes() {
+  auto* const raw = raw_.ptr<std::uint16_t>();
+  const auto* const sum = sum_.ptr<int>();
+  const auto* const count = count_.ptr<int>();
+  const int total = raw_.rows * raw_.cols;
+  for (int i = 0; i < total; ++i) raw[i] = static_cast<std::uint16_t>(count[i] > 1 ? sum[i] / count[i] : sum[i]);
+  raw_.copyTo(highest_);
+  auto* const colour = view_.colour.ptr<cv::Vec3b>();
+  const int stride = raw_.cols;
+  for (int row = 1; row + 1 < raw_.rows; ++row) {
+    for (int column = 1; column + 1 < stride; ++column) {
+      const int i = row * stride + column;
+      if (count[i] > 0) continue;
+      colour[i] = {0, 0, 0};
+      if (count[i - 1] + count[i + 1] == 0) continue;
+      std::array<int, 8> around{};
+      std::size_t known = 0;
+      for (const int j : {i - stride - 1, i - stride, i - stride + 1, i - 1, i + 1, i + stride - 1, i + stride, i + stride + 1}) {
+        if (count[j] == 0) continue;
+        std::size_t place = known++;
+        for (; place > 0 && raw[around[place - 1]] > raw[j]; --place) around[place] = around[place - 1];
+        around[place] = j;
+      }
+      if (known < kSurrounded) continue;
+      highest_.ptr<std::uint16_t>()[i] = raw[around[known / 2]];
+      colour[i] = colour[around[known / 2]];
+    }
+  }
+}
+
+const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) {
+  project(frame);
+  accumulate(frame, robot);
+  fill_pinholes();
+  cv::medianBlur(highest_, view_.height, 5);
+  return view_;
+}
+
+}  // namespace pons::perception

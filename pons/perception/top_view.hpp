@@ -1,0 +1,73 @@
+// A depth picture turned into a map seen from straight above: metric, without perspective, the same for any camera pose.
+// Hidden belt stays unknown instead of being guessed, so an object's outline can be told from the edge of what was seen.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "pons/core/image.hpp"
+#include "pons/perception/self_filter.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::perception {
+
+// Columns run along world +x, rows along world +y. Cell (row, column) covers cell_m × cell_m from its lower corner.
+struct TopView {
+  static constexpr std::uint16_t kUnknown = 0;  // in `height`: nothing was seen there
+  static constexpr int kLevel = 5000;           // in `height`: the belt's surface; one step is 0.1 mm
+  static constexpr std::uint8_t kNearRobot = 1;   // in `flags`: seen beside the robot, so perhaps hidden by it in part
+  static constexpr std::uint8_t kAtBorder = 2;    // seen at the picture's border or the belt's limits, so perhaps cut
+
+  double cell_m = 0;
+  double x0_m = 0, y0_m = 0;   // world, lower corner of cell (0, 0)
+  double surface_z_m = 0;      // world
+  Vector3 camera_m = Vector3::Zero();  // world
+  cv::Mat1w height;            // median filtered
+  cv::Mat3b colour;            // red, green, blue
+  cv::Mat1b flags;
+
+  [[nodiscard]] static double metres(std::uint16_t height) { return 1e-4 * (height - kLevel); }
+  [[nodiscard]] static std::uint16_t steps(double height_m) {
+    return static_cast<std::uint16_t>(kLevel + static_cast<int>(height_m * 1e4));
+  }
+  // The middle of a cell, world (m).
+  [[nodiscard]] Eigen::Vector2d xy(cv::Point cell) const {
+    return {x0_m + (cell.x + 0.5) * cell_m, y0_m + (cell.y + 0.5) * cell_m};
+  }
+  [[nodiscard]] cv::Point cell(double x_m, double y_m) const {
+    return {cvFloor((x_m - x0_m) / cell_m), cvFloor((y_m - y0_m) / cell_m)};
+  }
+  [[nodiscard]] bool contains(cv::Point cell) const {
+    return cell.x >= 0 && cell.y >= 0 && cell.x < height.cols && cell.y < height.rows;
+  }
+};
+
+// Makes the maps of one camera and keeps what depends on its geometry only.
+class TopViewer {
+ public:
+  // `frame` is any frame of the camera: intrinsics and pose must stay.
+  TopViewer(const RgbdFrame& frame, const world::Belt& belt);
+
+  // The picture as this class samples it: every so many pixels, about 800 a row.
+  [[nodiscard]] const Sampling& sampling() const { return sampling_; }
+  [[nodiscard]] bool fits(const RgbdFrame& frame) const;
+  // `robot` as SelfFilter::mask gives it. The result is good until the next call.
+  const TopView& build(const RgbdFrame& frame, const cv::Mat1b& robot);
+
+ private:
+  void project(const RgbdFrame& frame);
+  void accumulate(const RgbdFrame& frame, const cv::Mat1b& robot);
+  void fill_pinholes();
+
+  Sampling sampling_;
+  world::Belt belt_;
+  cv::Rect window_;              // of the sampled picture: what can see the belt
+  std::vector<Eigen::Vector3f> rays_;  // world direction of each sample in the window, optical z = 1
+  std::vector<int> cell_of_;     // −1: nothing there
+  std::vector<std::uint16_t> height_of_;
+  cv::Mat1w highest_, raw_;
+  cv::Mat1i sum_, count_;
+  TopView view_;
+};
+
+}  // namespace pons::perception

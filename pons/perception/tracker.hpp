@@ -1,0 +1,91 @@
+// Sightings of many frames become objects that stay themselves while the belt carries them.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/perception/segmentation.hpp"
+#include "pons/perception/top_face.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::perception {
+
+// Positions are kept relative to the belt (x minus its travel), where a parcel stands still unless something moves it.
+class Tracker {
+ public:
+  explicit Tracker(const world::Belt& belt);
+
+  // Takes in one frame's sightings; says which track each became, 0 for none. Frames in the order of their stamps.
+  std::vector<std::uint32_t> update(const TopView& view, const Segments& segments, const std::vector<Sighting>& sightings,
+                                    Time stamp, double belt_travel_m);
+
+  // A frame good enough to read this one's label.
+  void label_attempt(std::uint32_t track);
+  // A code was read on it. The first sticks; another one replaces it when read twice. No two tracks keep one code.
+  void label_read(std::uint32_t track, std::string_view code);
+  // False once its code has been read twice.
+  [[nodiscard]] bool wants_label(std::uint32_t track) const;
+
+  void forget(std::uint32_t track);
+  [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
+
+ private:
+  struct Observation {
+    Time stamp;
+    double x_m = 0, y_m = 0, z_m = 0;  // relative to the belt along x
+    double yaw_rad = 0;
+    Vector3 size_m = Vector3::Zero();
+    double flatness_m = 0;
+    bool doubtful = false;  // partly hidden or covered
+  };
+  struct Estimate {
+    Eigen::Vector2d position = Eigen::Vector2d::Zero();  // at `stamp`, relative to the belt
+    Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  // likewise
+    Time stamp;
+    double z_m = 0, yaw_rad = 0, flatness_m = 0;
+    Vector3 size_m = Vector3::Zero();
+    [[nodiscard]] Eigen::Vector2d at(Time time) const { return position + velocity * to_s(time - stamp); }
+  };
+  struct Track {
+    std::uint32_t id = 0;
+    std::deque<Observation> observations;  // since it was last disturbed, oldest first
+    Estimate estimate;
+    Sighting last;            // the last one that counted
+    int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0;
+    Time last_seen;
+    bool crowded = false;
+    std::string code, other_code;
+    int reads = 0, other_reads = 0, label_attempts = 0;
+    bool forgotten = false;   // only kept to swallow frames from before it was taken
+    Time forgotten_until;
+  };
+  struct Passage {
+    Time stamp;
+    double travel_m = 0;
+  };
+
+  [[nodiscard]] static Estimate estimate(const std::deque<Observation>& observations);
+  [[nodiscard]] Observation observe(const Track* track, const Sighting& sighting, Time stamp, double travel_m) const;
+  [[nodiscard]] double cost(const Track& track, const Sighting& sighting, Time stamp, double travel_m) const;
+  std::vector<int> associate(const std::vector<Sighting>& sightings, Time stamp, double travel_m) const;
+  void rescue(const std::vector<Sighting>& sightings, Time stamp, double travel_m, std::vector<int>& track_of) const;
+  void take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m);
+  void restart(Track& track, const Observation& observation);
+  [[nodiscard]] bool visibly_gone(const Track& track, const TopView& view, const Segments& segments,
+                                  const std::vector<bool>& known, Time stamp, double travel_m) const;
+  [[nodiscard]] ObjectBelief belief(const Track& track, Time now, double travel_m, double belt_speed_m_s) const;
+  [[nodiscard]] double belt_speed(Time now, double travel_m) const;
+  [[nodiscard]] Track* find(std::uint32_t track);
+  [[nodiscard]] const Track* find(std::uint32_t track) const;
+
+  world::Belt belt_;
+  std::vector<Track> tracks_;  // by id
+  std::deque<Passage> passages_;
+  std::uint32_t next_id_ = 1;
+};
+
+}  // namespace pons::perception

@@ -1,0 +1,100 @@
+#include "pons/perception/tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include "pons/perception/synthetic_camera.hpp"
+
+namespace pons::perception {
+namespace {
+
+// An empty, fully seen belt, and sightings made by hand.
+struct Bench {
+  TopView view;
+  Segments segments;
+  Tracker tracker{belt_world().belt};
+  Time now;
+
+  Bench() {
+    view.cell_m = 0.002, view.x0_m = -1.1, view.y0_m = -0.3, view.surface_z_m = 0.9;
+    view.height.create(300, 650);
+    view.height.setTo(TopView::kLevel);
+    view.flags = cv::Mat1b::zeros(300, 650);
+    segments.labels = cv::Mat1i::zeros(300, 650);
+  }
+  static Sighting sighting(double x, double y, double yaw = 0, Vector3 size = {0.2, 0.15, 0.1}) {
+    Sighting s;
+    s.world_from_top = pose_xyz_yaw(x, y, 0.9 + size.z(), yaw);
+    s.yaw_rad = yaw, s.size_m = size, s.complete = true, s.fill = 1;
+    return s;
+  }
+  std::vector<std::uint32_t> update(const std::vector<Sighting>& sightings, double travel_m = 0) {
+    now += from_s(0.2);
+    return tracker.update(view, segments, sightings, now, travel_m);
+  }
+};
+
+TEST(TrackerTest, NeverUsesATrackAgain) {
+  Bench bench;
+  const auto first = bench.update({Bench::sighting(-0.5, 0)});
+  for (int i = 0; i < 3; ++i) bench.update({});
+  EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).empty());
+  const auto second = bench.update({Bench::sighting(-0.5, 0)});
+  EXPECT_GT(second.at(0), first.at(0));
+}
+
+TEST(TrackerTest, AveragesOverFrames) {
+  Bench bench;
+  for (const double error : {0.004, -0.004, 0.002, -0.002}) bench.update({Bench::sighting(-0.5 + error, error)});
+  const auto beliefs = bench.tracker.beliefs(bench.now, 0.1);
+  ASSERT_EQ(beliefs.size(), 1u);
+  EXPECT_NEAR(beliefs[0].world_from_top.translation().x(), -0.4, 1e-9);
+  EXPECT_EQ(beliefs[0].frames_seen, 4);
+}
+
+TEST(TrackerTest, KeepsTheAxesOfASquareThatFlips) {
+  Bench bench;
+  constexpr double kQuarter = 1.5707963267948966;
+  for (int i = 0; i < 6; ++i) {
+    bench.update({Bench::sighting(-0.5, 0, i % 2 == 0 ? 0.2 : 0.2 + kQuarter, {0.2, 0.199, 0.1})});
+  }
+  const auto beliefs = bench.tracker.beliefs(bench.now, 0);
+  ASSERT_EQ(beliefs.size(), 1u);
+  EXPECT_NEAR(std::atan2(beliefs[0].world_from_top.linear()(1, 0), beliefs[0].world_from_top.linear()(0, 0)), 0.2, 1e-6);
+  EXPECT_GT(beliefs[0].confidence, 0.9);
+}
+
+TEST(TrackerTest, OneBadCutChangesNothingTwoDo) {
+  Bench bench;
+  for (int i = 0; i < 4; ++i) bench.update({Bench::sighting(-0.5, 0)});
+  bench.update({Bench::sighting(-0.53, 0, 0, {0.14, 0.15, 0.1})});
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.2, 1e-9);
+  bench.update({Bench::sighting(-0.53, 0, 0, {0.14, 0.15, 0.1})});
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.14, 1e-9);
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1u);
+}
+
+TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {
+  Bench bench;
+  const auto ids = bench.update({Bench::sighting(-0.8, 0), Bench::sighting(-0.4, 0)});
+  bench.tracker.label_read(ids[0], "A");
+  bench.tracker.label_read(ids[0], "B");
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "A");
+  bench.tracker.label_read(ids[0], "B");
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "B");
+  EXPECT_FALSE(bench.tracker.wants_label(ids[0]));
+  bench.tracker.label_read(ids[1], "B");
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "");
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(1).code, "B");
+}
+
+TEST(TrackerTest, DoesNotStartOnWhatTheRobotTouchesOrTheBorderCuts) {
+  Bench bench;
+  Sighting held = Bench::sighting(-0.5, 0), cut = Bench::sighting(-0.9, 0);
+  held.near_robot = true, held.complete = false;
+  cut.at_border = true, cut.complete = false;
+  EXPECT_EQ(bench.update({held, cut}), (std::vector<std::uint32_t>{0, 0}));
+  EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).empty());
+}
+
+}  // namespace
+}  // namespace pons::perception

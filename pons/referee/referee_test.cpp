@@ -1,0 +1,126 @@
+#include "pons/referee/referee.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace pons::referee {
+namespace {
+
+using sim::ParcelTruth;
+using sim::Whereabouts;
+using task::Json;
+using task::Outcome;
+
+class RefereeTest : public ::testing::Test {
+ protected:
+  RefereeTest() {
+    auto opened = bridge::Journal::open(":memory:");
+    if (opened) journal_ = std::move(*opened);
+  }
+
+  void SetUp() override { ASSERT_NE(journal_, nullptr); }
+
+  static ParcelTruth parcel(const std::string& id, Whereabouts where, const std::string& place) {
+    ParcelTruth truth;
+    truth.parcel_id = id;
+    truth.destination = "chute_1";
+    truth.where = where;
+    truth.place = place;
+    return truth;
+  }
+
+  void accept(const std::string& id, const std::string& object) {
+    const task::Task task{.id = id, .steps = {{"pick", {{"object", object}}}}};
+    ASSERT_TRUE(journal_->accept(task, Time{}));
+  }
+  void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
+  void ride(const std::string& code) { ASSERT_TRUE(journal_->event("", Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
+
+  Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
+    auto verdict = referee::judge(parcels, arm_, *journal_, {120, 0.6}, end);
+    EXPECT_TRUE(verdict);
+    return verdict ? *verdict : Verdict{};
+  }
+
+  std::unique_ptr<bridge::Journal> journal_;
+  sim::ArmTruth arm_;
+};
+
+TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
+  accept("A", "A");
+  end("A", Outcome::kSucceeded);
+  accept("B", "B");
+  end("B", Outcome::kFailed);
+  const Verdict verdict = judge({parcel("A", Whereabouts::kChute, "chute_1"), parcel("B", Whereabouts::kChute, "chute_1")});
+  EXPECT_EQ(verdict.offered, 2);
+  EXPECT_EQ(verdict.sorted, 1);
+  EXPECT_EQ(verdict.lost, 1);
+  EXPECT_THAT(verdict.findings, ::testing::ElementsAre(::testing::HasSubstr("B: lost")));
+}
+
+TEST_F(RefereeTest, AnotherChuteIsMissortedWhateverTheJournalSays) {
+  accept("A", "A");
+  end("A", Outcome::kSucceeded);
+  EXPECT_EQ(judge({parcel("A", Whereabouts::kChute, "chute_2")}).missorted, 1);
+}
+
+TEST_F(RefereeTest, ExceptionNeedsAnEntryAndDeservesAReason) {
+  ride("A");
+  ParcelTruth heavy = parcel("B", Whereabouts::kException, "exception");
+  heavy.overweight = true;
+  accept("B", "B");
+  end("B", Outcome::kException);
+  accept("D", "D");
+  end("D", Outcome::kSucceeded);
+  const Verdict verdict = judge({parcel("A", Whereabouts::kException, "exception"), heavy,
+                                 parcel("C", Whereabouts::kException, "exception"),
+                                 parcel("D", Whereabouts::kException, "exception")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.deserved, 1);
+  EXPECT_EQ(verdict.lost, 2);  // C has no entry; D is not where its outcome says
+}
+
+TEST_F(RefereeTest, AFallIsLostWithoutAnEntry) {
+  accept("A", "A");
+  end("A", Outcome::kFailed);
+  const Verdict verdict = judge({parcel("A", Whereabouts::kTray, "tray"), parcel("B", Whereabouts::kFloor, "floor")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.lost, 1);
+}
+
+TEST_F(RefereeTest, OnTheBeltIsLostUnlessTheRunWasBrokenOff) {
+  const std::vector<ParcelTruth> parcels{parcel("A", Whereabouts::kBelt, "belt")};
+  EXPECT_EQ(judge(parcels).lost, 1);
+  const Verdict broken_off = judge(parcels, RunEnd::kBrokenOff);
+  EXPECT_EQ(broken_off.lost, 0);
+  EXPECT_EQ(broken_off.unfinished, 1);
+}
+
+TEST_F(RefereeTest, TwoSuccessesOfOneParcelAreADuplicate) {
+  accept("A", "A");
+  end("A", Outcome::kSucceeded);
+  accept("A2", "A");
+  end("A2", Outcome::kSucceeded);
+  EXPECT_EQ(judge({parcel("A", Whereabouts::kChute, "chute_1")}).duplicated, 1);
+}
+
+TEST_F(RefereeTest, DamageAndLimitsComeFromTruth) {
+  accept("A", "A");
+  end("A", Outcome::kSucceeded);
+  ParcelTruth pressed = parcel("A", Whereabouts::kChute, "chute_1");
+  pressed.max_press_n = 121;
+  arm_.speed_violations = 2;
+  arm_.worst_speed_ratio = 1.1;
+  const Verdict verdict = judge({pressed});
+  EXPECT_EQ(verdict.damaged, 1);
+  EXPECT_EQ(verdict.sorted, 1);
+  EXPECT_EQ(verdict.violations, 2U);
+  EXPECT_DOUBLE_EQ(verdict.worst_ratio, 1.1);
+}
+
+TEST_F(RefereeTest, WhatWasNotOfferedDoesNotCount) {
+  EXPECT_EQ(judge({parcel("A", Whereabouts::kNotOffered, "")}).offered, 0);
+}
+
+}  // namespace
+}  // namespace pons::referee

@@ -1,0 +1,64 @@
+// Everything a simulation consists of. Private to pons/sim; truth.cpp reads it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pons/body/body.hpp"
+#include "pons/core/random.hpp"
+#include "pons/sim/camera.hpp"
+#include "pons/sim/compose.hpp"
+#include "pons/sim/feeder.hpp"
+#include "pons/sim/gripper.hpp"
+#include "pons/sim/ledger.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::sim {
+
+struct Cell;
+
+class SimBody final : public body::Body {
+ public:
+  explicit SimBody(Cell* cell) : cell_(cell) {}
+  void read(body::Sensors& sensors) PONS_NONBLOCKING override;
+  void write(const body::SetPoints& set_points) PONS_NONBLOCKING override;
+
+ private:
+  Cell* cell_;
+};
+
+struct Cell {
+  Cell(const world::World& world, const world::Manifest& manifest, Composed composed, std::uint64_t seed);
+
+  // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
+  void step();
+
+  world::World world;
+  Composed composed;
+  DataPtr data;
+  std::vector<Arrival> arrivals;
+  BeltDrive belt;
+  Gripper gripper;
+  Ledger ledger;
+  Feeder feeder;
+  LabelStore labels;
+  std::vector<std::unique_ptr<SimCamera>> cameras;
+  std::vector<body::Camera*> camera_list;
+  SimBody body;
+  Random noise;                // of wrist and vacuum
+  body::SetPoints set_points;  // in force
+  body::Sensors measured;      // at the last step
+  Duration step_length;
+  Time stepped;                // end of the last step
+  Time now;                    // last time advanced to
+  bool stop_pressed = false;
+  bool braked = true;
+  std::string failure;         // what MuJoCo said when it gave up
+
+ private:
+  void drive();
+  void measure();
+};
+
+}  // namespace pons::sim

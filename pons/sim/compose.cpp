@@ -1,0 +1,319 @@
+#include "pons/sim/compose.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace pons::sim {
+namespace {
+
+constexpr double kRotorInertia = 0.01;  // kg·m² at the joint; keeps light wrist links stable at 2 ms
+constexpr mjtSize kArenaBytes = 48 << 20;
+constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; far from anything a camera sees
+
+constexpr int kArmBits = 4;
+
+Expected<SpecPtr> parse(const std::filesystem::path& file) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(file, code)) {
+    return fail("there is no such file", file.string(), "name a file that exists in world.yaml");
+  }
+  char text[1024] = "";
+  SpecPtr spec(mj_parseXML(file.c_str(), nullptr, text, sizeof text));
+  if (!spec) return fail(text, file.string(), "mend the XML there");
+  return spec;
+}
+
+Expected<void> check_belt(const mjSpec* spec, const world::World& world) {
+  const mjsGeom* geom = nullptr;
+  if (mjsElement* element = mjs_findElement(spec, mjOBJ_GEOM, "belt")) geom = mjs_asGeom(element);
+  if (geom == nullptr || geom->type != mjGEOM_BOX) {
+    return fail("there is no box geom named 'belt'", world.scene_mjcf.string(), "add it, with a surfacevel along x");
+  }
+  const world::Belt& belt = world.belt;
+  const double top = geom->pos[2] + geom->size[2];
+  if (std::abs(top - belt.surface_z_m) > 1e-4 || std::abs(geom->pos[0] - geom->size[0] - belt.x_start_m) > 1e-4 ||
+      std::abs(geom->pos[0] + geom->size[0] - belt.x_end_m) > 1e-4) {
+    return fail("geom 'belt' is not where world.yaml has the belt", world.scene_mjcf.string(),
+                "make x_start_m, x_end_m and surface_z_m of world.yaml agree with the geom");
+  }
+  return {};
+}
+
+void set_options(mjSpec* spec, const world::World& world) {
+  mjOption& option = spec->option;
+  option.timestep = world.physics_step_s;
+  option.integrator = mjINT_IMPLICITFAST;
+  option.cone = mjCONE_ELLIPTIC;
+  option.solver = mjSOL_NEWTON;
+  option.iterations = 30;
+  option.ls_iterations = 30;
+  option.impratio = 3;
+  option.enableflags |= mjENBL_SLEEP;
+  option.sleep_tolerance = 1e-3;
+  spec->memory = kArenaBytes;
+  spec->compiler.fusestatic = 0;
+}
+
+void paint_arm(mjsBody* body) {
+  int index = 0;
+  for (mjsElement* e = mjs_firstChild(body, mjOBJ_GEOM, 1); e != nullptr; e = mjs_nextChild(body, e, 1)) {
+    mjsGeom* geom = mjs_asGeom(e);
+    geom->contype = kArmBits;
+    geom->conaffinity = 0;
+    geom->group = 1;
+    const bool joint_cover = index++ % 3 != 1;
+    const float shade[3] = {joint_cover ? 0.28f : 0.80f, joint_cover ? 0.42f : 0.82f, joint_cover ? 0.58f : 0.84f};
+    for (int i = 0; i < 3; ++i) geom->rgba[i] = shade[i];
+    geom->rgba[3] = 1;
+  }
+}
+
+// Attaches the first body of `child` at a frame, and keeps child's names under `prefix`.
+Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix, const std::filesystem::path& file) {
+  mjsBody* root = mjs_asBody(mjs_firstChild(mjs_findBody(child, "world"), mjOBJ_BODY, 0));
+  if (root == nullptr) return fail("there is no body", file.string(), "give it one root body");
+  mjsElement* attached = mjs_attach(frame->element, root->element, prefix, "");
+  if (attached == nullptr) return fail(mjs_getError(mjs_getSpec(frame->element)), file.string(), "mend it");
+  return mjs_asBody(attached);
+}
+
+Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::World& world) {
+  const world::Robot& robot = world.robot;
+  mjsFrame* base = mjs_addFrame(mjs_findBody(scene, "world"), nullptr);
+  to_mujoco(robot.world_from_base, base->pos, base->quat);
+  auto arm_root = attach(base, arm, "arm/", robot.urdf);
+  if (!arm_root) return std::unexpected(arm_root.error());
+  (*arm_root)->sleep = mjSLEEP_AUTO;
+  paint_arm(*arm_root);
+
+  mjsBody* flange = mjs_findBody(scene, ("arm/" + robot.flange_link).c_str());
+  if (flange == nullptr) {
+    return fail(fmt::format("link '{}' is missing", robot.flange_link), robot.urdf.string(),
+                "name the last link as robot.flange_link in world.yaml");
+  }
+  mjsFrame* at_flange = mjs_addFrame(flange, nullptr);
+  auto tool_root = attach(at_flange, tool, "tool/", robot.tool.mjcf);
+  if (!tool_root) return std::unexpected(tool_root.error());
+
+  Eigen::Index axis = 0;
+  for (mjsElement* e = mjs_firstElement(scene, mjOBJ_JOINT); e != nullptr; e = mjs_nextElement(scene, e)) {
+    // MuJoCo's own std::string is of another library: only its accessor may look inside.
+    const std::string joint_name = mjs_getString(mjs_getName(e));
+    if (!joint_name.starts_with("arm/")) continue;
+    mjsJoint* joint = mjs_asJoint(e);
+    if (axis >= robot.limits.torque_nm.size()) break;
+    joint->armature = kRotorInertia;
+    joint->range[0] = robot.limits.position_min[axis];
+    joint->range[1] = robot.limits.position_max[axis];
+    joint->limited = mjLIMITED_TRUE;
+    joint->actfrclimited = mjLIMITED_FALSE;
+    // The brake's friction, set while the power is off: near to rigid, or it would creep under the arm's weight.
+    joint->solimp_friction[0] = joint->solimp_friction[1] = 0.9999;
+    mjsActuator* motor = mjs_addActuator(scene, nullptr);
+    mjs_setToMotor(motor);
+    mjs_setName(motor->element, fmt::format("drive_{}", axis).c_str());
+    mjs_setString(motor->target, joint_name.c_str());
+    motor->trntype = mjTRN_JOINT;
+    motor->ctrllimited = mjLIMITED_TRUE;
+    motor->ctrlrange[0] = -robot.limits.torque_nm[axis];
+    motor->ctrlrange[1] = robot.limits.torque_nm[axis];
+    ++axis;
+  }
+  if (axis != robot.home.size()) {
+    return fail(fmt::format("the URDF has {} moving joints, world.yaml limits for {}", axis, robot.home.size()),
+                robot.urdf.string(), "give one limit a joint");
+  }
+  return {};
+}
+
+mjsGeom* add_parcel_geom(mjsBody* body, const std::string& name, mjtGeom type, int bits) {
+  mjsGeom* geom = mjs_addGeom(body, nullptr);
+  mjs_setName(geom->element, name.c_str());
+  geom->type = type;
+  geom->size[0] = geom->size[1] = geom->size[2] = 0.05;
+  geom->contype = bits;
+  geom->conaffinity = bits == 0 ? 0 : 6;
+  geom->condim = 4;
+  geom->mass = 0;
+  geom->group = 1;
+  return geom;
+}
+
+void add_slot(mjSpec* scene, int index) {
+  mjsBody* body = mjs_addBody(mjs_findBody(scene, "world"), nullptr);
+  const std::string name = fmt::format("parcel_{}", index);
+  mjs_setName(body->element, name.c_str());
+  body->pos[0] = kParkX;
+  body->pos[1] = kParkY + kParkPitch * index;
+  body->pos[2] = kParkZ;
+  body->mass = 1;
+  // Unset, the centre of mass would come from geoms that have no mass.
+  for (double& coordinate : body->ipos) coordinate = 0;
+  for (double& inertia : body->inertia) inertia = 0.01;
+  body->explicitinertial = 1;
+  body->gravcomp = 1;
+  body->sleep = mjSLEEP_ALLOWED;
+  mjs_addFreeJoint(body);
+
+  mjsTexture* texture = mjs_addTexture(scene, nullptr);
+  mjs_setName(texture->element, (name + "_label").c_str());
+  texture->type = mjTEXTURE_2D;
+  texture->builtin = mjBUILTIN_FLAT;
+  for (double& channel : texture->rgb1) channel = 1;
+  texture->width = texture->height = kLabelPixels;
+  texture->nchannel = 3;
+  mjsMaterial* material = mjs_addMaterial(scene, nullptr);
+  mjs_setName(material->element, (name + "_label").c_str());
+  mjs_setInStringVec(material->textures, mjTEXROLE_RGB, (name + "_label").c_str());
+  material->specular = 0;
+  material->shininess = 0;
+
+  add_parcel_geom(body, name + "_main", mjGEOM_BOX, 2);
+  add_parcel_geom(body, name + "_rim", mjGEOM_BOX, 2);
+  mjsGeom* label = add_parcel_geom(body, name + "_label", mjGEOM_BOX, 0);
+  mjs_setString(label->material, (name + "_label").c_str());
+}
+
+void add_cameras(mjSpec* scene, const world::World& world) {
+  Eigen::Matrix3d gl_from_optical = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  for (const world::CameraSpec& spec : world.cameras) {
+    mjsCamera* camera = mjs_addCamera(mjs_findBody(scene, "world"), nullptr);
+    mjs_setName(camera->element, ("camera/" + spec.name).c_str());
+    Pose world_from_gl = spec.world_from_optical;
+    world_from_gl.linear() = spec.world_from_optical.linear() * gl_from_optical;
+    to_mujoco(world_from_gl, camera->pos, camera->quat);
+    camera->fovy = spec.fovy_rad * 180 / std::numbers::pi;  // in degrees always
+  }
+}
+
+// -1 turned into an error that names what is missing.
+Expected<int> id_of(const mjModel* model, mjtObj type, const std::string& name, const std::filesystem::path& file) {
+  const int id = mj_name2id(model, type, name.c_str());
+  if (id >= 0) return id;
+  return fail(fmt::format("{} '{}' is missing", mju_type2Str(type), name), file.string(), "add it");
+}
+
+void find_arm(Composed& cell) {
+  const mjModel* model = cell.model.get();
+  for (int actuator = 0; actuator < model->nu; ++actuator) {
+    if (model->actuator_trntype[actuator] != mjTRN_JOINT) continue;
+    const int joint = model->actuator_trnid[2 * actuator];
+    cell.arm_actuator.push_back(actuator);
+    cell.arm_qpos.push_back(model->jnt_qposadr[joint]);
+    cell.arm_dof.push_back(model->jnt_dofadr[joint]);
+  }
+}
+
+Expected<void> find_tool(Composed& cell, const world::World& world) {
+  const mjModel* model = cell.model.get();
+  const auto& file = world.robot.tool.mjcf;
+  for (std::size_t i = 0; i < world.robot.tool.cups_m.size(); ++i) {
+    auto body = id_of(model, mjOBJ_BODY, fmt::format("tool/cup_{}", i), file);
+    auto geom = id_of(model, mjOBJ_GEOM, fmt::format("tool/lip_{}", i), file);
+    auto actuator = id_of(model, mjOBJ_ACTUATOR, fmt::format("tool/vacuum_{}", i), file);
+    for (const auto* id : {&body, &geom, &actuator}) {
+      if (!*id) return std::unexpected(id->error());
+    }
+    cell.cups.push_back({*body, *geom, *actuator});
+  }
+  auto site = id_of(model, mjOBJ_SITE, "tool/wrist", file);
+  auto force = id_of(model, mjOBJ_SENSOR, "tool/wrist_force", file);
+  auto torque = id_of(model, mjOBJ_SENSOR, "tool/wrist_torque", file);
+  for (const auto* id : {&site, &force, &torque}) {
+    if (!*id) return std::unexpected(id->error());
+  }
+  cell.wrist_site = *site;
+  cell.tool_body = model->site_bodyid[*site];
+  cell.force_sensor = model->sensor_adr[*force];
+  cell.torque_sensor = model->sensor_adr[*torque];
+  return {};
+}
+
+void find_slots(Composed& cell) {
+  const mjModel* model = cell.model.get();
+  for (int i = 0; i < kSlots; ++i) {
+    const std::string name = fmt::format("parcel_{}", i);
+    Slot slot;
+    slot.body = mj_name2id(model, mjOBJ_BODY, name.c_str());
+    slot.qpos = model->jnt_qposadr[model->body_jntadr[slot.body]];
+    slot.dof = model->body_dofadr[slot.body];
+    slot.main = mj_name2id(model, mjOBJ_GEOM, (name + "_main").c_str());
+    slot.rim = mj_name2id(model, mjOBJ_GEOM, (name + "_rim").c_str());
+    slot.label = mj_name2id(model, mjOBJ_GEOM, (name + "_label").c_str());
+    slot.texture = mj_name2id(model, mjOBJ_TEXTURE, (name + "_label").c_str());
+    cell.slots.push_back(slot);
+  }
+}
+
+void classify(Composed& cell) {
+  const mjModel* model = cell.model.get();
+  cell.parts.assign(static_cast<std::size_t>(model->ngeom), Part::kFixed);
+  cell.slot_of_geom.assign(static_cast<std::size_t>(model->ngeom), -1);
+  for (int geom = 0; geom < model->ngeom; ++geom) {
+    if ((model->geom_contype[geom] & kArmBits) != 0) cell.parts[static_cast<std::size_t>(geom)] = Part::kArm;
+  }
+  for (const Cup& cup : cell.cups) cell.parts[static_cast<std::size_t>(cup.geom)] = Part::kCup;
+  cell.parts[static_cast<std::size_t>(cell.belt_geom)] = Part::kBelt;
+  for (int i = 0; i < kSlots; ++i) {
+    const Slot& slot = cell.slots[static_cast<std::size_t>(i)];
+    for (const int geom : {slot.main, slot.rim, slot.label}) {
+      cell.parts[static_cast<std::size_t>(geom)] = Part::kParcel;
+      cell.slot_of_geom[static_cast<std::size_t>(geom)] = i;
+    }
+  }
+}
+
+Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
+  Composed cell;
+  cell.model.reset(mj_compile(scene, nullptr));
+  if (!cell.model) return fail(mjs_getError(scene), world.scene_mjcf.string(), "mend the scene, the URDF or the tool");
+  const mjModel* model = cell.model.get();
+  auto belt = id_of(model, mjOBJ_GEOM, "belt", world.scene_mjcf);
+  if (!belt) return std::unexpected(belt.error());
+  cell.belt_geom = *belt;
+  if (!model->flg_surfacevel) {
+    return fail("geom 'belt' has no surfacevel", world.scene_mjcf.string(), "give it its nominal speed");
+  }
+  auto picture = id_of(model, mjOBJ_CAMERA, "picture", world.scene_mjcf);
+  if (!picture) return std::unexpected(picture.error());
+  cell.picture_camera = *picture;
+  for (const world::CameraSpec& camera : world.cameras) {
+    cell.cameras.push_back(mj_name2id(model, mjOBJ_CAMERA, ("camera/" + camera.name).c_str()));
+  }
+  find_arm(cell);
+  if (auto found = find_tool(cell, world); !found) return std::unexpected(found.error());
+  find_slots(cell);
+  classify(cell);
+  return cell;
+}
+
+}  // namespace
+
+Expected<Composed> compose(const world::World& world) {
+  install_message_handler();
+  try {
+    auto scene = parse(world.scene_mjcf);
+    if (!scene) return std::unexpected(scene.error());
+    auto arm = parse(world.robot.urdf);
+    if (!arm) return std::unexpected(arm.error());
+    auto tool = parse(world.robot.tool.mjcf);
+    if (!tool) return std::unexpected(tool.error());
+    if (auto belt = check_belt(scene->get(), world); !belt) return std::unexpected(belt.error());
+    set_options(scene->get(), world);
+    if (auto added = add_robot(scene->get(), arm->get(), tool->get(), world); !added) {
+      return std::unexpected(added.error());
+    }
+    for (int i = 0; i < kSlots; ++i) add_slot(scene->get(), i);
+    add_cameras(scene->get(), world);
+    return compile_and_find(scene->get(), world);
+  } catch (const std::exception& error) {
+    return fail(error.what(), world.scene_mjcf.string(), "mend the scene, the URDF or the tool");
+  }
+}
+
+}  // namespace pons::sim

@@ -1,0 +1,97 @@
+#include "pons/sim/gripper.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pons::sim {
+namespace {
+
+constexpr double kSealed_kpa = 60, kOpen_kpa = 8, kHolding_kpa = 20;
+constexpr double kOn_s = 0.020, kOff_s = 0.012;
+constexpr double kTouch_m = 0.001;
+constexpr double kFacing = 0.77;  // cosine of 40 degrees: a lip that meets an edge leaks
+
+// Index of the cup that owns the geom, or the number of cups.
+std::size_t cup_of(const Composed& cell, int geom) {
+  std::size_t cup = 0;
+  while (cup < cell.cups.size() && cell.cups[cup].geom != geom) ++cup;
+  return cup;
+}
+
+bool is_cup(const Composed& cell, int geom) { return cell.parts[static_cast<std::size_t>(geom)] == Part::kCup; }
+
+}  // namespace
+
+void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, double step_s) {
+  count_ = cell.cups.size();
+  for (std::size_t i = 0; i < count_; ++i) cups_[i].slot = -1;
+  for (int i = 0; i < data->ncon; ++i) {
+    const mjContact& contact = data->contact[i];
+    if (contact.dist > kTouch_m) continue;
+    for (int side = 0; side < 2; ++side) {
+      if (!is_cup(cell, contact.geom[side])) continue;
+      const int slot = cell.slot_of_geom[static_cast<std::size_t>(contact.geom[1 - side])];
+      const double* axes = data->geom_xmat + 9 * contact.geom[side];
+      const double facing = contact.frame[0] * axes[2] + contact.frame[1] * axes[5] + contact.frame[2] * axes[8];
+      if (slot >= 0 && std::abs(facing) > kFacing) cups_[cup_of(cell, contact.geom[side])].slot = slot;
+    }
+  }
+  for (std::size_t i = 0; i < count_; ++i) {
+    Cup& cup = cups_[i];
+    const bool on = ((vacuum_on >> i) & 1U) != 0;
+    const double target = !on ? 0 : (cup.slot >= 0 ? kSealed_kpa : kOpen_kpa);
+    const double rate = target > cup.pressure_kpa ? kOn_s : kOff_s;
+    cup.pressure_kpa += (target - cup.pressure_kpa) * (1 - std::exp(-step_s / rate));
+    data->ctrl[cell.cups[i].actuator] = cup.slot >= 0 ? std::min(1.0, cup.pressure_kpa / kSealed_kpa) : 0;
+  }
+}
+
+int Gripper::grip(int slot) const {
+  return static_cast<int>(std::count_if(cups_.begin(), cups_.begin() + static_cast<std::ptrdiff_t>(count_),
+                                        [slot](const Cup& cup) {
+                                          return cup.slot == slot && cup.pressure_kpa > kHolding_kpa;
+                                        }));
+}
+
+void Gripper::measure(const Composed& cell, const mjData* data) {
+  std::array<int, kMaxCups> contacts{};
+  for (int i = 0; i < data->ncon; ++i) {
+    for (const int geom : data->contact[i].geom) {
+      if (is_cup(cell, geom)) ++contacts[cup_of(cell, geom)];
+    }
+  }
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double force = data->actuator_force[cell.cups[i].actuator];
+    cups_[i].pull_n = contacts[i] > 0 ? force / contacts[i] : 0;
+  }
+}
+
+std::array<double, 6> Gripper::wrist(const Composed& cell, const mjData* data) const {
+  // MuJoCo's interaction forces know the contacts' push on the cups but not the adhesion that balances it.
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_site(data->site_xmat +
+                                                                                       9 * cell.wrist_site);
+  const Eigen::Map<const Vector3> site(data->site_xpos + 3 * cell.wrist_site);
+  Vector3 force = Vector3::Zero(), torque = Vector3::Zero();
+  for (int i = 0; i < data->ncon; ++i) {
+    const mjContact& contact = data->contact[i];
+    for (int side = 0; side < 2; ++side) {
+      if (!is_cup(cell, contact.geom[side])) continue;
+      const double pull = cups_[cup_of(cell, contact.geom[side])].pull_n;
+      const Vector3 normal(contact.frame[0], contact.frame[1], contact.frame[2]);
+      const Vector3 on_cup = (side == 0 ? pull : -pull) * normal;
+      const Vector3 arm = Vector3(contact.pos[0], contact.pos[1], contact.pos[2]) - site;
+      force += on_cup;
+      torque += arm.cross(on_cup);
+    }
+  }
+  force = world_from_site.transpose() * force;
+  torque = world_from_site.transpose() * torque;
+  std::array<double, 6> wrist{};
+  for (int i = 0; i < 3; ++i) {
+    wrist[static_cast<std::size_t>(i)] = data->sensordata[cell.force_sensor + i] + force[i];
+    wrist[static_cast<std::size_t>(i + 3)] = data->sensordata[cell.torque_sensor + i] + torque[i];
+  }
+  return wrist;
+}
+
+}  // namespace pons::sim

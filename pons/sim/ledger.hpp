@@ -1,0 +1,46 @@
+// Keeps account of what really happens, step by step: where each parcel is, how it was treated, how hard the arm worked.
+// The feeder learns from it which parcels wait and which have left; the records themselves leave pons/sim only through
+// truth.hpp. Private to pons/sim.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pons/core/axes.hpp"
+#include "pons/core/time.hpp"
+#include "pons/sim/arrivals.hpp"
+#include "pons/sim/compose.hpp"
+#include "pons/sim/gripper.hpp"
+
+namespace pons::sim {
+
+struct ParcelTruth;
+struct ArmTruth;
+
+class Ledger {
+ public:
+  Ledger(const world::World& world, const world::Manifest& manifest, const std::vector<Arrival>& arrivals);
+  ~Ledger();
+
+  void offered(std::size_t parcel, int slot, Time now);
+  // After each step. `torque_nm` is what was asked of the drives.
+  void update(const Composed& cell, const mjData* data, const Gripper& gripper, std::uint32_t vacuum_on,
+              const AxisVector& torque_nm, Time now);
+  // Slots whose parcel is to be carried off now; each is named once, and is free afterwards.
+  [[nodiscard]] const std::vector<int>& leaving() const;
+
+  [[nodiscard]] int parcel_in(int slot) const;   // -1 when the slot is free
+  [[nodiscard]] int slot_of(std::size_t parcel) const;  // -1 when it is not in the cell
+  [[nodiscard]] bool on_belt(int slot) const;    // lies on the belt, unheld
+  [[nodiscard]] int in_transit() const;          // on the belt, held or falling
+  [[nodiscard]] std::size_t size() const;        // parcels of the manifest
+
+  [[nodiscard]] const std::vector<ParcelTruth>& parcels() const;
+  [[nodiscard]] const ArmTruth& arm() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pons::sim

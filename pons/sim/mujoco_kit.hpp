@@ -1,0 +1,32 @@
+// MuJoCo's C handles with owners, and its messages as errors. Private to pons/sim.
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <string>
+
+#include "pons/core/pose.hpp"
+
+namespace pons::sim {
+
+struct MujocoDelete {
+  void operator()(mjSpec* spec) const { mj_deleteSpec(spec); }
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+using SpecPtr = std::unique_ptr<mjSpec, MujocoDelete>;
+using ModelPtr = std::unique_ptr<mjModel, MujocoDelete>;
+using DataPtr = std::unique_ptr<mjData, MujocoDelete>;
+
+// MuJoCo's own handler writes a file and ends the process. Ours keeps the text for take_message() of the thread that
+// caused it, and throws std::runtime_error for errors. The library has one handler for all; installing twice is harmless.
+void install_message_handler();
+// The newest warning or error of this thread, empty when there was none since the last call.
+[[nodiscard]] std::string take_message();
+
+// Pose to MuJoCo's position and quaternion (w first), and back.
+void to_mujoco(const Pose& pose, double position[3], double quaternion[4]);
+[[nodiscard]] Pose from_mujoco(const double position[3], const double quaternion[4]);
+
+}  // namespace pons::sim

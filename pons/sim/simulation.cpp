@@ -1,0 +1,194 @@
+#include "pons/sim/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "pons/core/digest.hpp"
+#include "pons/sim/cell.hpp"
+#include "pons/sim/parcels.hpp"
+
+namespace pons::sim {
+namespace {
+
+constexpr std::uint64_t kNoiseStream = 0x6e6f6973;
+constexpr double kForceNoise_n = 0.15, kTorqueNoise_nm = 0.01, kVacuumNoise_kpa = 0.3;
+constexpr double kBrake = 1.5;  // holding torque of a brake, in drive torques
+
+}  // namespace
+
+Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Composed the_composed, std::uint64_t seed)
+    : world(the_world),
+      composed(std::move(the_composed)),
+      data(mj_makeData(composed.model.get())),
+      arrivals(plan_arrivals(world, manifest, seed)),
+      belt(world.belt, seed),
+      ledger(world, manifest, arrivals),
+      feeder(world, manifest, arrivals),
+      body(this),
+      noise(Random(seed).fork(kNoiseStream)),
+      step_length(from_s(world.physics_step_s)) {
+  set_points.torque_nm = AxisVector::Zero(world.robot.home.size());
+  for (int i = 0; i < kSlots; ++i) {
+    const Slot& slot = composed.slots[static_cast<std::size_t>(i)];
+    park(composed.model.get(), data.get(), slot, i);
+    labels.entries.push_back({slot.texture, 0, {}});
+  }
+}
+
+void Cell::step() {
+  mjModel* model = composed.model.get();
+  feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
+  belt.step(model, composed.belt_geom, stepped, world.physics_step_s);
+  gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
+  drive();
+  mj_step(model, data.get());
+  stepped += step_length;
+  gripper.measure(composed, data.get());
+  measure();
+  ledger.update(composed, data.get(), gripper, set_points.vacuum_on, set_points.torque_nm, stepped);
+}
+
+void Cell::drive() {
+  for (std::size_t i = 0; i < composed.arm_actuator.size(); ++i) {
+    const double torque = set_points.power ? set_points.torque_nm[static_cast<Eigen::Index>(i)] : 0;
+    data->ctrl[composed.arm_actuator[i]] = torque;
+  }
+  if (braked == !set_points.power && stepped > Time()) return;
+  braked = !set_points.power;
+  for (std::size_t i = 0; i < composed.arm_dof.size(); ++i) {
+    composed.model->dof_frictionloss[composed.arm_dof[i]] =
+        braked ? kBrake * world.robot.limits.torque_nm[static_cast<Eigen::Index>(i)] : 0;
+  }
+}
+
+void Cell::measure() {
+  const auto axes = static_cast<Eigen::Index>(composed.arm_qpos.size());
+  measured.position.resize(axes);
+  measured.speed.resize(axes);
+  for (Eigen::Index i = 0; i < axes; ++i) {
+    measured.position[i] = data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
+    measured.speed[i] = data->qvel[composed.arm_dof[static_cast<std::size_t>(i)]];
+  }
+  const std::array<double, 6> wrist = gripper.wrist(composed, data.get());
+  for (std::size_t i = 0; i < 3; ++i) {
+    measured.wrist_force_n[i] = wrist[i] + kForceNoise_n * noise.normal();
+    measured.wrist_torque_nm[i] = wrist[i + 3] + kTorqueNoise_nm * noise.normal();
+  }
+  for (std::size_t i = 0; i < composed.cups.size(); ++i) {
+    measured.cup_vacuum_kpa[i] = gripper.pressure_kpa(i) + kVacuumNoise_kpa * noise.normal();
+  }
+  measured.belt_travel_m = belt.travel_m();
+  measured.belt_speed_m_s = belt.speed_m_s();
+  measured.photo_eye_blocked = feeder.photo_eye(composed, data.get(), ledger);
+}
+
+void SimBody::read(body::Sensors& sensors) {
+  sensors = cell_->measured;
+  const double since_s = to_s(cell_->now - cell_->stepped);
+  if (since_s > 0) {
+    sensors.position += since_s * sensors.speed;
+    sensors.belt_travel_m += since_s * sensors.belt_speed_m_s;
+  }
+  sensors.stamp = cell_->now;
+  sensors.stop_input = cell_->stop_pressed;
+}
+
+void SimBody::write(const body::SetPoints& set_points) { cell_->set_points = set_points; }
+
+Simulation::Simulation(std::unique_ptr<Cell> cell) : cell_(std::move(cell)) {}
+Simulation::~Simulation() = default;
+
+Expected<std::unique_ptr<Simulation>> Simulation::create(const world::World& world, const world::Manifest& manifest,
+                                                         std::uint64_t seed) {
+  auto composed = compose(world);
+  if (!composed) return std::unexpected(composed.error());
+  auto cell = std::make_unique<Cell>(world, manifest, std::move(*composed), seed);
+  for (std::size_t i = 0; i < world.cameras.size(); ++i) {
+    auto camera = SimCamera::create(world.cameras[i], cell->composed.model.get(), cell->data.get(),
+                                    cell->composed.cameras[i], &cell->labels, seed);
+    if (!camera) return std::unexpected(camera.error());
+    cell->camera_list.push_back(camera->get());
+    cell->cameras.push_back(std::move(*camera));
+  }
+  std::unique_ptr<Simulation> simulation(new Simulation(std::move(cell)));
+  simulation->set_arm(world.robot.home);
+  return simulation;
+}
+
+void Simulation::advance_to(Time time) {
+  Cell& cell = *cell_;
+  try {
+    while (cell.stepped + cell.step_length <= time && cell.failure.empty()) cell.step();
+  } catch (const std::runtime_error& error) {
+    cell.failure = error.what();
+  }
+  if (time > cell.now) cell.now = time;
+}
+
+body::Body& Simulation::body() { return cell_->body; }
+const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
+void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
+
+void Simulation::set_arm(const AxisVector& position) {
+  Cell& cell = *cell_;
+  const auto axes = static_cast<Eigen::Index>(cell.composed.arm_qpos.size());
+  for (Eigen::Index i = 0; i < axes; ++i) {
+    cell.data->qpos[cell.composed.arm_qpos[static_cast<std::size_t>(i)]] = position[i];
+    cell.data->qvel[cell.composed.arm_dof[static_cast<std::size_t>(i)]] = 0;
+  }
+  mj_forward(cell.composed.model.get(), cell.data.get());
+  cell.measured.position = position;
+  cell.measured.speed = AxisVector::Zero(axes);
+}
+
+int Simulation::offered() const { return cell_->feeder.offered(); }
+
+bool Simulation::finished() const {
+  return static_cast<std::size_t>(offered()) == cell_->ledger.size() && cell_->ledger.in_transit() == 0;
+}
+
+std::uint64_t Simulation::state_digest() const {
+  const mjModel* model = cell_->composed.model.get();
+  Digest digest;
+  digest.add(std::span<const double>(cell_->data->qpos, static_cast<std::size_t>(model->nq)));
+  digest.add(std::span<const double>(cell_->data->qvel, static_cast<std::size_t>(model->nv)));
+  return digest.value();
+}
+
+Expected<void> Simulation::health() const {
+  const Cell& cell = *cell_;
+  const std::string where = fmt::format("simulation at {:.3f} s", cell.stepped.s());
+  if (!cell.failure.empty()) return fail("MuJoCo gave up: " + cell.failure, where, "report the seed and the world");
+  for (int i = 0; i < mjNWARNING; ++i) {
+    const mjWarningStat& warning = cell.data->warning[i];
+    if (warning.number == 0) continue;
+    return fail(fmt::format("MuJoCo warned {} times: {}", warning.number, mju_warningText(i, static_cast<size_t>(warning.lastinfo))),
+                where, "report the seed and the world");
+  }
+  for (int i = 0; i < cell.composed.model->nq; ++i) {
+    if (!std::isfinite(cell.data->qpos[i])) {
+      return fail(fmt::format("position {} is not finite", i), where, "report the seed and the world");
+    }
+  }
+  return {};
+}
+
+Expected<std::vector<std::uint8_t>> Simulation::picture(int width, int height) const {
+  const Cell& cell = *cell_;
+  auto renderer = Renderer::create(cell.composed.model.get(), width, height, Look::kPicture);
+  if (!renderer) return std::unexpected(renderer.error());
+  (*renderer)->capture(cell.composed.model.get(), cell.data.get(), cell.composed.picture_camera, cell.labels);
+  std::vector<std::uint8_t> upside_down;
+  std::vector<float> depth;
+  if (auto drawn = (*renderer)->draw(upside_down, depth); !drawn) return std::unexpected(drawn.error());
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(upside_down.size());
+  const auto row = static_cast<std::ptrdiff_t>(3 * width);
+  for (int i = height - 1; i >= 0; --i) rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
+  return rgb;
+}
+
+}  // namespace pons::sim

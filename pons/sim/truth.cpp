@@ -1,0 +1,55 @@
+#include "pons/sim/truth.hpp"
+
+#include <array>
+#include <numbers>
+
+#include "pons/sim/cell.hpp"
+#include "pons/sim/simulation.hpp"
+
+namespace pons::sim {
+
+std::string_view name(LabelTruth label) {
+  static constexpr std::array<std::string_view, 4> kNames{"readable", "down", "damaged", "unknown_code"};
+  return kNames[static_cast<std::size_t>(label)];
+}
+
+std::string_view name(Whereabouts where) {
+  static constexpr std::array<std::string_view, 8> kNames{"not_offered", "belt",      "held", "falling",
+                                                          "chute",       "exception", "tray", "floor"};
+  return kNames[static_cast<std::size_t>(where)];
+}
+
+Truth::Truth(const Simulation& simulation) : simulation_(&simulation) {}
+
+const std::vector<ParcelTruth>& Truth::parcels() const { return simulation_->cell_->ledger.parcels(); }
+const ArmTruth& Truth::arm() const { return simulation_->cell_->ledger.arm(); }
+
+std::optional<Pose> Truth::top(std::size_t parcel) const {
+  const Cell& cell = *simulation_->cell_;
+  const int index = cell.ledger.slot_of(parcel);
+  if (index < 0) return std::nullopt;
+  const Slot& slot = cell.composed.slots[static_cast<std::size_t>(index)];
+  const double* q = cell.data->qpos + slot.qpos;
+  const ParcelTruth& truth = parcels()[parcel];
+  Pose middle_from_top = Pose::Identity();
+  const bool down = truth.label == LabelTruth::kDown;
+  middle_from_top.translation().z() = (down ? -0.5 : 0.5) * truth.size_m.z();
+  if (down) middle_from_top.rotate(Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()));
+  return from_mujoco(q, q + 3) * middle_from_top;
+}
+
+Vector3 Truth::velocity_m_s(std::size_t parcel) const {
+  const Cell& cell = *simulation_->cell_;
+  const int index = cell.ledger.slot_of(parcel);
+  if (index < 0) return Vector3::Zero();
+  const double* v = cell.data->qvel + cell.composed.slots[static_cast<std::size_t>(index)].dof;
+  return {v[0], v[1], v[2]};
+}
+
+int Truth::on_belt() const {
+  int count = 0;
+  for (int i = 0; i < kSlots; ++i) count += simulation_->cell_->ledger.on_belt(i) ? 1 : 0;
+  return count;
+}
+
+}  // namespace pons::sim

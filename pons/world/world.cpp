@@ -1,0 +1,259 @@
+#include "pons/world/world.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <system_error>
+
+#include "pons/world/csv.hpp"
+#include "pons/world/sections.hpp"
+#include "pons/world/yaml.hpp"
+
+namespace pons::world {
+namespace {
+
+constexpr double kReach = 100;        // m
+constexpr double kMaxSeconds = 3600;  // of a period, a phase, a latency
+constexpr double kMaxMass = 1000;     // kg
+constexpr double kSumTolerance = 1e-6;
+constexpr double kDegree = std::numbers::pi / 180;
+
+// A name that is new among `taken`.
+std::string new_name(const YamlValue& value, std::set<std::string>& taken) {
+  std::string name = value.name();
+  if (!taken.insert(name).second) value.refuse(fmt::format("'{}' is there twice", name), "give each its own name");
+  return name;
+}
+
+Belt read_belt(const YamlValue& value) {
+  const YamlMap map(value, {"x_start_m", "x_end_m", "y_center_m", "width_m", "surface_z_m", "speed_m_s",
+                            "speed_variation", "speed_period_s", "pick_x_min_m", "pick_x_max_m"});
+  Belt belt;
+  belt.x_start_m = map["x_start_m"].number(-kReach, kReach);
+  belt.x_end_m = map["x_end_m"].number(-kReach, kReach);
+  if (belt.x_end_m <= belt.x_start_m) map["x_end_m"].refuse("is not above x_start_m", "the belt runs along +x");
+  belt.y_center_m = map["y_center_m"].number(-kReach, kReach);
+  belt.width_m = map["width_m"].positive(10);
+  belt.surface_z_m = map["surface_z_m"].positive(10);
+  belt.speed_m_s = map["speed_m_s"].positive(5);
+  belt.speed_variation = map["speed_variation"].number(0, 0.9);
+  belt.speed_period_s = map["speed_period_s"].positive(kMaxSeconds);
+  belt.pick_x_min_m = map["pick_x_min_m"].number(belt.x_start_m, belt.x_end_m);
+  belt.pick_x_max_m = map["pick_x_max_m"].number(belt.x_start_m, belt.x_end_m);
+  if (belt.pick_x_max_m <= belt.pick_x_min_m) {
+    map["pick_x_max_m"].refuse("is not above pick_x_min_m", "the pick zone runs along +x");
+  }
+  return belt;
+}
+
+PlaceKind read_place_kind(const YamlValue& value) {
+  const std::string word = value.text();
+  if (word == "chute") return PlaceKind::kChute;
+  if (word == "exception") return PlaceKind::kException;
+  if (word == "tray") return PlaceKind::kTray;
+  if (word == "region") return PlaceKind::kRegion;
+  value.refuse(fmt::format("'{}' is no kind of place", printable(word)), "write chute, exception, tray or region");
+}
+
+bool mouths_overlap(const Place& a, const Place& b) {
+  const Vector3 apart = (a.center_m - b.center_m).cwiseAbs();
+  const Vector3 reach = (a.size_m + b.size_m) / 2;
+  return apart.x() < reach.x() && apart.y() < reach.y();
+}
+
+std::vector<Place> read_places(const YamlValue& value) {
+  std::vector<Place> places;
+  std::set<std::string> taken{"belt"};
+  for (const YamlValue& entry : value.list(1, 256)) {
+    const YamlMap map(entry, {"name", "kind", "center", "size"});
+    Place place;
+    place.name = new_name(map["name"], taken);
+    place.kind = read_place_kind(map["kind"]);
+    place.center_m = map["center"].vector(kReach);
+    place.size_m = map["size"].vector(kReach);
+    if (place.size_m.minCoeff() <= 0) map["size"].refuse("is not above 0 everywhere", "write three lengths");
+    const bool mouth = place.kind == PlaceKind::kChute || place.kind == PlaceKind::kException;
+    for (const Place& other : places) {
+      const bool other_mouth = other.kind == PlaceKind::kChute || other.kind == PlaceKind::kException;
+      if (mouth && other_mouth && mouths_overlap(place, other)) {
+        map["center"].refuse(fmt::format("the mouth overlaps that of '{}'", other.name), "move one of them");
+      }
+    }
+    places.push_back(std::move(place));
+  }
+  const auto count = [&](PlaceKind kind) { return std::ranges::count(places, kind, &Place::kind); };
+  if (count(PlaceKind::kChute) == 0) value.refuse("there is no chute", "add a place of kind chute");
+  if (count(PlaceKind::kException) != 1) {
+    value.refuse(fmt::format("there are {} exception chutes", count(PlaceKind::kException)), "write exactly one");
+  }
+  if (count(PlaceKind::kTray) != 1) {
+    value.refuse(fmt::format("there are {} trays", count(PlaceKind::kTray)), "write exactly one");
+  }
+  return places;
+}
+
+CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places) {
+  CameraSpec camera;
+  camera.watches = map["watches"].name();
+  if (camera.watches != "belt" && std::ranges::find(places, camera.watches, &Place::name) == places.end()) {
+    std::vector<std::string> names{"belt"};
+    for (const Place& place : places) names.push_back(place.name);
+    map["watches"].refuse(fmt::format("there is no place '{}'", camera.watches),
+                          fmt::format("choose from {}", fmt::join(names, ", ")));
+  }
+  camera.world_from_optical = read_pose(map["world_from_optical"]);
+  camera.width = map["width"].integer(16, 4096);
+  camera.height = map["height"].integer(16, 4096);
+  camera.fovy_rad = map["fovy_deg"].number(1, 150) * kDegree;
+  camera.period_s = map["period_s"].number(0.001, kMaxSeconds);
+  camera.phase_s = map["phase_s"].number(0, kMaxSeconds);
+  camera.latency_s = map["latency_s"].number(0, kMaxSeconds);
+  camera.depth_noise_m = map["depth_noise_m"].number(0, 1);
+  camera.depth_dropout = map["depth_dropout"].number(0, 1);
+  camera.reads_labels = map["reads_labels"].boolean();
+  return camera;
+}
+
+std::vector<CameraSpec> read_cameras(const YamlValue& value, const std::vector<Place>& places) {
+  std::vector<CameraSpec> cameras;
+  std::set<std::string> taken;
+  for (const YamlValue& entry : value.list(1, 16)) {
+    const YamlMap map(entry, {"name", "watches", "world_from_optical", "width", "height", "fovy_deg", "period_s",
+                              "phase_s", "latency_s", "depth_noise_m", "depth_dropout", "reads_labels"});
+    std::string name = new_name(map["name"], taken);
+    cameras.push_back(read_camera(map, places));
+    cameras.back().name = std::move(name);
+  }
+  const auto reads_belt = [](const CameraSpec& camera) { return camera.watches == "belt" && camera.reads_labels; };
+  if (std::ranges::none_of(cameras, reads_belt)) {
+    value.refuse("none watches the belt and reads labels", "add one with watches: belt and reads_labels: yes");
+  }
+  return cameras;
+}
+
+std::vector<Resource> read_resources(const YamlValue& value) {
+  std::vector<Resource> resources;
+  std::set<std::string> taken;
+  for (const YamlValue& entry : value.list(1, 64)) resources.push_back({new_name(entry, taken)});
+  return resources;
+}
+
+Rules read_rules(const YamlValue& value, const Robot& robot) {
+  const YamlMap map(value, {"max_mass_kg", "max_size_m", "max_press_n", "max_drop_m"});
+  Rules rules;
+  rules.max_mass_kg = map["max_mass_kg"].positive(kMaxMass);
+  if (rules.max_mass_kg + robot.tool.mass_kg > robot.payload_kg) {
+    map["max_mass_kg"].refuse(
+        fmt::format("is more than the robot's payload less its tool, {} kg", robot.payload_kg - robot.tool.mass_kg),
+        "lower it");
+  }
+  rules.max_size_m = map["max_size_m"].positive(10);
+  rules.max_press_n = map["max_press_n"].positive(1e5);
+  rules.max_drop_m = map["max_drop_m"].positive(10);
+  return rules;
+}
+
+void read_shares(const YamlMap& map, Arrivals& arrivals) {
+  arrivals.touching = map["touching"].number(0, 1);
+  arrivals.unreadable = map["unreadable"].number(0, 1);
+  arrivals.overweight = map["overweight"].number(0, 1);
+  arrivals.oversize = map["oversize"].number(0, 1);
+  if (arrivals.overweight + arrivals.oversize > 1)
+    map["oversize"].refuse("makes more than 1 with overweight", "lower it");
+  arrivals.express = map["express"].number(0, 1);
+  const YamlMap kinds(map["kinds"], {"box", "mailer", "tube", "bag"});
+  arrivals.box = kinds["box"].number(0, 1);
+  arrivals.mailer = kinds["mailer"].number(0, 1);
+  arrivals.tube = kinds["tube"].number(0, 1);
+  arrivals.bag = kinds["bag"].number(0, 1);
+  const double sum = arrivals.box + arrivals.mailer + arrivals.tube + arrivals.bag;
+  if (std::abs(sum - 1) > kSumTolerance)
+    map["kinds"].refuse(fmt::format("the shares sum to {}", sum), "make them sum to 1");
+}
+
+Arrivals read_arrivals(const YamlValue& value, const Rules& rules) {
+  const YamlMap map(
+      value, {"touching", "unreadable", "overweight", "oversize", "express", "kinds", "length_min_m", "length_max_m",
+              "mass_min_kg", "mass_max_kg", "overweight_max_kg", "label_m", "waiting", "gap_min_m", "gap_max_m"});
+  Arrivals arrivals;
+  read_shares(map, arrivals);
+  arrivals.length_max_m = map["length_max_m"].positive(rules.max_size_m);
+  arrivals.length_min_m = map["length_min_m"].positive(arrivals.length_max_m);
+  arrivals.mass_max_kg = map["mass_max_kg"].positive(rules.max_mass_kg);
+  arrivals.mass_min_kg = map["mass_min_kg"].positive(arrivals.mass_max_kg);
+  arrivals.max_mass_kg = map["overweight_max_kg"].number(kOverweightFactor * rules.max_mass_kg, kMaxMass);
+  arrivals.label_m = map["label_m"].positive(arrivals.length_min_m);
+  arrivals.waiting = map["waiting"].integer(1, 100);
+  arrivals.gap_max_m = map["gap_max_m"].positive(10);
+  arrivals.gap_min_m = map["gap_min_m"].number(0, arrivals.gap_max_m);
+  return arrivals;
+}
+
+World read_world(const std::filesystem::path& folder, std::string_view name) {
+  const YamlMap map(read_yaml(folder / "world.yaml"), {"scene_mjcf", "physics_step_s", "robot", "belt", "places",
+                                                       "cameras", "resources", "arrivals", "rules"});
+  World world;
+  world.name = name;
+  world.folder = folder;
+  world.scene_mjcf = map["scene_mjcf"].existing_file(folder);
+  world.physics_step_s = map["physics_step_s"].number(1e-5, 0.01);
+  world.robot = read_robot(map["robot"], folder);
+  world.belt = read_belt(map["belt"]);
+  world.places = read_places(map["places"]);
+  world.cameras = read_cameras(map["cameras"], world.places);
+  world.resources = read_resources(map["resources"]);
+  world.rules = read_rules(map["rules"], world.robot);
+  world.arrivals = read_arrivals(map["arrivals"], world.rules);
+  return world;
+}
+
+}  // namespace
+
+const Place* World::place(std::string_view place_name) const {
+  const auto found = std::ranges::find(places, place_name, &Place::name);
+  return found == places.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> list(const std::filesystem::path& root) {
+  std::vector<std::string> names;
+  std::error_code code;
+  for (std::filesystem::directory_iterator entry(root, code), end; !code && entry != end; entry.increment(code)) {
+    std::error_code unreadable;
+    if (std::filesystem::is_regular_file(entry->path() / "world.yaml", unreadable)) {
+      names.push_back(entry->path().filename().string());
+    }
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+Expected<World> load(const std::filesystem::path& root, std::string_view name) {
+  // Only a listed name becomes a path: "../elsewhere" must not.
+  const std::vector<std::string> names = list(root);
+  if (std::ranges::find(names, name) == names.end()) {
+    const std::string mend = names.empty() ? "that folder holds no world (a folder with a world.yaml)"
+                                           : fmt::format("the worlds are: {}", fmt::join(names, ", "));
+    return fail(fmt::format("there is no world '{}'", printable(name)), root.string(), mend);
+  }
+  try {
+    return read_world(root / name, name);
+  } catch (LoadError& refused) {
+    return std::unexpected(std::move(refused.error));
+  }
+}
+
+Intrinsics intrinsics(const CameraSpec& camera) {
+  const double focal_px = 0.5 * camera.height / std::tan(0.5 * camera.fovy_rad);
+  return {.width = camera.width,
+          .height = camera.height,
+          .fx = focal_px,
+          .fy = focal_px,
+          .cx = 0.5 * (camera.width - 1),
+          .cy = 0.5 * (camera.height - 1)};
+}
+
+}  // namespace pons::world

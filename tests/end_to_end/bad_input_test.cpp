@@ -1,0 +1,113 @@
+// Whatever is wrong, a person gets one line that says what, where and how to mend it; exit code 2; nothing half-written.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kHeader = "parcel_id,destination,kind,length_m,width_m,height_m,mass_kg,priority\n";
+
+class BadInput : public ::testing::Test {
+ protected:
+  // One line on the error stream with all of `parts`, code 2, and no file left behind.
+  void expect_refused(std::vector<std::string> arguments, const std::vector<std::string>& parts,
+                      const std::vector<std::string>& environment = {}) {
+    const auto before = files();
+    const Finished run = run_pons(arguments, environment);
+    EXPECT_EQ(run.code, 2) << run.out << run.err;
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    EXPECT_EQ(run.err.rfind("pons: ", 0), 0U) << run.err;
+    for (const std::string& part : parts) EXPECT_THAT(run.err, HasSubstr(part));
+    EXPECT_EQ(files(), before);
+  }
+
+  void expect_manifest_refused(const std::string& text, const std::vector<std::string>& parts) {
+    write_text(folder_ / "orders.csv", text);
+    expect_refused({"run", "parcel_cell", "--manifest", folder_ / "orders.csv", "--journal", folder_ / "j.db", "--report",
+                    folder_ / "r.json"},
+                   parts);
+  }
+
+  std::vector<std::string> files() {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  Folder folder_;
+};
+
+TEST_F(BadInput, Manifests) {
+  const std::string good = "P1,chute_1,box,0.2,0.15,0.1,1.0,50\n";
+  expect_manifest_refused("", {"orders.csv", "empty"});
+  expect_manifest_refused(kHeader, {"orders.csv"});
+  expect_manifest_refused("parcel_id,destination\nP1,chute_1\n", {"orders.csv:1", "kind"});
+  expect_manifest_refused(kHeader + good + good, {"orders.csv:3", "P1"});
+  expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,-1,50\n", {"orders.csv:2", "mass_kg"});
+  expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,nan,0.15,0.1,1,50\n", {"orders.csv:2", "length_m"});
+  expect_manifest_refused(std::string(kHeader) + "P1,chute_99,box,0.2,0.15,0.1,1,50\n", {"orders.csv:2", "chute_99"});
+  expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,1,50\n\xff\xfe,", {"orders.csv", "UTF-8"});
+}
+
+TEST_F(BadInput, AHundredMegabyteLine) {
+  {
+    std::ofstream out(folder_ / "orders.csv", std::ios::binary);
+    const std::string chunk(1 << 20, 'x');
+    out << kHeader;
+    for (int i = 0; i < 100; ++i) out << chunk;
+  }
+  expect_refused({"run", "parcel_cell", "--manifest", folder_ / "orders.csv"}, {"orders.csv:2"});
+}
+
+TEST_F(BadInput, NamesAndNumbers) {
+  expect_refused({"run", "no_such_world"}, {"no_such_world", "parcel_cell"});
+  expect_refused({"run", "parcel_cell", "--parcels", "0"}, {"0"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1000000000"}, {"1000000000"});
+  expect_refused({"run", "parcel_cell", "--parcels", "many"}, {"--parcels"});
+  expect_refused({"run", "parcel_cell", "--manifest", folder_ / "none.csv"}, {"none.csv"});
+  expect_refused({"skills", "fly"}, {"fly"});
+  expect_refused({"no_such_command"}, {"no_such_command"});
+  expect_refused({"run", "parcel_cell", "--lockstep", "--realtime"}, {"--lockstep"});
+}
+
+TEST_F(BadInput, PlacesThatCannotBeWritten) {
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", folder_ / "none/r.json"}, {"none"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--picture", folder_.path()}, {"folder"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "none/j.db"}, {"none"});
+}
+
+TEST_F(BadInput, JournalsThatAreNotOurs) {
+  write_text(folder_ / "j.db", "this is not a database, however long the text may be");
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "j.db"}, {"j.db"});
+  expect_refused({"task", "list", "--journal", folder_ / "j.db"}, {"j.db"});
+  expect_refused({"task", "list", "--journal", folder_ / "none.db"}, {"none.db"});
+  expect_refused({"task", "list", "--socket", folder_ / "none.sock"}, {"none.sock"});
+}
+
+TEST_F(BadInput, BrokenWorlds) {
+  std::filesystem::create_directories(folder_ / "worlds/broken");
+  const std::vector<std::string> here{"PONS_WORLDS=" + (folder_ / "worlds").string()};
+  write_text(folder_ / "worlds/broken/world.yaml", "name: [unclosed\n");
+  expect_refused({"run", "broken"}, {"world.yaml"}, here);
+  write_text(folder_ / "worlds/broken/world.yaml", "name: broken\n");
+  expect_refused({"run", "broken"}, {"world.yaml"}, here);
+}
+
+TEST_F(BadInput, ABrokenScene) {
+  const auto worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  write_text(worlds / "parcel_cell/scene.xml", "<mujoco><worldbody><geom type='spoon'/></worldbody></mujoco>");
+  expect_refused({"run", "parcel_cell", "--parcels", "1"}, {"scene.xml"}, {"PONS_WORLDS=" + worlds.string()});
+}
+
+}  // namespace
+}  // namespace pons::tests

@@ -1,0 +1,36 @@
+// Runs the program as a person would, and reads what it left.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace pons::tests {
+
+struct Finished {
+  int code = -1;
+  std::string out, err;
+};
+
+// `arguments` are handed over as they are, through no shell. `environment` entries ("NAME=value") are added.
+[[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
+
+// A folder of its own for one test, gone with it.
+class Folder {
+ public:
+  Folder();
+  ~Folder();
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+[[nodiscard]] nlohmann::json read_json(const std::filesystem::path& file);
+void write_text(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace pons::tests
