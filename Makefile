@@ -6,7 +6,7 @@ PARCELS ?= 200
 SEED ?= 1
 SOURCES = git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
 # What reads bytes from outside or handles memory by hand; the rest runs under the sanitizers with make asan.
-ASAN_QUICK = record_test task_test world_test link_test
+ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
 
 .PHONY: help setup build demo test check format asan asan-quick tsan bench clean
 
@@ -63,9 +63,9 @@ tsan: setup ## all tests under the thread sanitizer
 	ctest --preset tsan --parallel 2 --no-tests=error
 
 bench: build ## run the benchmarks; docs/figures.md says which figure is whose
-	@found=0; for program in build/release/bench/*_bench; do \
-	  [ -x "$$program" ] || continue; found=1; echo "== $$program"; "$$program" || exit 1; done; \
-	  [ $$found = 1 ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }
+	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \
+	  [ -n "$$programs" ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }; \
+	  for program in $$programs; do echo "== $$program"; "$$program" || exit 1; done
 
 clean: ## remove what was built (keeps .venv)
 	rm -rf build install log

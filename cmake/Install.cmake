@@ -1,13 +1,14 @@
 # bin/pons, its worlds, and the wheels' libraries beside them, so that what is installed does not need .venv.
 install(DIRECTORY worlds/ DESTINATION share/pons/worlds)
 install(FILES package.xml LICENSE NOTICE DESTINATION share/pons)
-install(FILES docs/schema/report.json DESTINATION share/pons/schema)
+install(DIRECTORY docs/schema/ DESTINATION share/pons/schema)
 
 if(TARGET pons)
-  set_target_properties(pons PROPERTIES INSTALL_RPATH "$ORIGIN/../lib/pons")
+  # A folder named lib: some of the wheels' libraries look for the others in their own folder, some in ../lib.
+  set_target_properties(pons PROPERTIES INSTALL_RPATH "$ORIGIN/../lib/pons/lib")
   install(TARGETS pons RUNTIME_DEPENDENCY_SET pons_libraries RUNTIME DESTINATION bin)
   install(RUNTIME_DEPENDENCY_SET pons_libraries
     POST_EXCLUDE_REGEXES "^/lib/" "^/lib64/" "^/usr/lib/"
     DIRECTORIES "${PONS_PREFIX}/lib"
-    LIBRARY DESTINATION lib/pons)
+    LIBRARY DESTINATION lib/pons/lib)
 endif()

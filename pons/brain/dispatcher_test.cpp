@@ -1,0 +1,155 @@
+#include "pons/brain/dispatcher.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace pons::brain {
+namespace {
+
+Time at(double seconds) { return Time(from_s(seconds)); }
+
+// A camera 1 m above the belt at x = 0 looks straight down and sees 0.5 m to each side along it.
+world::World small_world() {
+  world::World world;
+  world.belt = {
+      .x_start_m = -2, .x_end_m = 3, .width_m = 0.5, .surface_z_m = 0.5, .speed_m_s = 0.5, .speed_variation = 0.3};
+  world.belt.pick_x_min_m = 0.5;
+  world.belt.pick_x_max_m = 2;
+  world::CameraSpec camera;
+  camera.name = "overhead";
+  camera.watches = "belt";
+  camera.reads_labels = true;
+  camera.width = 1280;
+  camera.height = 960;
+  camera.fovy_rad = 2 * std::atan(0.375);
+  camera.latency_s = 0.1;
+  camera.period_s = 0.1;
+  // Optical z down, image x along the belt.
+  camera.world_from_optical.linear() = Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()).toRotationMatrix();
+  camera.world_from_optical.translation() = Vector3(0, 0, 1.5);
+  world.cameras.push_back(camera);
+  world.rules.max_size_m = 0.4;
+  return world;
+}
+
+ObjectBelief parcel(std::uint32_t track, double x_m, const std::string& code = "") {
+  ObjectBelief belief;
+  belief.track = track;
+  belief.world_from_top.translation() = Vector3(x_m, 0, 0.6);
+  belief.velocity_m_s = Vector3(0.5, 0, 0);
+  belief.size_m = Vector3(0.3, 0.2, 0.1);
+  belief.frames_seen = 5;
+  belief.code = code;
+  return belief;
+}
+
+class DispatcherTest : public testing::Test {
+ protected:
+  world::World world_ = small_world();
+  Dispatcher dispatcher_{{{"P1", {"chute_3", 20}}, {"P2", {"chute_1", 90}}, {"P3", {"chute_2", 0}}}, world_};
+
+  [[nodiscard]] std::string only_reason(const Decisions& decisions) const {
+    EXPECT_TRUE(decisions.tasks.empty());
+    EXPECT_EQ(decisions.rides.size(), 1u);
+    return decisions.rides.empty() ? "" : decisions.rides[0].reason;
+  }
+};
+
+TEST_F(DispatcherTest, AsksForAParcelOnce) {
+  const Decisions decisions = dispatcher_.observe({parcel(1, 0, "P1")}, at(10));
+  ASSERT_EQ(decisions.tasks.size(), 1u);
+  const auto task = task::task_from(decisions.tasks[0]);
+  ASSERT_TRUE(task) << task.error().line();
+  EXPECT_EQ(task->id, "P1");
+  EXPECT_EQ(task->priority, kOrdinaryPriority);
+  ASSERT_EQ(task->steps.size(), 2u);
+  EXPECT_EQ(task->steps[0].skill, "pick");
+  EXPECT_EQ(task->steps[0].arguments, (Json{{"object", "P1"}}));
+  EXPECT_EQ(task->steps[1].skill, "place");
+  EXPECT_EQ(task->steps[1].arguments, (Json{{"place", "chute_3"}, {"object", "P1"}}));
+  EXPECT_TRUE(decisions.rides.empty());
+  const Decisions again = dispatcher_.observe({parcel(1, 0.1, "P1")}, at(10.2));
+  EXPECT_TRUE(again.tasks.empty() && again.rides.empty());
+}
+
+TEST_F(DispatcherTest, TheDeadlineIsLaterThanAnyBeltSpeedMayBring) {
+  const auto deadline_s = [this](std::uint32_t track, double x_m, double speed, const std::string& code) {
+    ObjectBelief belief = parcel(track, x_m, code);
+    belief.velocity_m_s.x() = speed;
+    return dispatcher_.observe({belief}, at(10)).tasks.at(0).at("deadline_s").get<double>();
+  };
+  const double fast_s = deadline_s(1, 0, 0.65, "P1"), ahead_s = deadline_s(2, 0.5, 0.65, "P2");
+  EXPECT_GE(fast_s, 10 + 2 / 0.35);
+  EXPECT_LT(ahead_s, fast_s);
+}
+
+TEST_F(DispatcherTest, ExpressGoesFirst) {
+  const Decisions decisions = dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, 0, "P2")}, at(0));
+  ASSERT_EQ(decisions.tasks.size(), 2u);
+  EXPECT_EQ(decisions.tasks[1].at("priority"), 90);
+}
+
+TEST_F(DispatcherTest, WaitsForAFewFrames) {
+  ObjectBelief belief = parcel(1, 0, "P1");
+  belief.frames_seen = 2;
+  EXPECT_TRUE(dispatcher_.observe({belief}, at(0)).tasks.empty());
+  belief.frames_seen = 3;
+  EXPECT_EQ(dispatcher_.observe({belief}, at(0.1)).tasks.size(), 1u);
+}
+
+TEST_F(DispatcherTest, LetsParcelsWithoutALabelRideOnceTheCameraIsPassed) {
+  EXPECT_NEAR(dispatcher_.label_view_end_m(), 0.5, 1e-9);
+  // Half its length may still be in view, and a frame may be on the way for 0.2 s.
+  EXPECT_TRUE(dispatcher_.observe({parcel(1, 0.74)}, at(0)).rides.empty());
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(1, 0.76)}, at(0))), kRideUnreadable);
+  const Decisions again = dispatcher_.observe({parcel(1, 1, "P1")}, at(1));
+  EXPECT_TRUE(again.tasks.empty() && again.rides.empty());
+}
+
+TEST_F(DispatcherTest, LetsStrangersGiantsAndLatecomersRide) {
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(1, 0, "P9")}, at(0))), kRideUnknown);
+  ObjectBelief giant = parcel(2, 0, "P1");
+  giant.size_m.x() = 0.5;
+  EXPECT_EQ(only_reason(dispatcher_.observe({giant}, at(0))), kRideTooLarge);
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(3, 2.1, "P2")}, at(0))), kRideLate);
+  EXPECT_EQ(dispatcher_.unseen(), std::vector<std::string>{"P3"});
+}
+
+TEST_F(DispatcherTest, TwoParcelsWithOneCodeAreSortedOnce) {
+  const Decisions decisions = dispatcher_.observe({parcel(1, 0.3, "P1"), parcel(2, 0, "P1")}, at(0));
+  EXPECT_EQ(decisions.tasks.size(), 1u);
+  ASSERT_EQ(decisions.rides.size(), 1u);
+  EXPECT_EQ(decisions.rides[0].track, 2u);
+  EXPECT_EQ(decisions.rides[0].reason, kRideTwice);
+}
+
+TEST_F(DispatcherTest, ALostTrackThatComesBackKeepsItsTask) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.3, "P1")}, at(0)).tasks.size(), 1u);
+  const Decisions back = dispatcher_.observe({parcel(7, 0.4, "P1")}, at(0.2));
+  EXPECT_TRUE(back.tasks.empty() && back.rides.empty());
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(7, 0.5, "P1"), parcel(8, 0, "P1")}, at(0.4))), kRideTwice);
+}
+
+TEST_F(DispatcherTest, ACopyOfASortedParcelRides) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.3, "P1")}, at(0)).tasks.size(), 1u);
+  dispatcher_.heard("P1", task::Outcome::kSucceeded);
+  dispatcher_.heard("stranger", task::Outcome::kSucceeded);
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(2, 0, "P1")}, at(9))), kRideTwice);
+}
+
+TEST_F(DispatcherTest, NeverAsksForWhatTheJournalHas) {
+  dispatcher_.already("P1");
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(1, 0, "P1")}, at(0))), kRideTwice);
+}
+
+TEST_F(DispatcherTest, WithoutALabelCameraTheReachIsTheEnd) {
+  world::World blind = small_world();
+  blind.cameras.clear();
+  const Dispatcher dispatcher({}, blind);
+  EXPECT_EQ(dispatcher.label_view_end_m(), 2);
+}
+
+}  // namespace
+}  // namespace pons::brain

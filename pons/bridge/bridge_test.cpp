@@ -43,7 +43,8 @@ class BridgeTest : public testing::Test {
   }
   std::vector<std::string> kinds(const std::string& id) {
     std::vector<std::string> result;
-    for (const Event& event : journal_->events(id).value()) result.push_back(event.kind);
+    const auto events = journal_->events(id).value();
+    for (const Event& event : events) result.push_back(event.kind);
     return result;
   }
   std::optional<OutcomeRecord> recorded(const std::string& id) {
@@ -209,9 +210,9 @@ TEST_F(BridgeTest, StartedIsInTheJournalBeforeTheSkillMoves) {
 
 TEST_F(BridgeTest, RecoversWhatAnEarlierRunLeft) {
   ASSERT_TRUE(submit("running", "slow"));
+  bridge_->tick(now_);
   ASSERT_TRUE(submit("queued", "pick"));
   ASSERT_TRUE(submit("due", "pick", R"(,"deadline_s":500)"));
-  bridge_->tick(now_);
   reopen();
   EXPECT_EQ(bridge_->recover(now_).value(), 1u);
   EXPECT_EQ(bridge_->recover(now_).value(), 0u);
@@ -291,11 +292,12 @@ std::string mutated(const std::string& text, Random& random) {
 TEST_F(BridgeTest, SurvivesAHostileBrain) {
   journal_ = std::move(*Journal::open(":memory:"));
   bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
-  const std::string good =
-      R"({"id":"P1","priority":50,"deadline_s":100.5,"steps":[{"skill":"pick","arguments":{"object":"P1"}},{"skill":"place"}]})";
   Random random(11);
   std::int64_t accepted = 0, refused = 0;
   for (int i = 0; i < 20'000; ++i) {
+    const std::string good = fmt::format(
+        R"({{"id":"P{}","priority":50,"deadline_s":100.5,"steps":[{{"skill":"pick","arguments":{{"object":"P1"}}}}]}})",
+        i);
     const auto admission = bridge_->submit(mutated(good, random), now_);
     if (admission) {
       accepted += admission->accepted == Accepted::kNew ? 1 : 0;

@@ -12,7 +12,7 @@ struct Gains {
   double position_1_s2 = 4800;
   double speed_1_s = 120;
   double integral_1_s3 = 64'000;
-  double integral_max_rad_s2 = 30;  // what the integral may ask for, so that it cannot wind up against an obstacle
+  double integral_max_rad_s2 = 120;  // what the integral may ask for, so that it cannot wind up against an obstacle
 };
 
 // tau = ID(q_d, v_d, a_d + Kp e + Kd ė + Ki ∫e) with the model at the commanded state (Luh, Walker, Paul 1980): without

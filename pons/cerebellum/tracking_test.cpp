@@ -105,7 +105,7 @@ TEST(Payload, IsCarriedToTheMilliradianWhenItWasTold) {
   const double told = move_with(payload, payload), untold = move_with(payload, {});
   std::printf("payload of 1.5 kg: worst error %.2f mrad when told, %.2f mrad when not\n", 1e3 * told, 1e3 * untold);
   EXPECT_LT(told, 1e-3);
-  EXPECT_LT(untold, 0.05);
+  EXPECT_GT(untold, 10 * told);  // so it is worth telling
 }
 
 TEST(Step, AllocatesNothingFromStartToEmergencyStop) {

@@ -145,9 +145,8 @@ bool LineServer::serve(std::uint64_t id, Client& client, short events, Clock::ti
   if ((events & POLLIN) != 0 && !read(client)) return false;
   if (!client.out.empty() && !write(client)) return false;
   if (client.out.empty()) {
-    if (client.closing) return false;
-    if (!client.waiting) deliver_line(id, client);
-    if (client.ended && !client.waiting && client.out.empty()) return false;
+    if (!client.closing && !client.waiting) deliver_line(id, client);
+    if ((client.closing || client.ended) && !client.waiting && client.out.empty()) return false;
   }
   // Half a line gets its patience from its first byte on, an answer from its last progress on.
   const bool owes = !client.out.empty() || (!client.waiting && !client.in.empty());

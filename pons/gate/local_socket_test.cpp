@@ -1,0 +1,262 @@
+#include "pons/gate/local_socket.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <thread>
+
+#include "pons/gate/unix_address.hpp"
+
+namespace pons::gate {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+class LocalSocketTest : public testing::Test {
+ protected:
+  LocalSocketTest() {
+    std::string name = (fs::temp_directory_path() / "pons-XXXXXX").string();
+    EXPECT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    path_ = folder_ / "pons.sock";
+  }
+  ~LocalSocketTest() override { fs::remove_all(folder_); }
+
+  std::unique_ptr<LocalSocket> listen(SocketLimits limits = {}) {
+    auto socket = LocalSocket::listen(path_, limits);
+    EXPECT_TRUE(socket) << socket.error().line();
+    return socket ? std::move(*socket) : nullptr;
+  }
+  // What has come, once something has.
+  static std::vector<Request> wait_for_requests(LocalSocket& socket) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (std::chrono::steady_clock::now() < until) {
+      auto requests = socket.poll();
+      if (!requests.empty()) return requests;
+      std::this_thread::yield();
+    }
+    ADD_FAILURE() << "nothing came";
+    return {};
+  }
+
+  fs::path folder_, path_;
+};
+
+// A client that does what the test wants, good or bad.
+class RawClient {
+ public:
+  explicit RawClient(const fs::path& path) : socket_(unix_socket()) {
+    EXPECT_EQ(connect_to(socket_, unix_address(path).value()), 0);
+  }
+  // How much the other side took at once.
+  std::size_t send(std::string_view text) const {
+    const ssize_t sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL);
+    return sent < 0 ? 0 : static_cast<std::size_t>(sent);
+  }
+  void end_sending() const { EXPECT_EQ(::shutdown(socket_.get(), SHUT_WR), 0); }
+  void wait_until_dropped() const {
+    pollfd polled{socket_.get(), 0, 0};
+    EXPECT_EQ(::poll(&polled, 1, 20'000), 1);
+    EXPECT_NE(polled.revents & POLLHUP, 0);
+  }
+  // One line without its end; empty when the other side has closed.
+  std::string line() {
+    for (;;) {
+      if (const auto end = text_.find('\n'); end != text_.npos) {
+        std::string result = text_.substr(0, end);
+        text_.erase(0, end + 1);
+        return result;
+      }
+      pollfd polled{socket_.get(), POLLIN, 0};
+      if (::poll(&polled, 1, 20'000) <= 0) {
+        ADD_FAILURE() << "no line";
+        return "";
+      }
+      char buffer[4096];
+      const ssize_t got = ::recv(socket_.get(), buffer, sizeof buffer, 0);
+      if (got <= 0) return "";
+      text_.append(buffer, static_cast<std::size_t>(got));
+    }
+  }
+
+ private:
+  Descriptor socket_;
+  std::string text_;
+};
+
+TEST_F(LocalSocketTest, AnswersARequest) {
+  const auto socket = listen();
+  Expected<Json> answer = fail("none");
+  std::thread client([&] { answer = ask(path_, {{"op", "list"}}); });
+  for (const Request& request : wait_for_requests(*socket)) {
+    EXPECT_EQ(request.text, R"({"op":"list"})");
+    request.reply({{"ok", true}});
+    request.reply({{"ok", false}});
+  }
+  client.join();
+  ASSERT_TRUE(answer) << answer.error().line();
+  EXPECT_EQ(*answer, (Json{{"ok", true}}));
+}
+
+TEST_F(LocalSocketTest, KeepsEachClientsOrder) {
+  const auto socket = listen();
+  RawClient one(path_), two(path_);
+  one.send("a\n\nb\r\nc");
+  two.send("x\n");
+  one.end_sending();
+  std::string order;
+  while (order.size() < 4) {
+    for (const Request& request : wait_for_requests(*socket)) {
+      order += request.text;
+      request.reply(request.text);
+    }
+  }
+  EXPECT_EQ(one.line(), "\"a\"");
+  EXPECT_EQ(one.line(), "\"b\"");
+  EXPECT_EQ(one.line(), "\"c\"");
+  EXPECT_EQ(one.line(), "");
+  EXPECT_EQ(two.line(), "\"x\"");
+}
+
+TEST_F(LocalSocketTest, OnlyTheOwnerMayConnectAndTheFileGoesWithIt) {
+  auto socket = listen();
+  struct stat status{};
+  ASSERT_EQ(::lstat(path_.c_str(), &status), 0);
+  EXPECT_TRUE(S_ISSOCK(status.st_mode));
+  EXPECT_EQ(status.st_mode & 0777, 0600u);
+  socket.reset();
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(LocalSocketTest, ReplacesAStaleSocketOnly) {
+  {
+    const Descriptor stale = unix_socket();
+    const sockaddr_un address = unix_address(path_).value();
+    ASSERT_EQ(::bind(stale.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  ASSERT_TRUE(fs::exists(path_));
+  const auto socket = listen();
+  EXPECT_EQ(LocalSocket::listen(path_).error().what, "this socket is in use");
+
+  std::ofstream(folder_ / "file") << "x";
+  EXPECT_EQ(LocalSocket::listen(folder_ / "file").error().what, "this file is not a socket");
+  EXPECT_TRUE(fs::exists(folder_ / "file"));
+  EXPECT_NE(LocalSocket::listen(folder_ / "none/pons.sock").error().what.find("No such file"), std::string::npos);
+  EXPECT_NE(LocalSocket::listen(folder_ / std::string(200, 'x')).error().what.find("1 to 107 bytes"),
+            std::string::npos);
+}
+
+TEST_F(LocalSocketTest, RefusesLongLines) {
+  const auto socket = listen({.line_bytes = 100});
+  RawClient exact(path_), above(path_), endless(path_);
+  exact.send(std::string(100, 'a') + "\n");
+  EXPECT_EQ(wait_for_requests(*socket).at(0).text.size(), 100u);
+  above.send(std::string(101, 'a') + "\n");
+  EXPECT_EQ(above.line(), R"({"error":"a line has at most 100 bytes","ok":false})");
+  EXPECT_EQ(above.line(), "");
+  endless.send(std::string(5000, 'a'));
+  EXPECT_EQ(endless.line(), R"({"error":"a line has at most 100 bytes","ok":false})");
+  EXPECT_TRUE(socket->poll().empty());
+}
+
+TEST_F(LocalSocketTest, RefusesOneClientTooManyUntilOneLeaves) {
+  const auto socket = listen({.clients = 2});
+  auto first = std::make_unique<RawClient>(path_);
+  RawClient second(path_);
+  RawClient third(path_);
+  EXPECT_EQ(third.line(), R"({"error":"2 clients are connected already","ok":false})");
+  first.reset();
+  Expected<Json> answer = fail("none");
+  // The server sees the first one leave before it sees this one come: both wake it, and it looks at clients first.
+  std::thread client([&] { answer = ask(path_, "hello"); });
+  wait_for_requests(*socket).at(0).reply("hello");
+  client.join();
+  EXPECT_TRUE(answer);
+}
+
+TEST_F(LocalSocketTest, DropsAClientThatSendsHalfALine) {
+  const auto socket = listen({.patience = milliseconds(50)});
+  RawClient half(path_);
+  half.send("{\"op\":");
+  EXPECT_EQ(half.line(), "");
+}
+
+TEST_F(LocalSocketTest, DropsAClientThatDoesNotRead) {
+  const auto socket = listen({.patience = milliseconds(50)});
+  RawClient lazy(path_);
+  lazy.send("a\n");
+  wait_for_requests(*socket).at(0).reply(std::string(8'000'000, 'x'));
+  lazy.wait_until_dropped();
+  EXPECT_EQ(lazy.line(), "");
+}
+
+TEST_F(LocalSocketTest, AnswersThatAreTooLargeBecomeAnError) {
+  const auto socket = listen({.reply_bytes = 1000});
+  RawClient client(path_);
+  client.send("a\n");
+  wait_for_requests(*socket).at(0).reply(std::string(2000, 'x'));
+  EXPECT_EQ(client.line(), R"({"error":"the answer has 2003 bytes, more than 1000","ok":false})");
+}
+
+TEST_F(LocalSocketTest, CarriesLargeAnswers) {
+  const auto socket = listen();
+  Expected<Json> answer = fail("none");
+  std::thread client([&] { answer = ask(path_, "all"); });
+  wait_for_requests(*socket).at(0).reply(std::string(10'000'000, 'x'));
+  client.join();
+  ASSERT_TRUE(answer) << answer.error().line();
+  EXPECT_EQ(answer->get<std::string>().size(), 10'000'000u);
+}
+
+TEST_F(LocalSocketTest, AnAnswerToSomebodyGoneIsDropped) {
+  auto socket = listen();
+  std::vector<Request> requests;
+  {
+    const RawClient client(path_);
+    client.send("a\n");
+    requests = wait_for_requests(*socket);
+  }
+  requests.at(0).reply("late");
+  socket.reset();
+  requests.at(0).reply("later");
+  EXPECT_EQ(ask(path_, "x").error().what, "nobody listens there");
+}
+
+TEST_F(LocalSocketTest, AskGivesUpInTime) {
+  const auto socket = listen();
+  EXPECT_EQ(ask(path_, "x", milliseconds(30)).error().what, "no answer in time");
+  EXPECT_EQ(ask(folder_ / "none", "x").error().what, "nobody listens there");
+}
+
+TEST_F(LocalSocketTest, ServesManyAtOnce) {
+  const auto socket = listen();
+  std::vector<std::thread> threads;
+  std::array<int, 8> right{};
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    threads.emplace_back([this, i, &right] {
+      for (int n = 0; n < 50; ++n) {
+        const Json question{{"client", i}, {"n", n}};
+        const auto answer = ask(path_, question);
+        right[i] += answer && *answer == question ? 1 : 0;
+      }
+    });
+  }
+  for (int answered = 0; answered < 400;) {
+    for (const Request& request : wait_for_requests(*socket)) {
+      request.reply(Json::parse(request.text));
+      ++answered;
+    }
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const int count : right) EXPECT_EQ(count, 50);
+}
+
+}  // namespace
+}  // namespace pons::gate

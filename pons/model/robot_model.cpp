@@ -3,7 +3,7 @@
 #include <console_bridge/console.h>
 #include <fmt/format.h>
 
-#include <pinocchio/algorithm/aba.hpp>
+#include <Eigen/Cholesky>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
@@ -20,6 +20,9 @@
 
 namespace pons::model {
 namespace {
+
+using AxisMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, static_cast<int>(kMaxAxes),
+                                 static_cast<int>(kMaxAxes)>;
 
 constexpr double kGravityMS2 = 9.81;
 
@@ -59,21 +62,18 @@ struct RobotModel::Impl final : Chain {
   world::Robot robot;
   pinocchio::Model model;
   pinocchio::Data data;
-  Pose base_from_world = Pose::Identity();
-  pinocchio::FrameIndex flange = 0;
   pinocchio::JointIndex last_joint = 0;
   pinocchio::SE3 last_joint_from_flange;
   pinocchio::SE3 last_joint_from_tip;
   pinocchio::Inertia last_inertia;  // last link and tool, without payload
   std::vector<pinocchio::FrameIndex> capsule_frames;
-  Eigen::VectorXd q, v, a, tau;
+  Eigen::VectorXd q, v, a;
 
   Impl(world::Robot robot_in, pinocchio::Model model_in)
       : robot(std::move(robot_in)), model(std::move(model_in)), data(model) {
-    base_from_world = robot.world_from_base.inverse();
-    model.gravity.linear() = base_from_world.linear() * Vector3(0, 0, -kGravityMS2);
+    model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravityMS2);
     model.armature.setConstant(kRotorInertiaKgM2);
-    flange = model.getFrameId(robot.flange_link);
+    const auto flange = model.getFrameId(robot.flange_link);
     last_joint = model.frames[flange].parentJoint;
     last_joint_from_flange = model.frames[flange].placement;
     last_joint_from_tip = last_joint_from_flange * se3_of(robot.tool.flange_from_tip);
@@ -82,8 +82,24 @@ struct RobotModel::Impl final : Chain {
     model.inertias[last_joint] = last_inertia;
     for (const auto& capsule : robot.capsules)
       capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
-    q = v = a = tau = Eigen::VectorXd::Zero(model.nv);
+    q = v = a = Eigen::VectorXd::Zero(model.nv);
   }
+
+  // Copies what was set up and makes its own scratch pad.
+  Impl(const Impl& other)
+      : robot(other.robot),
+        model(other.model),
+        data(model),
+        last_joint(other.last_joint),
+        last_joint_from_flange(other.last_joint_from_flange),
+        last_joint_from_tip(other.last_joint_from_tip),
+        last_inertia(other.last_inertia),
+        capsule_frames(other.capsule_frames),
+        q(other.q),
+        v(other.v),
+        a(other.a) {}
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() override = default;
 
   // The payload joins the inertia of the last moving link.
   void carry(const Payload& payload) PONS_NONBLOCKING {
@@ -241,9 +257,16 @@ void RobotModel::forward_dynamics(const AxisVector& q, const AxisVector& speed, 
   impl_->carry(payload);
   impl_->q = q;
   impl_->v = speed;
-  impl_->tau = torque_nm;
-  acceleration =
-      pinocchio::aba(impl_->model, impl_->data, impl_->q, impl_->v, impl_->tau, pinocchio::Convention::LOCAL);
+  // Pinocchio's articulated-body algorithm costs a minute of compiling; for eight axes this is as good.
+  impl_->a.setZero();
+  const AxisVector bias = pinocchio::rnea(impl_->model, impl_->data, impl_->q, impl_->v, impl_->a);
+  AxisMatrix mass(axes(), axes());
+  for (int axis = 0; axis < axes(); ++axis) {
+    impl_->a.setZero();
+    impl_->a[axis] = 1;
+    mass.col(axis) = pinocchio::rnea(impl_->model, impl_->data, impl_->q, impl_->v, impl_->a) - bias;
+  }
+  acceleration = mass.ldlt().solve(torque_nm - bias);
 }
 
 }  // namespace pons::model

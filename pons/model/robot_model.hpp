@@ -58,7 +58,7 @@ class RobotModel {
   // Torques (N·m) for the asked acceleration at (q, speed), tool and payload included: recursive Newton-Euler.
   void inverse_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& acceleration,
                         const Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING;
-  // The reverse: the acceleration that these torques cause, by the articulated-body algorithm (Featherstone 1983).
+  // The reverse: the acceleration that these torques cause, by the mass matrix (Walker and Orin 1982, method 1).
   void forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm,
                         const Payload& payload, AxisVector& acceleration) PONS_NONBLOCKING;
 

@@ -14,31 +14,32 @@ namespace {
 // A start may lie this much beyond a limit, relatively: what sampling a motion that used the limit fully may leave.
 constexpr double kSlack = 1e-6;
 constexpr double kPositionSlack = 1e-9;  // rad
-constexpr Duration kEndSlack{3};            // profiles end up to this much before their piece does
 constexpr double kLongest_s = 3600;      // what takes longer is a mistake
+// Added to a piece that does not end at rest: near the fastest duration the position in reach changes so steeply with
+// time that what a search leaves would show.
+constexpr double kMargin_s = 10e-9;
 
 Expected<void> check_value(double value, double low, double high, const char* what, const char* name,
                            Eigen::Index axis) {
   if (value >= low && value <= high) return {};
-  return fail(fmt::format("{} {:.9g} of axis {} is not within [{:.9g}, {:.9g}]", what, value, axis + 1, low, high), name,
-              "plan within the robot's limits");
+  return fail(fmt::format("{} {:.9g} of axis {} is not within [{:.9g}, {:.9g}]", what, value, axis + 1, low, high),
+              name, "plan within the robot's limits");
 }
 
 }  // namespace
 
 AxisBounds inner_bounds(const AxisLimits& limits, Eigen::Index axis) {
   const double jerk = limits.jerk_rad_s3[axis] * (1 - 1e-10);
-  return {limits.speed_rad_s[axis] * (1 - 1e-10), std::max(limits.acceleration_rad_s2[axis] - 1e-9 * jerk,
-                                                           limits.acceleration_rad_s2[axis] / 2), jerk};
+  return {limits.speed_rad_s[axis] * (1 - 1e-10),
+          std::max(limits.acceleration_rad_s2[axis] - 1e-9 * jerk, limits.acceleration_rad_s2[axis] / 2), jerk};
 }
 
 Expected<void> check_limits(const AxisLimits& limits, Eigen::Index axes) {
   if (axes < 1 || axes > static_cast<Eigen::Index>(kMaxAxes)) {
     return fail(fmt::format("{} axes", axes), "motion", fmt::format("plan for 1 to {} axes", kMaxAxes));
   }
-  const std::pair<const AxisVector*, const char*> rates[] = {{&limits.speed_rad_s, "speed"},
-                                                            {&limits.acceleration_rad_s2, "acceleration"},
-                                                            {&limits.jerk_rad_s3, "jerk"}};
+  const std::pair<const AxisVector*, const char*> rates[] = {
+      {&limits.speed_rad_s, "speed"}, {&limits.acceleration_rad_s2, "acceleration"}, {&limits.jerk_rad_s3, "jerk"}};
   for (const auto& [vector, what] : rates) {
     if (vector->size() != axes) {
       return fail(fmt::format("{} limits for {} axes, not {}", what, vector->size(), axes), "limits",
@@ -64,8 +65,8 @@ Expected<void> check_start(const AxisState& start, const AxisLimits& limits) {
     const double v = limits.speed_rad_s[i] * (1 + kSlack), a = limits.acceleration_rad_s2[i] * (1 + kSlack);
     const double coasting =
         coasting_speed({start.position[i], start.speed[i], start.acceleration[i]}, limits.jerk_rad_s3[i]);
-    auto ok = check_value(start.position[i], limits.position_min[i] - kSlack, limits.position_max[i] + kSlack, "position",
-                          "start", i);
+    auto ok = check_value(start.position[i], limits.position_min[i] - kSlack, limits.position_max[i] + kSlack,
+                          "position", "start", i);
     if (ok) ok = check_value(start.speed[i], -v, v, "speed", "start", i);
     if (ok) ok = check_value(start.acceleration[i], -a, a, "acceleration", "start", i);
     if (ok) ok = check_value(coasting, -v, v, "the speed ahead", "start", i);
@@ -83,8 +84,7 @@ Expected<void> check_waypoint(const Waypoint& waypoint, const char* name, const 
   }
   for (Eigen::Index i = 0; i < axes; ++i) {
     const double v = limits.speed_rad_s[i] * (1 + kPositionSlack);
-    auto ok =
-        check_value(waypoint.position[i], limits.position_min[i], limits.position_max[i], "position", name, i);
+    auto ok = check_value(waypoint.position[i], limits.position_min[i], limits.position_max[i], "position", name, i);
     if (ok) ok = check_value(waypoint.speed[i], -v, v, "speed", name, i);
     if (!ok) return ok;
   }
@@ -96,6 +96,10 @@ Duration ceil_ns(double seconds) { return Duration(static_cast<std::int64_t>(std
 double common_duration_s(const Piece& piece) {
   double duration = 0;
   for (std::size_t i = 0; i < piece.count; ++i) duration = std::max(duration, fastest_duration_s(piece.axes[i]));
+  const auto flies_on = [](const AxisPiece& axis) { return axis.to.speed != 0 || axis.to.acceleration != 0; };
+  if (std::any_of(piece.axes.begin(), piece.axes.begin() + static_cast<std::ptrdiff_t>(piece.count), flies_on)) {
+    duration += kMargin_s;
+  }
   // Each axis has one blocked interval at most, and durations only grow: so this ends.
   for (std::size_t round = 0; round <= piece.count; ++round) {
     if (!(duration < kLongest_s)) return std::numeric_limits<double>::infinity();
@@ -103,8 +107,7 @@ double common_duration_s(const Piece& piece) {
     const double before = duration;
     for (std::size_t i = 0; i < piece.count; ++i) {
       const double possible = possible_duration_s(piece.axes[i], duration);
-      // What rounding adds, an axis whose optimum this is need not dawdle.
-      if (possible > duration + 1e-9 && fastest_duration_s(piece.axes[i]) < duration - 2e-9) duration = possible;
+      if (possible > duration) duration = possible + kMargin_s;
     }
     if (duration == before) break;
   }
@@ -115,19 +118,19 @@ Expected<void> plan(const Piece& piece, double duration_s, const AxisLimits& lim
   for (std::size_t i = 0; i < piece.count; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     const AxisPiece& one = piece.axes[i];
-    // Time-optimal, but for the last nanosecond at the end speed: fewer segments than a weighted mean. Not so if it
-    // still accelerates there.
-    const bool slowest = one.to.acceleration == 0 && fastest_duration_s(one) >= duration_s - 2e-9;
-    profiles[i] = slowest ? plan_to_position(one.from, one.to.position, one.to.speed, one.bounds)
-                          : plan_in_time(one, duration_s);
+    // Time-optimal, then rest for the margin: fewer segments than a weighted mean.
+    const bool slowest =
+        one.to.acceleration == 0 && one.to.speed == 0 && fastest_duration_s(one) >= duration_s - 2 * kMargin_s;
+    profiles[i] =
+        slowest ? plan_to_position(one.from, one.to.position, one.to.speed, one.bounds) : plan_in_time(one, duration_s);
     const AxisProfile::Extent extent = profiles[i].extent();
     const double low = std::min(limits.position_min[axis], one.from.position) - kPositionSlack;
     const double high = std::max(limits.position_max[axis], one.from.position) + kPositionSlack;
     if (extent.position_min < low || extent.position_max > high) {
-      return fail(fmt::format("axis {} swings through [{:.6g}, {:.6g}], beyond its limits [{:.6g}, {:.6g}]", i + 1,
-                              extent.position_min, extent.position_max, limits.position_min[axis],
-                              limits.position_max[axis]),
-                  "motion", "start or end slower, or farther from the limit");
+      return fail(
+          fmt::format("axis {} swings through [{:.6g}, {:.6g}], beyond its limits [{:.6g}, {:.6g}]", i + 1,
+                      extent.position_min, extent.position_max, limits.position_min[axis], limits.position_max[axis]),
+          "motion", "start or end slower, or farther from the limit");
     }
   }
   return {};
@@ -138,7 +141,7 @@ void append(std::span<const AxisProfile> profiles, Time at, Duration duration, T
   for (const AxisProfile& profile : profiles) {
     for (std::size_t k = 1; k <= profile.phases(); ++k) {
       const Duration when = from_s(profile.begin_s(k));
-      if (when > Duration{0} && when + kEndSlack < duration) switches.push_back(when);
+      if (when > Duration{0} && when < duration) switches.push_back(when);
     }
   }
   std::ranges::sort(switches);

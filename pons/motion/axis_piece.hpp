@@ -10,8 +10,8 @@ struct AxisPiece {
   AxisBounds bounds;
 };
 
-// Time-optimal if either end has no acceleration. Otherwise the best of the motions that let go of all acceleration once
-// on the way: then it may be longer than the optimum, and infinite where no such motion was found.
+// Time-optimal if either end has no acceleration. Otherwise the best of the motions that let go of all acceleration
+// once on the way: then it may be longer than the optimum, and infinite where no such motion was found.
 [[nodiscard]] double fastest_duration_s(const AxisPiece& piece) PONS_NONBLOCKING;
 
 // The shortest duration from `duration_s` on in which the piece can be done; infinite if none was found.

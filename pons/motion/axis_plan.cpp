@@ -8,8 +8,8 @@
 namespace pons::motion {
 namespace {
 
-// Ends that differ less count as one. The fastest duration jumps where the axis just fails to reach a position on the way
-// to a speed: the end of one plan must not count as out of reach for the next, for rounding's sake.
+// Ends that differ less count as one. The fastest duration jumps where the axis just fails to reach a position on the
+// way to a speed: the end of one plan must not count as out of reach for the next, for rounding's sake.
 constexpr double kSamePosition = 1e-10;
 
 struct Phase {
@@ -142,18 +142,21 @@ class Family {
   }
 
  private:
-  [[nodiscard]] double miss(double position, double lead) const { return side_ * (end(lead).point.position - position); }
+  [[nodiscard]] double miss(double position, double lead) const {
+    return side_ * (end(lead).point.position - position);
+  }
   [[nodiscard]] double search_position(double position, double from, double miss_from, double to) const {
     return find_root([&](double lead) { return miss(position, lead); }, from, miss_from, to, miss(position, to));
   }
 
-  // What comes after a lead: fall from it, hold, rise to the end speed; and the acceleration it begins with over the peak.
+  // What comes after a lead: fall from it, hold, rise to the end speed; and the acceleration it begins with over the
+  // peak.
   struct Tail {
     double slope;  // of the position reached, over duration, towards the side
     double bend;   // has the sign of the slope's own slope over the lead
   };
-  // With p = 1 as the costate of position, that of acceleration is a parabola on each arc, zero where the jerk switches;
-  // the Hamiltonian at the end is the slope (Pontryagin et al. 1962).
+  // With p = 1 as the costate of position, that of acceleration is a parabola on each arc, zero where the jerk
+  // switches; the Hamiltonian at the end is the slope (Pontryagin et al. 1962).
   [[nodiscard]] Tail tail(double lead) const {
     const AxisPoint point = after_lead(lead).point;
     const Ramp way = ramp_towards(-side_, point.speed, point.acceleration, end_speed_, bounds_);
@@ -163,8 +166,8 @@ class Family {
             hold > 0 ? 2 * share + 0.5 : share * share + 4 * share + 1};
   }
 
-  // Positions usually move towards the side as the lead grows, or away and back if the end speed points away. But if the
-  // start accelerates away, too, they may move forth, back and forth. The lead where the first forth ends, else 0.
+  // Positions usually move towards the side as the lead grows, or away and back if the end speed points away. But if
+  // the start accelerates away, too, they may move forth, back and forth. The lead where the first forth ends, else 0.
   [[nodiscard]] double crest() const {
     const double none = 0;
     if (side_ * end_speed_ >= 0 || side_ * start_.acceleration >= 0 || direct_.direction == side_) return none;
@@ -190,9 +193,9 @@ Walk direct_end(const AxisPoint& start, double end_speed, const AxisBounds& boun
   return walk;
 }
 
-// The family that holds the fastest motion, and its lead there. The positions a family reaches move towards its side all
-// the time if the end speed points there, too; else they first go with the end speed and turn back once. Either way the
-// fastest motion is on the side where the position lies from the end of the direct change of speed.
+// The family that holds the fastest motion, and its lead there. The positions a family reaches move towards its side
+// all the time if the end speed points there, too; else they first go with the end speed and turn back once. Either way
+// the fastest motion is on the side where the position lies from the end of the direct change of speed.
 struct Fastest {
   Family family;
   double lead;
@@ -271,10 +274,10 @@ AxisProfile plan_in_time(const AxisPoint& start, double end_position, double end
     low = member(start, end_speed, -1, -bounds.speed, duration_s, bounds);
   }
   const double span = end(high) - end(low);
-  if (!(span > 0)) return high;
-  const double weight = std::clamp((end_position - end(low)) / span, 0.0, 1.0);
-  if (weight == 1) return high;
-  if (weight == 0) return low;
+  const double weight = span > 0 ? std::clamp((end_position - end(low)) / span, 0.0, 1.0) : 1;
+  if (weight == 1) low = high;
+  if (weight == 0) high = low;
+  // Even then: the mean takes duration_s to the bit, its parts to the root search's tolerance.
   return weighted_mean(high, low, weight, duration_s);
 }
 
@@ -285,8 +288,7 @@ void plan_stop(const AxisState& start, const AxisLimits& limits, std::span<AxisP
   };
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    profiles[i] =
-        plan_to_speed({start.position[axis], start.speed[axis], start.acceleration[axis]}, 0.0, bounds(axis));
+    profiles[i] = plan_to_speed({start.position[axis], start.speed[axis], start.acceleration[axis]}, 0.0, bounds(axis));
     if (profiles[i].duration_s() > profiles[slowest].duration_s()) slowest = i;
   }
   if (profiles.empty()) return;

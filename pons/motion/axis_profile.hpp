@@ -3,9 +3,10 @@
 //
 // How it works. Of all motions from (speed, acceleration) to (end speed, 0) in a given time, two travel farthest: "up"
 // (push up as long as possible, then turn to the end speed) and "down", its mirror image. Both are members of a family
-// with one parameter, the lead (how long it pushes), along which duration grows. The fastest motion to a position is the
-// member of the family that points there. For any longer duration the positions in reach lie between up and down, and
-// because limits and equations of motion are convex, a weighted mean of the two reaches each of them within the limits.
+// with one parameter, the lead (how long it pushes), along which duration grows. The fastest motion to a position is
+// the member of the family that points there. For any longer duration the positions in reach lie between up and down,
+// and because limits and equations of motion are convex, a weighted mean of the two reaches each of them within the
+// limits.
 #pragma once
 
 #include <array>
@@ -71,13 +72,15 @@ class AxisProfile {
 
 // Fastest change to `end_speed`, ending without acceleration; the position is free. Works from any finite start: an
 // acceleration beyond its bound is reduced first, and no speed outside {start, coasting, end} speed is passed.
-[[nodiscard]] AxisProfile plan_to_speed(const AxisPoint& start, double end_speed, const AxisBounds& bounds) PONS_NONBLOCKING;
+[[nodiscard]] AxisProfile plan_to_speed(const AxisPoint& start, double end_speed,
+                                        const AxisBounds& bounds) PONS_NONBLOCKING;
 
 // What that takes, cheaper.
 struct SpeedChange {
   double duration_s, distance;
 };
-[[nodiscard]] SpeedChange change_speed(const AxisPoint& start, double end_speed, const AxisBounds& bounds) PONS_NONBLOCKING;
+[[nodiscard]] SpeedChange change_speed(const AxisPoint& start, double end_speed,
+                                       const AxisBounds& bounds) PONS_NONBLOCKING;
 
 // Fastest motion to end_position with end_speed (inside the bounds) and no acceleration. Time-optimal.
 [[nodiscard]] AxisProfile plan_to_position(const AxisPoint& start, double end_position, double end_speed,
@@ -87,20 +90,20 @@ struct SpeedChange {
 [[nodiscard]] double fastest_duration_s(const AxisPoint& start, double end_position, double end_speed,
                                         const AxisBounds& bounds) PONS_NONBLOCKING;
 
-// The shortest duration of at least `duration_s` in which the end can be reached. It is `duration_s` itself unless that is
-// less than the fastest, or the end speed is not zero and the axis would have to dawdle longer than it can without going
-// back (the blocked interval).
-[[nodiscard]] double possible_duration_s(const AxisPoint& start, double end_position, double end_speed, double duration_s,
-                                         const AxisBounds& bounds) PONS_NONBLOCKING;
+// The shortest duration of at least `duration_s` in which the end can be reached. It is `duration_s` itself unless that
+// is less than the fastest, or the end speed is not zero and the axis would have to dawdle longer than it can without
+// going back (the blocked interval).
+[[nodiscard]] double possible_duration_s(const AxisPoint& start, double end_position, double end_speed,
+                                         double duration_s, const AxisBounds& bounds) PONS_NONBLOCKING;
 
-// A motion that takes exactly `duration_s`, which must be possible. Leaves the speeds between coasting and end speed only
-// if it must, and then by as little push as the duration allows.
+// A motion that takes exactly `duration_s`, which must be possible. Leaves the speeds between coasting and end speed
+// only if it must, and then by as little push as the duration allows.
 [[nodiscard]] AxisProfile plan_in_time(const AxisPoint& start, double end_position, double end_speed, double duration_s,
                                        const AxisBounds& bounds) PONS_NONBLOCKING;
 
 // All axes to standstill: the slowest as fast as possible, the others in the same time along the present direction of
-// travel as far as their bounds let them; an axis that would leave its position limits stops as fast as it can. Works from
-// any finite start. `profiles` has one entry an axis.
+// travel as far as their bounds let them; an axis that would leave its position limits stops as fast as it can. Works
+// from any finite start. `profiles` has one entry an axis.
 void plan_stop(const AxisState& start, const AxisLimits& limits, std::span<AxisProfile> profiles) PONS_NONBLOCKING;
 
 }  // namespace pons::motion

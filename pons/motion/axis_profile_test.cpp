@@ -21,9 +21,7 @@ struct Case {
 
 // Any start from which the speed limit can still be kept, any end inside the limits, over decades of sizes.
 Case draw(Random& random) {
-  const auto decade = [&](double low, double high) {
-    return std::exp(random.uniform(std::log(low), std::log(high)));
-  };
+  const auto decade = [&](double low, double high) { return std::exp(random.uniform(std::log(low), std::log(high))); };
   Case c{{}, 0, 0, {decade(0.3, 4), decade(1, 30), decade(10, 1000)}};
   c.start.position = random.uniform(-3, 3);
   c.start.acceleration = random.below(4) == 0 ? 0 : random.uniform(-1, 1) * c.bounds.acceleration;

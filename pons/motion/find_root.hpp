@@ -7,7 +7,8 @@
 
 namespace pons::motion {
 
-// A root of f in [low, high] where f changes sign; f is continuous (Chandrupatla 1997). Some ten evaluations, 100 at most.
+// A root of f in [low, high] where f changes sign; f is continuous (Chandrupatla 1997). Some ten evaluations, 100 at
+// most.
 template <typename F>
 [[nodiscard]] double find_root(F f, double low, double f_low, double high, double f_high) {
   double a = high, fa = f_high, b = low, fb = f_low, c = a, fc = fa, t = 0.5;

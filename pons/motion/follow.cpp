@@ -11,20 +11,17 @@ namespace {
 
 // How far the start may be from the path's own beginning. The first piece takes the difference up; whether it can is
 // seen by the limits it keeps.
-constexpr double kPositionTolerance = 1e-4;      // rad
-constexpr double kSpeedTolerance = 0.05;         // rad/s
-constexpr double kAccelerationTolerance = 2.0;   // rad/s²
-constexpr double kLimitTolerance = 1e-9;         // relative
-constexpr std::size_t kFewestPieces = 4;         // the stencils below need five samples
+constexpr double kPositionTolerance = 1e-4;     // rad
+constexpr double kSpeedTolerance = 0.05;        // rad/s
+constexpr double kAccelerationTolerance = 2.0;  // rad/s²
+constexpr double kLimitTolerance = 1e-9;        // relative
+constexpr std::size_t kFewestPieces = 4;        // the stencils below need five samples
 constexpr std::size_t kMostPieces = 100'000;
 
-// Finite differences of fourth (speed) and third (acceleration) order at least, on five equidistant samples, at the m-th
-// of them (Fornberg 1988, table 3).
-constexpr double kSpeedStencil[5][5] = {{-25, 48, -36, 16, -3},
-                                        {-3, -10, 18, -6, 1},
-                                        {1, -8, 0, 8, -1},
-                                        {-1, 6, -18, 10, 3},
-                                        {3, -16, 36, -48, 25}};
+// Finite differences of fourth (speed) and third (acceleration) order at least, on five equidistant samples, at the
+// m-th of them (Fornberg 1988, table 3).
+constexpr double kSpeedStencil[5][5] = {
+    {-25, 48, -36, 16, -3}, {-3, -10, 18, -6, 1}, {1, -8, 0, 8, -1}, {-1, 6, -18, 10, 3}, {3, -16, 36, -48, 25}};
 constexpr double kAccelerationStencil[5][5] = {{35, -104, 114, -56, 11},
                                                {11, -20, 6, 4, -1},
                                                {-1, 16, -30, 16, -1},
@@ -53,7 +50,8 @@ std::array<double, 6> quintic(double p0, double v0, double a0, double p1, double
 }
 
 Expected<void> check_beginning(const AxisState& start, const AxisState& path) {
-  const auto check = [](const AxisVector& a, const AxisVector& b, double tolerance, const char* what) -> Expected<void> {
+  const auto check = [](const AxisVector& a, const AxisVector& b, double tolerance,
+                        const char* what) -> Expected<void> {
     Eigen::Index axis = 0;
     const double most = (a - b).cwiseAbs().maxCoeff(&axis);
     if (most <= tolerance) return {};
@@ -75,9 +73,12 @@ Expected<void> check_use(const Trajectory& trajectory, const AxisLimits& limits)
       Segment one = segment;
       one.coefficients[0] = segment.coefficients[static_cast<std::size_t>(axis)];
       const auto pick = [&](const AxisVector& all) { return AxisVector(all.segment(axis, 1)); };
-      const LimitUse use = limit_use(std::span(&one, 1), {pick(limits.position_min), pick(limits.position_max),
-                                                          pick(limits.speed_rad_s), pick(limits.acceleration_rad_s2),
-                                                          pick(limits.jerk_rad_s3), {}});
+      const LimitUse use = limit_use(std::span(&one, 1), {pick(limits.position_min),
+                                                          pick(limits.position_max),
+                                                          pick(limits.speed_rad_s),
+                                                          pick(limits.acceleration_rad_s2),
+                                                          pick(limits.jerk_rad_s3),
+                                                          {}});
       if (use.worst() <= 1 + kLimitTolerance) continue;
       const double t = to_s(segment.start - trajectory.front().start);
       if (!use.inside_position) {
@@ -108,9 +109,9 @@ Expected<Trajectory> follow(const AxisState& start, Time at, const std::function
     Expected<AxisVector> knot = path(static_cast<double>(k) * h);
     if (!knot) return std::unexpected(knot.error());
     if (knot->size() != start.position.size() || !knot->allFinite()) {
-      return fail(fmt::format("the path has no finite position for each axis after {:.3f} s",
-                              static_cast<double>(k) * h),
-                  "path", "return one finite value an axis");
+      return fail(
+          fmt::format("the path has no finite position for each axis after {:.3f} s", static_cast<double>(k) * h),
+          "path", "return one finite value an axis");
     }
     knots.push_back(*knot);
   }

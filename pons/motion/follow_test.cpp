@@ -15,9 +15,7 @@ AxisLimits limits() {
           AxisVector::Constant(2, 20), AxisVector::Constant(2, 400), AxisVector::Constant(2, 100)};
 }
 
-Expected<AxisVector> circle(double t) {
-  return AxisVector{{std::cos(2 * t), std::sin(2 * t)}};
-}
+Expected<AxisVector> circle(double t) { return AxisVector{{std::cos(2 * t), std::sin(2 * t)}}; }
 AxisState on_circle(double t) {
   return {AxisVector{{std::cos(2 * t), std::sin(2 * t)}}, AxisVector{{-2 * std::sin(2 * t), 2 * std::cos(2 * t)}},
           AxisVector{{-4 * std::cos(2 * t), -4 * std::sin(2 * t)}}};

@@ -29,7 +29,8 @@ struct Turns {
   std::size_t count = 0;
 };
 
-// The turns of p from those of its derivative p': between two of these p' is monotone, so it has one root at most there.
+// The turns of p from those of its derivative p': between two of these p' is monotone, so it has one root at most
+// there.
 Turns turns(const Polynomial& p, double duration, int degree) {
   Turns result;
   result.t[result.count++] = 0;

@@ -150,7 +150,7 @@ TEST(Move, SaysWhatIsWrong) {
 TEST(MoveThrough, PassesTheViasFasterThanHalting) {
   Random random(3);
   const AxisLimits limits = arm_limits();
-  for (int i = 0; i < 300 && !testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < 1000 && !testing::Test::HasFailure(); ++i) {
     SCOPED_TRACE(i);
     const AxisState start = i % 2 == 0 ? at_rest(draw(random, 6, 2)) : moving(random, limits);
     const std::vector<AxisVector> vias{draw(random, 6, 2), draw(random, 6, 2)};

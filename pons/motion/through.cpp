@@ -1,7 +1,7 @@
 // Motion through via points. The positions are given; speed and acceleration there are chosen by descent on the total
-// time: each axis' piece has a fastest duration, a piece takes as long as its slowest axis, and a power sum instead of the
-// maximum tells the search what would become slowest next. Then axes that got too fast to wait for the slowest are slowed
-// down. A fixed number of steps: the same input, the same motion.
+// time: each axis' piece has a fastest duration, a piece takes as long as its slowest axis, and a power sum instead of
+// the maximum tells the search what would become slowest next. Then axes that got too fast to wait for the slowest are
+// slowed down. A fixed number of steps: the same input, the same motion.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,7 +13,7 @@ namespace pons::motion {
 namespace {
 
 constexpr int kSweeps = 7;
-constexpr double kFirstStep = 0.25;  // of the limit
+constexpr double kFirstStep = 0.3;  // of the limit
 constexpr double kScales[] = {0, 0.5, 1, 1.5, 2, 3};
 constexpr int kRelaxations = 2;
 constexpr double kSlower[] = {0.8, 0.6, 0.4, 0.2, 0};

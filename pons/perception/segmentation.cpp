@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "pons/perception/plane.hpp"
+
 namespace pons::perception {
 namespace {
 
@@ -115,14 +117,13 @@ void Segmenter::describe(const TopView& view, Region& region) const {
   const int own_height = typical_height(view, region.core.empty() ? region.cells : region.core);
   for (const cv::Point& cell : region.cells) {
     if ((view.flags(cell) & TopView::kNearRobot) != 0) ++beside_robot;
-    if ((view.flags(cell) & TopView::kAtBorder) != 0 || cell.x < 2 || cell.y < 2 || cell.x >= labels.cols - 2 ||
-        cell.y >= labels.rows - 2) {
-      ++border;
-    }
     const bool inner = std::ranges::all_of(
         kAround, [&](const cv::Point& step) { return view.contains(cell + step) && labels(cell + step) == region.label; });
+    const bool edge = (view.flags(cell) & TopView::kAtBorder) != 0 || cell.x < 2 || cell.y < 2 ||
+                      cell.x >= labels.cols - 2 || cell.y >= labels.rows - 2;
     if (inner) continue;
     ++outline;
+    border += edge ? 1 : 0;
     const double dx = below_camera.x - cell.x, dy = below_camera.y - cell.y, distance = std::hypot(dx, dy);
     if (distance > 2 * kLook) {
       const cv::Point towards = cell + cv::Point(cvRound(kLook * dx / distance), cvRound(kLook * dy / distance));
@@ -147,7 +148,7 @@ void Segmenter::describe(const TopView& view, Region& region) const {
   region.below_share = outline > 0 ? static_cast<double>(below) / outline : 0;
   region.crowded = crowded > 3;
   region.near_robot = beside_robot > 3;
-  region.at_border = border > 0;
+  region.border_share = outline > 0 ? static_cast<double>(border) / outline : 0;
 }
 
 void Segmenter::cut(std::size_t index, const Line& line) {
@@ -156,7 +157,6 @@ void Segmenter::cut(std::size_t index, const Line& line) {
   Region second;
   second.label = label;
   second.near_robot = first.near_robot;
-  second.at_border = first.at_border;
   const auto beyond = [&](const cv::Point& cell) { return line.beyond(cell); };
   std::ranges::copy_if(first.cells, std::back_inserter(second.cells), beyond);
   std::ranges::copy_if(first.core, std::back_inserter(second.core), beyond);
@@ -173,8 +173,11 @@ void Segmenter::split(const TopView& view) {
   for (std::size_t i = 0; i < segments_.regions.size(); ++i) {
     while (cuts < kMostCuts) {
       Region& region = segments_.regions[i];
-      std::optional<Line> line = splitter_.by_colour(view, region.core);
-      const bool whole = !region.near_robot && !region.at_border && region.hidden_share < 0.03 && region.below_share < 0.05;
+      if (region.core.size() < 20) break;
+      // A curve is shaded: its colours say nothing.
+      std::optional<Line> line;
+      if (!fit_plane(view, region.core).curved()) line = splitter_.by_colour(view, region.core);
+      const bool whole = !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
       if (!line && whole) line = splitter_.by_outline(region.core);
       if (!line) break;
       ++cuts;

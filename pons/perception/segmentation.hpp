@@ -19,7 +19,7 @@ struct Region {
   double below_share = 0;         // adjoins something higher
   bool crowded = false;           // another object within about 8 mm
   bool near_robot = false;        // beside or under the robot, or in its hand
-  bool at_border = false;         // cut by the picture or the belt's limits
+  double border_share = 0;        // cut by the picture or the belt's limits
   std::vector<int> higher;        // labels of the higher neighbours, ascending
 };
 

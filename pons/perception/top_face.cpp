@@ -6,67 +6,26 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "pons/perception/plane.hpp"
+
 namespace pons::perception {
 namespace {
 
-constexpr double kCurved_m = 0.0022;      // RMS; filtered noise of a plane stays below half of it
-constexpr std::size_t kPlaneCells = 1500;  // looked at to fit a plane
 constexpr double kOnPlane_m = 0.005;
 constexpr double kUpright_rad = 3 * std::numbers::pi / 180;
-constexpr double kLeaning_rad = 5 * std::numbers::pi / 180;
+constexpr double kLeaning_rad = 3.5 * std::numbers::pi / 180;
 constexpr double kFullShape = 0.86;           // an ellipse fills π/4 of its rectangle
 constexpr double kHidden = 0.04;
 constexpr double kBelow = 0.06;
 constexpr double kWhole = 0.90;
-
-// z = height + slope · (p − middle), heights above the belt (m), the rest in cells.
-struct Plane {
-  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-  Eigen::Vector3d abc = Eigen::Vector3d::Zero();
-  double rms_m = 0;  // of all cells it was fitted to, worst 3 % left out
-
-  [[nodiscard]] double at(double x, double y) const { return abc[0] + abc[1] * (x - middle.x()) + abc[2] * (y - middle.y()); }
-};
+constexpr double kNearlyWhole = 0.95;
+constexpr double kLostCorner = 0.10;      // of the outline
 
 struct Rectangle {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // cells
   double yaw = 0;
   double length = 0, width = 0;  // cells
 };
-
-Plane fit_plane(const TopView& view, const std::vector<cv::Point>& cells) {
-  Plane plane;
-  const std::size_t stride = std::max<std::size_t>(1, cells.size() / kPlaneCells);
-  for (std::size_t i = 0; i < cells.size(); i += stride) plane.middle += Eigen::Vector2d(cells[i].x, cells[i].y);
-  plane.middle /= static_cast<double>((cells.size() + stride - 1) / stride);
-  std::vector<double> residuals;
-  double limit = 1e9;
-  for (int round = 0; round < 4; ++round) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < cells.size(); i += stride) {
-      const double z = TopView::metres(view.height(cells[i]));
-      if (std::abs(z - plane.at(cells[i].x, cells[i].y)) > limit) continue;
-      const Eigen::Vector3d row(1, cells[i].x - plane.middle.x(), cells[i].y - plane.middle.y());
-      normal.noalias() += row * row.transpose();
-      right += row * z;
-    }
-    plane.abc = normal.ldlt().solve(right);
-    residuals.clear();
-    for (std::size_t i = 0; i < cells.size(); i += stride) {
-      residuals.push_back(std::abs(TopView::metres(view.height(cells[i])) - plane.at(cells[i].x, cells[i].y)));
-    }
-    const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-    std::ranges::nth_element(residuals, middle);
-    limit = std::max(0.004, 2.5 * *middle);
-  }
-  std::ranges::sort(residuals);
-  const std::size_t kept = residuals.size() - residuals.size() / 33;
-  double squares = 0;
-  for (std::size_t i = 0; i < kept; ++i) squares += residuals[i] * residuals[i];
-  plane.rms_m = std::sqrt(squares / static_cast<double>(kept));
-  return plane;
-}
 
 std::vector<cv::Point> boundary(const std::vector<cv::Point>& cells) {
   const cv::Rect box = cv::boundingRect(cells);
@@ -293,15 +252,16 @@ std::vector<Sighting> measure(const TopView& view, const Segments& segments) {
   for (const Region& region : segments.regions) {
     const std::vector<cv::Point>& core = region.core.size() >= 20 ? region.core : region.cells;
     const Plane plane = fit_plane(view, core);
-    const bool curved = plane.rms_m > kCurved_m && region.core.size() >= 20;
+    const bool curved = plane.curved() && region.core.size() >= 20;
     Sighting sighting = curved ? measure_curved(view, region, plane) : measure_flat(view, region, plane);
     sighting.label = region.label;
     sighting.flatness_m = plane.rms_m;
     sighting.crowded = region.crowded || region.below_share > 0 || sighting.tilt_rad > kLeaning_rad;
     sighting.near_robot = region.near_robot;
-    sighting.at_border = region.at_border;
+    // A box that only lost a corner to the border is measured as well as a whole one.
+    sighting.at_border = region.border_share > kLostCorner || (region.border_share > 0 && sighting.fill < kNearlyWhole);
     sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
-    sighting.complete = !region.near_robot && !region.at_border && region.hidden_share < kHidden;
+    sighting.complete = !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
     sightings.push_back(sighting);
   }
   // What leans on a lower neighbour hides a part of it, however whole the rest looks.

@@ -18,6 +18,7 @@ constexpr double kRoundBag_m = 0.035;
 constexpr std::size_t kMemory = 16;       // observations averaged
 constexpr std::size_t kMotionMemory = 4;
 constexpr double kMoved_m = 0.009;        // over the motion memory: more than noise
+constexpr int kDoubts = 4;
 constexpr double kDoubtful = 0.3;         // confidence of what is partly hidden
 constexpr Duration kSwallow = std::chrono::milliseconds(500);
 
@@ -184,7 +185,9 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   if (!usable(sighting)) return;
   const Observation o = observe(&track, sighting, stamp, travel_m);
   const bool was_doubtful = track.observations.back().doubtful;
-  if (o.doubtful && !was_doubtful) return;
+  // A good look outlives a glimpse of a part, but not when parts are all that shows.
+  track.doubts = o.doubtful ? track.doubts + 1 : 0;
+  if (o.doubtful && !was_doubtful && track.doubts < kDoubts) return;
   const double moved = (Eigen::Vector2d(o.x_m, o.y_m) - track.estimate.at(stamp)).norm();
   const bool round = sighting.shape == Shape::kBag && o.size_m.x() - o.size_m.y() < kRoundBag_m;
   const bool turned = !round && std::abs(o.yaw_rad - track.estimate.yaw_rad) > kDisturbed_rad;
@@ -192,7 +195,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   const bool now_whole = was_doubtful && !o.doubtful;
   if (resized && !now_whole && ++track.odd_sizes < 2) return;  // once may be a bad cut between neighbours
   track.last = sighting;
-  if (now_whole || resized || moved > kDisturbed_m || turned) {
+  if (now_whole || (o.doubtful && !was_doubtful) || resized || moved > kDisturbed_m || turned) {
     restart(track, o);
     return;
   }

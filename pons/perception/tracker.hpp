@@ -55,7 +55,7 @@ class Tracker {
     std::deque<Observation> observations;  // since it was last disturbed, oldest first
     Estimate estimate;
     Sighting last;            // the last one that counted
-    int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0;
+    int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
     bool crowded = false;
     std::string code, other_code;

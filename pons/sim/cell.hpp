@@ -53,11 +53,14 @@ struct Cell {
   Time stepped;                // end of the last step
   Time now;                    // last time advanced to
   bool stop_pressed = false;
-  bool braked = true;
+  AxisVector held;             // where the brakes hold the arm; empty while it moves
   std::string failure;         // what MuJoCo said when it gave up
 
  private:
+  std::vector<double> brake_acceleration, brake_torque;  // scratch, one a degree of freedom
+
   void drive();
+  void brake();
   void measure();
 };
 

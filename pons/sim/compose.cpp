@@ -112,8 +112,6 @@ Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::
     joint->range[1] = robot.limits.position_max[axis];
     joint->limited = mjLIMITED_TRUE;
     joint->actfrclimited = mjLIMITED_FALSE;
-    // The brake's friction, set while the power is off: near to rigid, or it would creep under the arm's weight.
-    joint->solimp_friction[0] = joint->solimp_friction[1] = 0.9999;
     mjsActuator* motor = mjs_addActuator(scene, nullptr);
     mjs_setToMotor(motor);
     mjs_setName(motor->element, fmt::format("drive_{}", axis).c_str());

@@ -67,7 +67,8 @@ void Gripper::measure(const Composed& cell, const mjData* data) {
 }
 
 std::array<double, 6> Gripper::wrist(const Composed& cell, const mjData* data) const {
-  // MuJoCo's interaction forces know the contacts' push on the cups but not the adhesion that balances it.
+  // MuJoCo's sensor gives what the arm exerts on the tool, and knows the contacts' push on the cups but not the adhesion
+  // that balances it.
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_site(data->site_xmat +
                                                                                        9 * cell.wrist_site);
   const Eigen::Map<const Vector3> site(data->site_xpos + 3 * cell.wrist_site);
@@ -88,8 +89,8 @@ std::array<double, 6> Gripper::wrist(const Composed& cell, const mjData* data) c
   torque = world_from_site.transpose() * torque;
   std::array<double, 6> wrist{};
   for (int i = 0; i < 3; ++i) {
-    wrist[static_cast<std::size_t>(i)] = data->sensordata[cell.force_sensor + i] + force[i];
-    wrist[static_cast<std::size_t>(i + 3)] = data->sensordata[cell.torque_sensor + i] + torque[i];
+    wrist[static_cast<std::size_t>(i)] = force[i] - data->sensordata[cell.force_sensor + i];
+    wrist[static_cast<std::size_t>(i + 3)] = torque[i] - data->sensordata[cell.torque_sensor + i];
   }
   return wrist;
 }

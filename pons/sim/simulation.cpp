@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -16,6 +17,8 @@ namespace {
 constexpr std::uint64_t kNoiseStream = 0x6e6f6973;
 constexpr double kForceNoise_n = 0.15, kTorqueNoise_nm = 0.01, kVacuumNoise_kpa = 0.3;
 constexpr double kBrake = 1.5;  // holding torque of a brake, in drive torques
+constexpr double kBrakeStiffness = 3600, kBrakeDamping = 120;  // 1/s², 1/s: 60 rad/s, critically damped
+constexpr double kBrakeHolds_rad_s = 0.02;
 
 }  // namespace
 
@@ -31,6 +34,8 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       noise(Random(seed).fork(kNoiseStream)),
       step_length(from_s(world.physics_step_s)) {
   set_points.torque_nm = AxisVector::Zero(world.robot.home.size());
+  brake_acceleration.assign(static_cast<std::size_t>(composed.model->nv), 0.0);
+  brake_torque = brake_acceleration;
   for (int i = 0; i < kSlots; ++i) {
     const Slot& slot = composed.slots[static_cast<std::size_t>(i)];
     park(composed.model.get(), data.get(), slot, i);
@@ -56,11 +61,37 @@ void Cell::drive() {
     const double torque = set_points.power ? set_points.torque_nm[static_cast<Eigen::Index>(i)] : 0;
     data->ctrl[composed.arm_actuator[i]] = torque;
   }
-  if (braked == !set_points.power && stepped > Time()) return;
-  braked = !set_points.power;
-  for (std::size_t i = 0; i < composed.arm_dof.size(); ++i) {
-    composed.model->dof_frictionloss[composed.arm_dof[i]] =
-        braked ? kBrake * world.robot.limits.torque_nm[static_cast<Eigen::Index>(i)] : 0;
+  if (set_points.power) {
+    held.resize(0);
+    for (const int dof : composed.arm_dof) data->qfrc_applied[dof] = 0;
+  } else {
+    brake();
+  }
+}
+
+// Brakes slow the joints at once and then hold them where they stand, with at most kBrake times the drives' torque. Dry
+// friction as a constraint creeps under the arm's weight, or makes the solver stumble when it is made stiff.
+void Cell::brake() {
+  const mjModel* model = composed.model.get();
+  const auto axes = static_cast<Eigen::Index>(composed.arm_dof.size());
+  double fastest = 0;
+  for (const int dof : composed.arm_dof) fastest = std::max(fastest, std::abs(data->qvel[dof]));
+  if (held.size() == 0 && fastest < kBrakeHolds_rad_s) {
+    held.resize(axes);
+    for (Eigen::Index i = 0; i < axes; ++i) held[i] = data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
+  }
+  std::fill(brake_acceleration.begin(), brake_acceleration.end(), 0.0);
+  for (Eigen::Index i = 0; i < axes; ++i) {
+    const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
+    const double away = held.size() == 0 ? 0 : held[i] - data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
+    brake_acceleration[static_cast<std::size_t>(dof)] = kBrakeStiffness * away - kBrakeDamping * data->qvel[dof];
+  }
+  mj_mulM(model, data.get(), brake_torque.data(), brake_acceleration.data());
+  for (Eigen::Index i = 0; i < axes; ++i) {
+    const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
+    const double most = kBrake * world.robot.limits.torque_nm[i];
+    data->qfrc_applied[dof] =
+        std::clamp(brake_torque[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof], -most, most);
   }
 }
 
@@ -140,6 +171,7 @@ void Simulation::set_arm(const AxisVector& position) {
     cell.data->qvel[cell.composed.arm_dof[static_cast<std::size_t>(i)]] = 0;
   }
   mj_forward(cell.composed.model.get(), cell.data.get());
+  cell.held.resize(0);
   cell.measured.position = position;
   cell.measured.speed = AxisVector::Zero(axes);
 }

@@ -15,7 +15,7 @@ class MoveTo final : public task::Skill {
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
       moving_ = false;
-      return {Status::kRetry, "the arm was stopped", {}};
+      return {};
     }
     if (moving_) {
       if (now < arrives_) return {};

@@ -29,7 +29,11 @@ class Pick final : public task::Skill {
   Pick(Cell& cell, std::string code, Time now) : cell_(cell), code_(std::move(code)), started_(now), seen_(now) {}
 
   Progress tick(Time now) override {
-    if (!cell_.arm.operational()) return {Status::kRetry, "the arm was stopped", {}};
+    if (!cell_.arm.operational()) {
+      stopped_ = true;
+      return {};
+    }
+    if (stopped_) return {Status::kRetry, "the arm was stopped", {}};
     switch (phase_) {
       case Phase::kFind: return find(now);
       case Phase::kApproach: return approach(now);
@@ -244,7 +248,7 @@ class Pick final : public task::Skill {
   Progress verdict_;
   std::string last_error_;
   int sealed_ticks_ = 0;
-  bool waiting_ = false;
+  bool waiting_ = false, stopped_ = false;
 };
 
 }  // namespace

@@ -29,8 +29,9 @@ class Place final : public task::Skill {
 
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
+      // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       phase_ = Phase::kPlan;
-      return {Status::kRetry, "the arm was stopped", {}};
+      return {};
     }
     switch (phase_) {
       case Phase::kPlan: return plan(now);

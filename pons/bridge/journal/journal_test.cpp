@@ -1,5 +1,6 @@
 #include "pons/bridge/journal/journal.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sqlite3.h>
@@ -260,7 +261,7 @@ TEST_F(JournalTest, WhenTheDiskIsFullWhatWasAcceptedIsThereAndNothingElse) {
     const rlimit limit{200'000, 200'000};
     if (!journal || ::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(1);
     for (int i = 0; i < 10'000; ++i) {
-      task::Task task = sample("t" + std::to_string(i));
+      task::Task task = sample(fmt::format("t{}", i));
       task.steps[0].arguments["object"] = std::string(900, 'x');
       if (!(*journal)->accept(task, at(i))) ::_exit(0);
       if (::write(pipe_ends[1], "a", 1) != 1) ::_exit(1);
@@ -274,7 +275,7 @@ TEST_F(JournalTest, WhenTheDiskIsFullWhatWasAcceptedIsThereAndNothingElse) {
   int status = 0;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(WEXITSTATUS(status), 0);
-  EXPECT_GT(accepted.size(), 20u);
+  EXPECT_GT(accepted.size(), 10u);
   EXPECT_EQ(open()->tasks().value().size(), accepted.size());
 }
 

@@ -1,6 +1,9 @@
 #include "pons/bridge/schedule/arbiter.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <map>
 
 #include "pons/core/random.hpp"
 
@@ -101,7 +104,7 @@ TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
       for (const std::string& name : names) {
         if (random.uniform() < 0.3) wanted.push_back(name);
       }
-      const std::string id = "t" + std::to_string(added++);
+      const std::string id = fmt::format("t{}", added++);
       needs[id] = wanted;
       arbiter.add(id, static_cast<int>(random.below(3)), std::nullopt, wanted);
     }
