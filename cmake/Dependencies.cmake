@@ -11,6 +11,10 @@ find_package(PkgConfig REQUIRED)
 
 add_library(pons_eigen INTERFACE)
 target_include_directories(pons_eigen SYSTEM INTERFACE "${PONS_PREFIX}/include/eigen3")
+if(CMAKE_CXX_FLAGS MATCHES "-fsanitize=")
+  # Under a sanitizer Eigen chooses another allocator than the wheels were built with, and each frees the other's memory.
+  target_compile_definitions(pons_eigen INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+endif()
 add_library(ext::eigen ALIAS pons_eigen)
 
 function(pons_wheel_library name file)

@@ -12,7 +12,7 @@ namespace pons::bridge {
 namespace {
 
 // Events between the durable moments of a task may wait this long for the disk.
-constexpr Duration kCommitPeriod = std::chrono::seconds(1);
+constexpr Duration kCommitPeriod = std::chrono::seconds(5);
 
 std::vector<std::string> names(const std::vector<world::Resource>& resources) {
   std::vector<std::string> result;

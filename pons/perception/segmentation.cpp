@@ -76,7 +76,12 @@ void Segmenter::grow(const TopView& view) {
   front_.clear();
   for (int row = 0; row < labels.rows; ++row) {
     for (int column = 0; column < labels.cols; ++column) {
-      if (labels(row, column) > 0) front_.emplace_back(column, row);
+      if (labels(row, column) == 0) continue;
+      const bool open = std::ranges::any_of(kAround, [&](const cv::Point& step) {
+        const cv::Point to = cv::Point(column, row) + step;
+        return view.contains(to) && labels(to) == 0 && foreground_(to) != 0;
+      });
+      if (open) front_.emplace_back(column, row);
     }
   }
   for (std::size_t i = 0; i < front_.size(); ++i) {
@@ -191,9 +196,11 @@ const Segments& Segmenter::segment(const TopView& view) {
   grow(view);
   collect();
   for (Region& region : segments_.regions) describe(view, region);
+  const std::size_t before = segments_.regions.size();
   split(view);
   // What a hand holds stays one thing: pieces of it keep the mark of the whole.
   for (Region& region : segments_.regions) {
+    if (segments_.regions.size() == before) break;
     const bool held = region.near_robot;
     describe(view, region);
     region.near_robot = region.near_robot || held;

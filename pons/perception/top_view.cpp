@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kOverhang_m = 0.06;      // how far a parcel may stick out over the belt's sides and still be measured whole
 constexpr double kTallest_m = 0.6;        // above the belt; what is higher does not lie on it
-constexpr double kFinestCell_m = 0.002;
+constexpr double kFinestCell_m = 0.0025;
+constexpr double kBare_m = 0.006;         // lower readings are of the belt
 constexpr int kSameSurface = 80;          // 8 mm: readings of one cell that far below its highest are of what lies behind
 constexpr std::size_t kSurrounded = 5;    // of 8 neighbours: along the edge of hidden belt there are 3
 constexpr int kBorder = 2;                // samples
@@ -39,13 +40,15 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling
   window_.height = within(bottom + 1, sampling_.height) - window_.y;
 
   const Eigen::Matrix3d rotation = pose.linear();
-  rays_.reserve(static_cast<std::size_t>(window_.area()));
+  for (auto* part : {&ray_x_, &ray_y_, &ray_z_}) part->reserve(static_cast<std::size_t>(window_.area()));
   double x_min = 1e9, x_max = -1e9;
   for (int row = window_.y; row < window_.br().y; ++row) {
     for (int column = window_.x; column < window_.br().x; ++column) {
       const Vector3 ray =
           rotation * Vector3((column - sampling_.cx) / sampling_.fx, (row - sampling_.cy) / sampling_.fy, 1.0);
-      rays_.push_back(ray.cast<float>());
+      ray_x_.push_back(static_cast<float>(ray.x()));
+      ray_y_.push_back(static_cast<float>(ray.y()));
+      ray_z_.push_back(static_cast<float>(ray.z()));
       if (ray.z() > -0.05) continue;  // at or above the horizon
       const double x = pose.translation().x() + ray.x() * (belt.surface_z_m - pose.translation().z()) / ray.z();
       x_min = std::min(x_min, x), x_max = std::max(x_max, x);
@@ -59,10 +62,10 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling
   view_.camera_m = pose.translation();
   const int columns = std::max(8, static_cast<int>((std::min(belt.x_end_m, x_max) - view_.x0_m) / view_.cell_m));
   const int rows = std::max(8, static_cast<int>((belt.width_m + 2 * kOverhang_m) / view_.cell_m));
-  for (cv::Mat1w* map : {&highest_, &raw_}) map->create(rows, columns);
+  highest_.create(rows, columns);
   sum_.create(rows, columns), count_.create(rows, columns);
   view_.colour.create(rows, columns), view_.flags.create(rows, columns);
-  cell_of_.resize(rays_.size()), height_of_.resize(rays_.size());
+  cell_of_.resize(ray_x_.size()), height_of_.resize(ray_x_.size());
 }
 
 bool TopViewer::fits(const RgbdFrame& frame) const {
@@ -72,92 +75,106 @@ bool TopViewer::fits(const RgbdFrame& frame) const {
          (frame.world_from_optical.translation() - view_.camera_m).norm() < 1e-9;
 }
 
+// Plain loops over rows of floats without branches: the compiler turns them into vector code.
 void TopViewer::project(const RgbdFrame& frame) {
   const auto inverse_cell = static_cast<float>(1 / view_.cell_m);
-  const auto from_x = static_cast<float>(view_.camera_m.x() - view_.x0_m);
-  const auto from_y = static_cast<float>(view_.camera_m.y() - view_.y0_m);
+  const auto from_x = static_cast<float>(view_.camera_m.x() - view_.x0_m) * inverse_cell;
+  const auto from_y = static_cast<float>(view_.camera_m.y() - view_.y0_m) * inverse_cell;
   const auto from_z = static_cast<float>(view_.camera_m.z() - view_.surface_z_m);
-  const float limit_x = static_cast<float>(highest_.cols), limit_y = static_cast<float>(highest_.rows);
-  std::size_t i = 0;
-  for (int row = window_.y; row < window_.br().y; ++row) {
-    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
-      const float depth = sampling_.depth(frame, row, column);
-      const Eigen::Vector3f& ray = rays_[i];
-      const float x = (from_x + depth * ray.x()) * inverse_cell, y = (from_y + depth * ray.y()) * inverse_cell;
-      const float z = from_z + depth * ray.z();
-      const bool inside = depth > 0 && x >= 0 && y >= 0 && x < limit_x && y < limit_y && z > -0.4F && z < 3.0F;
-      cell_of_[i] = inside ? static_cast<int>(y) * highest_.cols + static_cast<int>(x) : -1;
-      height_of_[i] = inside ? static_cast<std::uint16_t>(static_cast<float>(TopView::kLevel) + z * 1e4F + 0.5F)
-                             : TopView::kUnknown;
+  const int columns = highest_.cols;
+  const auto limit_x = static_cast<float>(columns), limit_y = static_cast<float>(highest_.rows);
+  depth_row_.resize(static_cast<std::size_t>(window_.width));
+  for (int row = 0; row < window_.height; ++row) {
+    const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window_.width);
+    for (int i = 0; i < window_.width; ++i) {
+      depth_row_[static_cast<std::size_t>(i)] = sampling_.depth(frame, window_.y + row, window_.x + i);
+    }
+    const float* const depth = depth_row_.data();
+    const float* const ray_x = ray_x_.data() + first;
+    const float* const ray_y = ray_y_.data() + first;
+    const float* const ray_z = ray_z_.data() + first;
+    int* const cell = cell_of_.data() + first;
+    std::uint16_t* const height = height_of_.data() + first;
+    for (int i = 0; i < window_.width; ++i) {
+      const float x = from_x + depth[i] * ray_x[i] * inverse_cell, y = from_y + depth[i] * ray_y[i] * inverse_cell;
+      const float z = from_z + depth[i] * ray_z[i];
+      const bool inside = (depth[i] > 0) & (x >= 0) & (y >= 0) & (x < limit_x) & (y < limit_y) & (z > -0.4F) & (z < 3.0F);
+      const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
+      const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
+      const float steps = static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F;
+      cell[i] = inside ? row_of * columns + column_of : -1;
+      height[i] = static_cast<std::uint16_t>(static_cast<int>(steps));
     }
   }
 }
 
+void TopViewer::drop_robot(const cv::Mat1b& robot) {
+  for (int row = 0; row < window_.height; ++row) {
+    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(window_.y + row) + window_.x;
+    int* const cell = cell_of_.data() + static_cast<std::ptrdiff_t>(row) * window_.width;
+    for (int i = 0; i < window_.width; ++i) cell[i] = seen[i] == SelfFilter::kRobot ? -1 : cell[i];
+  }
+}
+
+// The highest surface of each cell, averaged over its readings; and what was seen of it. Of bare belt only the height
+// matters, and most of the picture is bare belt.
 void TopViewer::accumulate(const RgbdFrame& frame, const cv::Mat1b& robot) {
   highest_.setTo(0), sum_.setTo(0), count_.setTo(0);
-  view_.flags.setTo(0);
+  view_.flags.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
   auto* const highest = highest_.ptr<std::uint16_t>();
   auto* const sum = sum_.ptr<int>();
   auto* const count = count_.ptr<int>();
   auto* const colour = view_.colour.ptr<cv::Vec3b>();
   auto* const flags = view_.flags.ptr<std::uint8_t>();
-  std::size_t i = 0;
-  for (int row = window_.y; row < window_.br().y; ++row) {
-    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
-    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
-      if (cell_of_[i] < 0) continue;
-      if (seen[column] == SelfFilter::kRobot) {
-        cell_of_[i] = -1;
-        continue;
-      }
-      highest[cell_of_[i]] = std::max(highest[cell_of_[i]], height_of_[i]);
-    }
+  for (std::size_t i = 0; i < cell_of_.size(); ++i) {
+    if (cell_of_[i] >= 0) highest[cell_of_[i]] = std::max(highest[cell_of_[i]], height_of_[i]);
   }
-  i = 0;
+  const std::uint16_t bare = TopView::steps(kBare_m);
+  std::size_t i = 0;
   const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
   for (int row = window_.y; row < window_.br().y; ++row) {
     const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
     const bool border_row = row < kBorder || row >= sampling_.height - kBorder;
     for (int column = window_.x; column < window_.br().x; ++column, ++i) {
       const int cell = cell_of_[i];
-      if (cell < 0 || height_of_[i] + kSameSurface < highest[cell]) continue;
+      if (cell < 0) continue;
+      if (seen[column] != 0) flags[cell] |= TopView::kNearRobot;
+      if (height_of_[i] < bare || height_of_[i] + kSameSurface < highest[cell]) continue;
       sum[cell] += height_of_[i];
       ++count[cell];
       const std::size_t pixel = 3 * (static_cast<std::size_t>(row * sampling_.step) * stride +
                                      static_cast<std::size_t>(column * sampling_.step));
       colour[cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
-      if (seen[column] == SelfFilter::kNear) flags[cell] |= TopView::kNearRobot;
       if (border_row || column < kBorder || column >= sampling_.width - kBorder) flags[cell] |= TopView::kAtBorder;
     }
+  }
+  const int total = highest_.rows * highest_.cols;
+  for (int cell = 0; cell < total; ++cell) {
+    if (count[cell] > 1) highest[cell] = static_cast<std::uint16_t>(sum[cell] / count[cell]);
   }
 }
 
 // Lost readings leave single empty cells; hidden belt leaves wide ones, which must stay unknown.
 void TopViewer::fill_pinholes() {
-  auto* const raw = raw_.ptr<std::uint16_t>();
-  const auto* const sum = sum_.ptr<int>();
-  const auto* const count = count_.ptr<int>();
-  const int total = raw_.rows * raw_.cols;
-  for (int i = 0; i < total; ++i) raw[i] = static_cast<std::uint16_t>(count[i] > 1 ? sum[i] / count[i] : sum[i]);
-  raw_.copyTo(highest_);
+  highest_.copyTo(filled_);
+  const auto* const raw = highest_.ptr<std::uint16_t>();
+  auto* const filled = filled_.ptr<std::uint16_t>();
   auto* const colour = view_.colour.ptr<cv::Vec3b>();
-  const int stride = raw_.cols;
-  for (int row = 1; row + 1 < raw_.rows; ++row) {
+  const int stride = highest_.cols;
+  for (int row = 1; row + 1 < highest_.rows; ++row) {
     for (int column = 1; column + 1 < stride; ++column) {
       const int i = row * stride + column;
-      if (count[i] > 0) continue;
-      colour[i] = {0, 0, 0};
-      if (count[i - 1] + count[i + 1] == 0) continue;
+      if (raw[i] > 0 || raw[i - 1] + raw[i + 1] == 0) continue;
       std::array<int, 8> around{};
       std::size_t known = 0;
       for (const int j : {i - stride - 1, i - stride, i - stride + 1, i - 1, i + 1, i + stride - 1, i + stride, i + stride + 1}) {
-        if (count[j] == 0) continue;
+        if (raw[j] == 0) continue;
         std::size_t place = known++;
         for (; place > 0 && raw[around[place - 1]] > raw[j]; --place) around[place] = around[place - 1];
         around[place] = j;
       }
       if (known < kSurrounded) continue;
-      highest_.ptr<std::uint16_t>()[i] = raw[around[known / 2]];
+      filled[i] = raw[around[known / 2]];
       colour[i] = colour[around[known / 2]];
     }
   }
@@ -165,9 +182,10 @@ void TopViewer::fill_pinholes() {
 
 const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) {
   project(frame);
+  drop_robot(robot);
   accumulate(frame, robot);
   fill_pinholes();
-  cv::medianBlur(highest_, view_.height, 5);
+  cv::medianBlur(filled_, view_.height, 5);
   return view_;
 }
 

@@ -23,7 +23,7 @@ struct TopView {
   double surface_z_m = 0;      // world
   Vector3 camera_m = Vector3::Zero();  // world
   cv::Mat1w height;            // median filtered
-  cv::Mat3b colour;            // red, green, blue
+  cv::Mat3b colour;            // red, green, blue; black where nothing stands on the belt
   cv::Mat1b flags;
 
   [[nodiscard]] static double metres(std::uint16_t height) { return 1e-4 * (height - kLevel); }
@@ -56,16 +56,18 @@ class TopViewer {
 
  private:
   void project(const RgbdFrame& frame);
+  void drop_robot(const cv::Mat1b& robot);
   void accumulate(const RgbdFrame& frame, const cv::Mat1b& robot);
   void fill_pinholes();
 
   Sampling sampling_;
   world::Belt belt_;
   cv::Rect window_;              // of the sampled picture: what can see the belt
-  std::vector<Eigen::Vector3f> rays_;  // world direction of each sample in the window, optical z = 1
+  std::vector<float> ray_x_, ray_y_, ray_z_;  // world direction of each sample in the window, optical z = 1
+  std::vector<float> depth_row_;
   std::vector<int> cell_of_;     // −1: nothing there
   std::vector<std::uint16_t> height_of_;
-  cv::Mat1w highest_, raw_;
+  cv::Mat1w highest_, filled_;
   cv::Mat1i sum_, count_;
   TopView view_;
 };

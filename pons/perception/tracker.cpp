@@ -28,6 +28,20 @@ bool usable(const Sighting& s) { return !s.near_robot && !s.at_border; }
 
 double size_difference(const Vector3& a, const Vector3& b) { return (a - b).cwiseAbs().maxCoeff(); }
 
+// Whether all corners of `part` lie on `whole`, and as high.
+bool within(const Sighting& whole, const Sighting& part) {
+  const Vector3 middle = part.world_from_top.translation();
+  if (std::abs(middle.z() - whole.world_from_top.translation().z()) > 0.01) return false;
+  const double c = std::cos(part.yaw_rad), s = std::sin(part.yaw_rad);
+  for (const double a : {-0.5, 0.5}) {
+    for (const double b : {-0.5, 0.5}) {
+      const double along = a * part.size_m.x(), across = b * part.size_m.y();
+      if (!whole.covers(middle.x() + c * along - s * across, middle.y() + s * along + c * across, 0.012)) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 Tracker::Tracker(const world::Belt& belt) : belt_(belt) {}
@@ -96,6 +110,16 @@ Tracker::Observation Tracker::observe(const Track* track, const Sighting& sighti
   return o;
 }
 
+// How the track should look now.
+Sighting Tracker::expected(const Track& track, Time stamp, double travel_m) {
+  Sighting sighting = track.last;
+  const Eigen::Vector2d at = track.estimate.at(stamp);
+  sighting.world_from_top.translation() = Vector3(at.x() + travel_m, at.y(), track.estimate.z_m);
+  sighting.yaw_rad = track.estimate.yaw_rad;
+  sighting.size_m = track.estimate.size_m;
+  return sighting;
+}
+
 // Distance in metres, or infinity when they cannot be one object.
 double Tracker::cost(const Track& track, const Sighting& sighting, Time stamp, double travel_m) const {
   constexpr double kNever = 1e9;
@@ -104,12 +128,8 @@ double Tracker::cost(const Track& track, const Sighting& sighting, Time stamp, d
   const double distance = (Eigen::Vector2d(o.x_m, o.y_m) - predicted).norm();
   if (!usable(sighting) || !sighting.complete) {
     // Of a part that shows, only that it lies where the object should is known.
-    Sighting expected = track.last;
-    expected.world_from_top.translation() = Vector3(predicted.x() + travel_m, predicted.y(), track.estimate.z_m);
-    expected.yaw_rad = track.estimate.yaw_rad;
-    expected.size_m = track.estimate.size_m;
     const Vector3 seen = sighting.world_from_top.translation();
-    const bool inside = expected.covers(seen.x(), seen.y(), 0.01);
+    const bool inside = expected(track, stamp, travel_m).covers(seen.x(), seen.y(), 0.01);
     const bool as_high = std::abs(seen.z() - track.estimate.z_m) < 0.02;
     return inside && as_high ? 0.1 + distance : kNever;
   }
@@ -181,13 +201,17 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   track.last_seen = stamp;
   track.missing = 0;
   track.crowded = sighting.crowded || sighting.covered;
+  track.covered = sighting.covered;
   ++track.frames_seen;
   if (!usable(sighting)) return;
   const Observation o = observe(&track, sighting, stamp, travel_m);
   const bool was_doubtful = track.observations.back().doubtful;
-  // A good look outlives a glimpse of a part, but not when parts are all that shows.
-  track.doubts = o.doubtful ? track.doubts + 1 : 0;
-  if (o.doubtful && !was_doubtful && track.doubts < kDoubts) return;
+  // A good look outlives glimpses of a part, unless the part lies where the whole cannot.
+  if (o.doubtful && !was_doubtful) {
+    track.doubts = within(expected(track, stamp, travel_m), sighting) ? 0 : track.doubts + 1;
+    if (track.doubts < kDoubts) return;
+  }
+  track.doubts = 0;
   const double moved = (Eigen::Vector2d(o.x_m, o.y_m) - track.estimate.at(stamp)).norm();
   const bool round = sighting.shape == Shape::kBag && o.size_m.x() - o.size_m.y() < kRoundBag_m;
   const bool turned = !round && std::abs(o.yaw_rad - track.estimate.yaw_rad) > kDisturbed_rad;
@@ -268,6 +292,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
     track.frames_seen = 1;
     track.last_seen = stamp;
     track.crowded = sightings[s].crowded || sightings[s].covered;
+    track.covered = sightings[s].covered;
     ids[s] = track.id;
     tracks_.push_back(std::move(track));
   }
@@ -340,10 +365,8 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.position_sigma_m = 0.0005 + 0.0015 / std::sqrt(count) + 0.05 * e.velocity.norm();
   belief.yaw_sigma_rad = 0.002 + 0.01 / std::sqrt(count);
   belief.confidence = (1 - std::exp2(-std::min(count, 8.0))) * std::exp2(-track.missing);
-  if (track.observations.back().doubtful) {
-    belief.confidence = std::min(belief.confidence, kDoubtful);
-    belief.position_sigma_m += 0.01;
-  }
+  if (track.observations.back().doubtful || track.covered) belief.confidence = std::min(belief.confidence, kDoubtful);
+  if (track.observations.back().doubtful) belief.position_sigma_m += 0.01;
   belief.frames_seen = track.frames_seen;
   belief.last_seen = track.last_seen;
   belief.crowded = track.crowded;

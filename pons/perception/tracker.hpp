@@ -57,7 +57,7 @@ class Tracker {
     Sighting last;            // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
-    bool crowded = false;
+    bool crowded = false, covered = false;  // when last seen
     std::string code, other_code;
     int reads = 0, other_reads = 0, label_attempts = 0;
     bool forgotten = false;   // only kept to swallow frames from before it was taken
@@ -69,6 +69,7 @@ class Tracker {
   };
 
   [[nodiscard]] static Estimate estimate(const std::deque<Observation>& observations);
+  [[nodiscard]] static Sighting expected(const Track& track, Time stamp, double travel_m);
   [[nodiscard]] Observation observe(const Track* track, const Sighting& sighting, Time stamp, double travel_m) const;
   [[nodiscard]] double cost(const Track& track, const Sighting& sighting, Time stamp, double travel_m) const;
   std::vector<int> associate(const std::vector<Sighting>& sightings, Time stamp, double travel_m) const;

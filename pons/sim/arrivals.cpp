@@ -15,9 +15,9 @@ namespace {
 constexpr std::uint64_t kParcelStream = 0x70617263;  // names of the random streams
 constexpr std::uint64_t kGroupStream = 0x67726f75;
 constexpr double kPi = std::numbers::pi;
-constexpr double kEdgeFree_m = 0.012;   // belt left free at its sides
-constexpr double kSettle_m = 0.003;     // let down from so high
-constexpr double kSide_m = 0.0005;      // between neighbours that touch
+constexpr double kEdgeFree_m = 0.012;  // belt left free at its sides
+constexpr double kSettle_m = 0.003;    // let down from so high
+constexpr double kSide_m = 0.0005;     // between neighbours that touch
 
 struct Footprint {
   double x = 0, y = 0;  // half extents along the belt and across

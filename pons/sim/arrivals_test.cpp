@@ -26,7 +26,8 @@ TEST_P(Mix, HoldsTheSharesOfTheWorld) {
   };
   EXPECT_NEAR(share([](const Arrival& a) { return a.touching; }), world.arrivals.touching, 0.01);
   EXPECT_GE(share([](const Arrival& a) { return a.touching; }), 0.2);
-  EXPECT_NEAR(share([](const Arrival& a) { return a.label != LabelState::kReadable; }), world.arrivals.unreadable, 0.012);
+  EXPECT_NEAR(share([](const Arrival& a) { return a.label != LabelState::kReadable; }), world.arrivals.unreadable,
+              0.012);
 }
 
 TEST_P(Mix, TwoHundredParcelsAlreadyTouchEnough) {

@@ -8,8 +8,8 @@
 namespace pons::sim {
 namespace {
 
-constexpr float kEdge_m = 0.012f;        // neighbours further apart in depth make an edge
-constexpr double kEdgeDropout = 25;      // times the usual share there
+constexpr float kEdge_m = 0.012f;    // neighbours further apart in depth make an edge
+constexpr double kEdgeDropout = 25;  // times the usual share there
 constexpr double kMostEdgeDropout = 0.5;
 
 // The finalizer of SplitMix64.
@@ -19,8 +19,8 @@ inline std::uint64_t mix(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-// Near enough to a normal number (the sum of four uniform ones, scaled to unit variance), and cheap enough for a million
-// pixels.
+// Near enough to a normal number (the sum of four uniform ones, scaled to unit variance), and cheap enough for a
+// million pixels.
 inline float rough_normal(std::uint64_t bits) {
   const auto sum = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
   return static_cast<float>(sum - 131070) * (1.7320508f / 65536.0f);
@@ -28,8 +28,9 @@ inline float rough_normal(std::uint64_t bits) {
 
 }  // namespace
 
-Expected<std::unique_ptr<SimCamera>> SimCamera::create(const world::CameraSpec& spec, const mjModel* model, mjData* data,
-                                                       int camera_id, const LabelStore* labels, std::uint64_t seed) {
+Expected<std::unique_ptr<SimCamera>> SimCamera::create(const world::CameraSpec& spec, const mjModel* model,
+                                                       mjData* data, int camera_id, const LabelStore* labels,
+                                                       std::uint64_t seed) {
   auto renderer = Renderer::create(model, spec.width, spec.height, Look::kSensor);
   if (!renderer) return std::unexpected(renderer.error());
   std::unique_ptr<SimCamera> camera(new SimCamera);

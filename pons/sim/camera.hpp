@@ -11,13 +11,13 @@
 
 namespace pons::sim {
 
-// Depth carries noise of 1 σ = depth_noise_m · z² and lacks readings: a share everywhere, far more where depth jumps. All
-// of it depends on seed, camera, time stamp and pixel alone.
+// Depth carries noise of 1 σ = depth_noise_m · z² and lacks readings: a share everywhere, far more where depth jumps.
+// All of it depends on seed, camera, time stamp and pixel alone.
 class SimCamera final : public body::Camera {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<SimCamera>> create(const world::CameraSpec& spec, const mjModel* model,
-                                                                   mjData* data, int camera_id, const LabelStore* labels,
-                                                                   std::uint64_t seed);
+                                                                   mjData* data, int camera_id,
+                                                                   const LabelStore* labels, std::uint64_t seed);
 
   [[nodiscard]] const Intrinsics& intrinsics() const override { return intrinsics_; }
   void begin(Time now) override;

@@ -50,11 +50,11 @@ struct Cell {
   body::SetPoints set_points;  // in force
   body::Sensors measured;      // at the last step
   Duration step_length;
-  Time stepped;                // end of the last step
-  Time now;                    // last time advanced to
+  Time stepped;  // end of the last step
+  Time now;      // last time advanced to
   bool stop_pressed = false;
-  AxisVector held;             // where the brakes hold the arm; empty while it moves
-  std::string failure;         // what MuJoCo said when it gave up
+  AxisVector held;      // where the brakes hold the arm; empty while it moves
+  std::string failure;  // what MuJoCo said when it gave up
 
  private:
   std::vector<double> brake_acceleration, brake_torque;  // scratch, one a degree of freedom

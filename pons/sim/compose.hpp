@@ -1,5 +1,5 @@
-// From a world's files to one MuJoCo model: scene, arm at its base, tool at the flange, spare parcels, cameras. Private to
-// pons/sim.
+// From a world's files to one MuJoCo model: scene, arm at its base, tool at the flange, spare parcels, cameras. Private
+// to pons/sim.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@
 
 namespace pons::sim {
 
-inline constexpr int kSlots = 24;        // parcels in the cell at one moment
-inline constexpr int kLabelPixels = 100; // side of a label's texture: 25 modules of 4 pixels
+inline constexpr int kSlots = 24;         // parcels in the cell at one moment
+inline constexpr int kLabelPixels = 100;  // side of a label's texture: 25 modules of 4 pixels
 
 // What a geom is to the bookkeeping of contacts.
 enum class Part : unsigned char { kFixed, kBelt, kParcel, kArm, kCup };
@@ -36,9 +36,9 @@ struct Composed {
   int force_sensor = 0, torque_sensor = 0;  // addresses in sensordata
   int belt_geom = 0;
   std::vector<Slot> slots;
-  std::vector<Part> parts;          // of each geom
-  std::vector<int> slot_of_geom;    // -1 when it is no parcel
-  std::vector<int> cameras;         // ids in the order of world.cameras
+  std::vector<Part> parts;        // of each geom
+  std::vector<int> slot_of_geom;  // -1 when it is no parcel
+  std::vector<int> cameras;       // ids in the order of world.cameras
   int picture_camera = 0;
 };
 

@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint64_t kBeltStream = 0x62656c74, kSpoilStream = 0x73706f69;
 constexpr double kStartMargin_m = 0.01;  // between the belt's start and the rear of what is put down
 constexpr double kEyeHeight_m = 0.008;
-constexpr double kEye_m = 0.45;          // from the belt's start
+constexpr double kEye_m = 0.45;  // from the belt's start
 constexpr double kTau = 2 * std::numbers::pi;
 
 Vector3 position(const mjData* data, const Slot& slot) {
@@ -119,8 +119,8 @@ bool Feeder::photo_eye(const Composed& cell, const mjData* data, const Ledger& l
     for (const int geom : {slot.main, slot.rim}) {
       const mjModel* model = cell.model.get();
       if (model->geom_contype[geom] == 0) continue;
-      const double hit = mju_rayGeom(data->geom_xpos + 3 * geom, data->geom_xmat + 9 * geom, model->geom_size + 3 * geom,
-                                     from, along, model->geom_type[geom], nullptr);
+      const double hit = mju_rayGeom(data->geom_xpos + 3 * geom, data->geom_xmat + 9 * geom,
+                                     model->geom_size + 3 * geom, from, along, model->geom_type[geom], nullptr);
       if (hit >= 0 && hit <= 1) return true;
     }
   }

@@ -30,8 +30,8 @@ class BeltDrive {
   double speed_m_s_ = 0, travel_m_ = 0;
 };
 
-// Keeps arrivals.waiting parcels on the belt ahead of the pick zone's end, group by group, each as soon as there is room
-// at the belt's start.
+// Keeps arrivals.waiting parcels on the belt ahead of the pick zone's end, group by group, each as soon as there is
+// room at the belt's start.
 class Feeder {
  public:
   Feeder(const world::World& world, const world::Manifest& manifest, std::vector<Arrival> arrivals);
@@ -46,8 +46,8 @@ class Feeder {
   [[nodiscard]] bool room(const Composed& cell, const mjData* data, const Ledger& ledger, double length_m) const;
   [[nodiscard]] int waiting(const Composed& cell, const mjData* data, const Ledger& ledger) const;
   [[nodiscard]] std::size_t group_size() const;
-  void put_down(const Composed& cell, mjModel* model, mjData* data, Ledger& ledger, LabelStore& labels, double speed_m_s,
-                Time now);
+  void put_down(const Composed& cell, mjModel* model, mjData* data, Ledger& ledger, LabelStore& labels,
+                double speed_m_s, Time now);
 
   world::World world_;
   world::Manifest manifest_;

@@ -11,7 +11,8 @@
 namespace pons::sim {
 namespace {
 
-constexpr const char* kMend = "install libegl1 and libgl1-mesa-dri (tools/setup does), or point PONS_EGL at an EGL library";
+constexpr const char* kMend =
+    "install libegl1 and libgl1-mesa-dri (tools/setup does), or point PONS_EGL at an EGL library";
 
 }  // namespace
 
@@ -50,8 +51,7 @@ Expected<void> GlContext::Egl::open() {
       !get_error) {
     return fail("no OpenGL for the cameras: not an EGL library", file, kMend);
   }
-  const auto platform_display =
-      reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(get_proc("eglGetPlatformDisplayEXT"));
+  const auto platform_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(get_proc("eglGetPlatformDisplayEXT"));
   if (platform_display != nullptr) {
     display = platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
   }

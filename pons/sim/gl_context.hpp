@@ -1,5 +1,5 @@
-// An offscreen OpenGL context without a display, by EGL, which is loaded when first needed: a machine without it can run
-// everything but cameras, and hears what is missing. Private to pons/sim.
+// An offscreen OpenGL context without a display, by EGL, which is loaded when first needed: a machine without it can
+// run everything but cameras, and hears what is missing. Private to pons/sim.
 #pragma once
 
 #include <memory>

@@ -47,10 +47,9 @@ void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on
 }
 
 int Gripper::grip(int slot) const {
-  return static_cast<int>(std::count_if(cups_.begin(), cups_.begin() + static_cast<std::ptrdiff_t>(count_),
-                                        [slot](const Cup& cup) {
-                                          return cup.slot == slot && cup.pressure_kpa > kHolding_kpa;
-                                        }));
+  return static_cast<int>(
+      std::count_if(cups_.begin(), cups_.begin() + static_cast<std::ptrdiff_t>(count_),
+                    [slot](const Cup& cup) { return cup.slot == slot && cup.pressure_kpa > kHolding_kpa; }));
 }
 
 void Gripper::measure(const Composed& cell, const mjData* data) {
@@ -67,8 +66,8 @@ void Gripper::measure(const Composed& cell, const mjData* data) {
 }
 
 std::array<double, 6> Gripper::wrist(const Composed& cell, const mjData* data) const {
-  // MuJoCo's sensor gives what the arm exerts on the tool, and knows the contacts' push on the cups but not the adhesion
-  // that balances it.
+  // MuJoCo's sensor gives what the arm exerts on the tool, and knows the contacts' push on the cups but not the
+  // adhesion that balances it.
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_site(data->site_xmat +
                                                                                        9 * cell.wrist_site);
   const Eigen::Map<const Vector3> site(data->site_xpos + 3 * cell.wrist_site);

@@ -9,8 +9,8 @@
 
 namespace pons::sim {
 
-// A cup that is switched on and whose lip lies on a parcel, facing it, is evacuated to about 60 kPa with a time constant of
-// 20 ms; an open one draws 8 kPa; switched off, air returns with 12 ms. The adhesion follows the pressure.
+// A cup that is switched on and whose lip lies on a parcel, facing it, is evacuated to about 60 kPa with a time
+// constant of 20 ms; an open one draws 8 kPa; switched off, air returns with 12 ms. The adhesion follows the pressure.
 class Gripper {
  public:
   // Before each step; looks at the contacts of the last one.

@@ -9,8 +9,8 @@
 
 namespace pons::sim {
 
-// kLabelPixels × kLabelPixels RGB, top row first. Text: upper-case letters, digits and " $%*+-./:" need the smallest code;
-// anything else makes a larger one, which a camera may be too far away to read.
+// kLabelPixels × kLabelPixels RGB, top row first. Text: upper-case letters, digits and " $%*+-./:" need the smallest
+// code; anything else makes a larger one, which a camera may be too far away to read.
 [[nodiscard]] std::vector<std::uint8_t> draw_label(const std::string& text);
 // Blots it so that no reader decodes it: across the middle, and over two of the three corner marks.
 void spoil_label(std::vector<std::uint8_t>& pixels, Random random);

@@ -10,17 +10,17 @@ namespace pons::sim {
 namespace {
 
 constexpr double kGravity = 9.81;
-constexpr double kLifted_m = 0.02;                 // risen so far in the grip of the cups: held
+constexpr double kLifted_m = 0.02;  // risen so far in the grip of the cups: held
 constexpr double kSinking_m_s = 0.25, kStopped_m_s = 0.15;
-constexpr double kStill_m_s = 0.15;                // slower has come to rest, if it stays so
+constexpr double kStill_m_s = 0.15;  // slower has come to rest, if it stays so
 constexpr Duration kSettling = from_s(0.10);
-constexpr Duration kInside = from_s(0.8);          // whatever moves in a chute that long is in it
+constexpr Duration kInside = from_s(0.8);  // whatever moves in a chute that long is in it
 constexpr Duration kChuteCarriesOff = from_s(1.2);
-constexpr Duration kTrayCleared = from_s(6.0);     // long enough for the camera over it
-constexpr Duration kStrayCleared = from_s(8.0);    // at rest where nothing belongs
+constexpr Duration kTrayCleared = from_s(6.0);   // long enough for the camera over it
+constexpr Duration kStrayCleared = from_s(8.0);  // at rest where nothing belongs
 constexpr double kRimSlack_m = 0.02;
 constexpr double kWithinLimit = 1.001;
-constexpr std::size_t kWindow = 5;                 // steps of the mean acceleration at 2 ms
+constexpr std::size_t kWindow = 5;  // steps of the mean acceleration at 2 ms
 
 bool above(const world::Place& place, const Vector3& point) {
   const Vector3 d = (point - place.center_m).cwiseAbs();
@@ -199,9 +199,10 @@ void Ledger::Impl::locate(Track& track, ParcelTruth& parcel, const Vector3& at, 
   if (around != nullptr) {
     const bool chute = around->kind != world::PlaceKind::kTray;
     const bool arrived = now - track.moved >= kSettling || (chute && now - track.since >= kInside);
-    if (!arrived) return parcel.where == Whereabouts::kHeld || parcel.where == Whereabouts::kBelt
-                             ? set(Whereabouts::kFalling, name(Whereabouts::kFalling))
-                             : void();
+    if (!arrived)
+      return parcel.where == Whereabouts::kHeld || parcel.where == Whereabouts::kBelt
+                 ? set(Whereabouts::kFalling, name(Whereabouts::kFalling))
+                 : void();
     if (around->kind == world::PlaceKind::kChute) return set(Whereabouts::kChute, around->name);
     if (around->kind == world::PlaceKind::kException) return set(Whereabouts::kException, around->name);
     return set(Whereabouts::kTray, around->name);

@@ -1,6 +1,6 @@
-// Keeps account of what really happens, step by step: where each parcel is, how it was treated, how hard the arm worked.
-// The feeder learns from it which parcels wait and which have left; the records themselves leave pons/sim only through
-// truth.hpp. Private to pons/sim.
+// Keeps account of what really happens, step by step: where each parcel is, how it was treated, how hard the arm
+// worked. The feeder learns from it which parcels wait and which have left; the records themselves leave pons/sim only
+// through truth.hpp. Private to pons/sim.
 #pragma once
 
 #include <memory>
@@ -29,11 +29,11 @@ class Ledger {
   // Slots whose parcel is to be carried off now; each is named once, and is free afterwards.
   [[nodiscard]] const std::vector<int>& leaving() const;
 
-  [[nodiscard]] int parcel_in(int slot) const;   // -1 when the slot is free
+  [[nodiscard]] int parcel_in(int slot) const;          // -1 when the slot is free
   [[nodiscard]] int slot_of(std::size_t parcel) const;  // -1 when it is not in the cell
-  [[nodiscard]] bool on_belt(int slot) const;    // lies on the belt, unheld
-  [[nodiscard]] int in_transit() const;          // on the belt, held or falling
-  [[nodiscard]] std::size_t size() const;        // parcels of the manifest
+  [[nodiscard]] bool on_belt(int slot) const;           // lies on the belt, unheld
+  [[nodiscard]] int in_transit() const;                 // on the belt, held or falling
+  [[nodiscard]] std::size_t size() const;               // parcels of the manifest
 
   [[nodiscard]] const std::vector<ParcelTruth>& parcels() const;
   [[nodiscard]] const ArmTruth& arm() const;

@@ -20,7 +20,8 @@ using ModelPtr = std::unique_ptr<mjModel, MujocoDelete>;
 using DataPtr = std::unique_ptr<mjData, MujocoDelete>;
 
 // MuJoCo's own handler writes a file and ends the process. Ours keeps the text for take_message() of the thread that
-// caused it, and throws std::runtime_error for errors. The library has one handler for all; installing twice is harmless.
+// caused it, and throws std::runtime_error for errors. The library has one handler for all; installing twice is
+// harmless.
 void install_message_handler();
 // The newest warning or error of this thread, empty when there was none since the last call.
 [[nodiscard]] std::string take_message();

@@ -12,7 +12,7 @@ constexpr double kRimStep_m = 0.008;     // a bag's edges are that much thinner 
 constexpr double kLabelLift_m = 0.0006;  // above the surface
 constexpr double kLabelHalf_m = 0.0002;
 constexpr double kLabelMargin_m = 0.004;
-constexpr double kWake_m_s = 1e-9;       // any speed wakes a sleeping body
+constexpr double kWake_m_s = 1e-9;  // any speed wakes a sleeping body
 
 std::array<double, 4> quaternion(const Eigen::Quaterniond& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
@@ -108,9 +108,10 @@ void set_shape(mjModel* model, const Slot& slot, const world::ManifestRow& row, 
   set_bounds(model, slot, half);
 }
 
-void set_label(mjModel* model, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival, double label_m) {
+void set_label(mjModel* model, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
+               double label_m) {
   const Vector3 half = 0.5 * row.size_m;
-  const double half_label = 0.5 * label_m;
+  const double half_label = std::min(0.5 * label_m, 0.96 * half.head<2>().minCoeff());
   const double edge = kLabelMargin_m + half_label + (row.kind == world::ParcelKind::kBag ? kRimStep_m : 0);
   const double room_x = std::max(0.0, half.x() - edge), room_y = std::max(0.0, half.y() - edge);
   const double y = row.kind == world::ParcelKind::kTube ? 0 : arrival.label_offset[1] * room_y;

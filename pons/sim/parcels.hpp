@@ -11,8 +11,8 @@
 
 namespace pons::sim {
 
-// Rewrites shape, mass, inertia and what MuJoCo derived from them at compile time, and puts the body at `world_from_middle`
-// with the belt's speed along x.
+// Rewrites shape, mass, inertia and what MuJoCo derived from them at compile time, and puts the body at
+// `world_from_middle` with the belt's speed along x.
 void activate(mjModel* model, mjData* data, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
               double label_m, const Pose& world_from_middle, double speed_m_s);
 // Far away, weightless, touching nothing; `index` is the slot's number.

@@ -48,8 +48,7 @@ AxisVector Puppet::solve(const Vector3& at) {
     Eigen::Matrix<double, 6, 1> error;
     error << at - tip, axis.cross(Vector3(0, 0, -1));
     if (error.norm() < 1e-6) break;
-    const Eigen::Matrix<double, 6, 6> damped =
-        both * both.transpose() + 1e-5 * Eigen::Matrix<double, 6, 6>::Identity();
+    const Eigen::Matrix<double, 6, 6> damped = both * both.transpose() + 1e-5 * Eigen::Matrix<double, 6, 6>::Identity();
     q += both.transpose() * damped.ldlt().solve(error);
   }
   return q;
@@ -62,9 +61,8 @@ void Puppet::step(const AxisVector& position, const AxisVector& speed) {
   for (Eigen::Index i = 0; i < axes; ++i) {
     const auto index = static_cast<std::size_t>(i);
     const int dof = cell_.composed.arm_dof[index];
-    error[static_cast<std::size_t>(dof)] =
-        900 * (position[i] - cell_.data->qpos[cell_.composed.arm_qpos[index]]) +
-        60 * (speed[i] - cell_.data->qvel[dof]);
+    error[static_cast<std::size_t>(dof)] = 900 * (position[i] - cell_.data->qpos[cell_.composed.arm_qpos[index]]) +
+                                           60 * (speed[i] - cell_.data->qvel[dof]);
   }
   mj_mulM(model, cell_.data.get(), torque.data(), error.data());
   cell_.set_points.torque_nm.resize(axes);

@@ -24,12 +24,13 @@ struct LabelStore {
 // How a picture is to look; sensors want speed, people want shadows.
 enum class Look : std::uint8_t { kSensor, kPicture };
 
-// capture() on the thread that advances the physics; draw() on any one thread, not at the same time. What draw() needs is
-// copied in capture(), so the physics may go on in between.
+// capture() on the thread that advances the physics; draw() on any one thread, not at the same time. What draw() needs
+// is copied in capture(), so the physics may go on in between.
 class Renderer {
  public:
   // Errors: no OpenGL; a picture larger than the driver takes.
-  [[nodiscard]] static Expected<std::unique_ptr<Renderer>> create(const mjModel* model, int width, int height, Look look);
+  [[nodiscard]] static Expected<std::unique_ptr<Renderer>> create(const mjModel* model, int width, int height,
+                                                                  Look look);
   ~Renderer();
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;

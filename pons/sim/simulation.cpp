@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint64_t kNoiseStream = 0x6e6f6973;
 constexpr double kForceNoise_n = 0.15, kTorqueNoise_nm = 0.01, kVacuumNoise_kpa = 0.3;
-constexpr double kBrake = 1.5;  // holding torque of a brake, in drive torques
+constexpr double kBrake = 1.5;                                 // holding torque of a brake, in drive torques
 constexpr double kBrakeStiffness = 3600, kBrakeDamping = 120;  // 1/s², 1/s: 60 rad/s, critically damped
 constexpr double kBrakeHolds_rad_s = 0.02;
 
@@ -153,7 +153,7 @@ void Simulation::advance_to(Time time) {
   Cell& cell = *cell_;
   try {
     while (cell.stepped + cell.step_length <= time && cell.failure.empty()) cell.step();
-  } catch (const std::runtime_error& error) {
+  } catch (const std::exception& error) {
     cell.failure = error.what();
   }
   if (time > cell.now) cell.now = time;
@@ -193,11 +193,13 @@ std::uint64_t Simulation::state_digest() const {
 Expected<void> Simulation::health() const {
   const Cell& cell = *cell_;
   const std::string where = fmt::format("simulation at {:.3f} s", cell.stepped.s());
-  if (!cell.failure.empty()) return fail("MuJoCo gave up: " + cell.failure, where, "report the seed and the world");
+  if (!cell.failure.empty())
+    return fail("the simulation gave up: " + cell.failure, where, "report the seed and the world");
   for (int i = 0; i < mjNWARNING; ++i) {
     const mjWarningStat& warning = cell.data->warning[i];
     if (warning.number == 0) continue;
-    return fail(fmt::format("MuJoCo warned {} times: {}", warning.number, mju_warningText(i, static_cast<size_t>(warning.lastinfo))),
+    return fail(fmt::format("MuJoCo warned {} times: {}", warning.number,
+                            mju_warningText(i, static_cast<size_t>(warning.lastinfo))),
                 where, "report the seed and the world");
   }
   for (int i = 0; i < cell.composed.model->nq; ++i) {
@@ -219,7 +221,8 @@ Expected<std::vector<std::uint8_t>> Simulation::picture(int width, int height) c
   std::vector<std::uint8_t> rgb;
   rgb.reserve(upside_down.size());
   const auto row = static_cast<std::ptrdiff_t>(3 * width);
-  for (int i = height - 1; i >= 0; --i) rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
+  for (int i = height - 1; i >= 0; --i)
+    rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
   return rgb;
 }
 

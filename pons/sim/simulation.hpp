@@ -1,5 +1,5 @@
-// A world's cell in MuJoCo behind the body contract: arm, tool, belt, feeder, cameras. Truth about parcels is not here but
-// in truth.hpp, which only the referee, tests and apps may include.
+// A world's cell in MuJoCo behind the body contract: arm, tool, belt, feeder, cameras. Truth about parcels is not here
+// but in truth.hpp, which only the referee, tests and apps may include.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ struct Cell;
 // states to the byte.
 class Simulation {
  public:
-  // Composes scene, arm, tool and parcels, puts the arm at home with its brakes on, and opens the cameras. Errors: a file
-  // that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
+  // Composes scene, arm, tool and parcels, puts the arm at home with its brakes on, and opens the cameras. Errors: a
+  // file that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
   [[nodiscard]] static Expected<std::unique_ptr<Simulation>> create(const world::World& world,
                                                                     const world::Manifest& manifest,
                                                                     std::uint64_t seed);
@@ -39,7 +39,7 @@ class Simulation {
 
   // The stop input as a person presses (true) or releases (false) it.
   void press_stop(bool pressed);
-  // Places the arm at rest, brakes as they are. Throws nothing; `position` must have one value an axis.
+  // Places the arm at rest there, without moving through space; `position` must have one value an axis.
   void set_arm(const AxisVector& position);
 
   // How many parcels of the manifest have been put on the belt; whether all have been and none is on the belt, in the
@@ -49,7 +49,7 @@ class Simulation {
 
   // Digest of every position and speed: two runs of one seed agree.
   [[nodiscard]] std::uint64_t state_digest() const;
-  // An error once MuJoCo has warned (contacts dropped, memory short) or a state is not finite.
+  // An error once MuJoCo has warned (contacts dropped, memory short), gave up, or a state is not finite.
   [[nodiscard]] Expected<void> health() const;
   // The scene camera named "picture", with shadows and smoothed edges: height × width × 3 bytes, top row first.
   [[nodiscard]] Expected<std::vector<std::uint8_t>> picture(int width, int height) const;

@@ -23,34 +23,34 @@ enum class Whereabouts : std::uint8_t { kNotOffered, kBelt, kHeld, kFalling, kCh
 // One parcel of the manifest, in its order.
 struct ParcelTruth {
   std::string parcel_id;
-  std::string destination;             // as ordered
+  std::string destination;  // as ordered
   LabelTruth label = LabelTruth::kReadable;
-  bool touching = false;               // was put down touching, overlapping or leaning on a neighbour
-  bool overweight = false;             // really heavier than rules.max_mass_kg
-  bool oversize = false;               // really longer than rules.max_size_m
-  Vector3 size_m = Vector3::Zero();    // length, width, height
-  double mass_kg = 0;                  // real
-  Time offered;                        // when it was put on the belt; meaningless while kNotOffered
+  bool touching = false;             // was put down touching, overlapping or leaning on a neighbour
+  bool overweight = false;           // really heavier than rules.max_mass_kg
+  bool oversize = false;             // really longer than rules.max_size_m
+  Vector3 size_m = Vector3::Zero();  // length, width, height
+  double mass_kg = 0;                // real
+  Time offered;                      // when it was put on the belt; meaningless while kNotOffered
   Whereabouts where = Whereabouts::kNotOffered;
-  std::string place;                   // the place's name for kChute, kException and kTray, else name(where)
-  Time arrived;                        // when it came to rest there
-  double max_press_n = 0;              // largest sum of the arm's and tool's net normal forces on it in one step
-  double max_squeeze_n = 0;            // largest single contact with anything else while it was held
-  double max_drop_m = 0;               // deepest fall: from where it began to sink unheld to where it stopped
-  int picks = 0;                       // times it was lifted off by the cups
-  int drops = 0;                       // times it was lost although the vacuum was on
+  std::string place;         // the place's name for kChute, kException and kTray, else name(where)
+  Time arrived;              // when it came to rest there
+  double max_press_n = 0;    // largest sum of the arm's and tool's net normal forces on it in one step
+  double max_squeeze_n = 0;  // largest single contact with anything else while it was held
+  double max_drop_m = 0;     // deepest fall: from where it began to sink unheld to where it stopped
+  int picks = 0;             // times it was lifted off by the cups
+  int drops = 0;             // times it was lost although the vacuum was on
 };
 
 // How hard the arm really worked, over every physics step so far. Ratios to world limits; above 1 is a violation.
 struct ArmTruth {
   std::uint64_t steps = 0;
   double worst_speed_ratio = 0;
-  double worst_acceleration_ratio = 0;       // speed difference of two steps, over the step
-  double worst_mean_acceleration_ratio = 0;  // the same over 10 ms: contact chatter averaged out
-  double worst_torque_ratio = 0;             // commanded, before the drives clamp it
-  double worst_position_ratio = 0;           // outside [min, max]: 1 + excess in rad
-  std::uint64_t speed_violations = 0;        // axis-steps above 1.001
-  std::uint64_t acceleration_violations = 0; // of the 10 ms mean
+  double worst_acceleration_ratio = 0;        // speed difference of two steps, over the step
+  double worst_mean_acceleration_ratio = 0;   // the same over 10 ms: contact chatter averaged out
+  double worst_torque_ratio = 0;              // commanded, before the drives clamp it
+  double worst_position_ratio = 0;            // outside [min, max]: 1 + excess in rad
+  std::uint64_t speed_violations = 0;         // axis-steps above 1.001
+  std::uint64_t acceleration_violations = 0;  // of the 10 ms mean
   std::uint64_t torque_violations = 0;
 };
 
@@ -61,8 +61,8 @@ class Truth {
 
   [[nodiscard]] const std::vector<ParcelTruth>& parcels() const;
   [[nodiscard]] const ArmTruth& arm() const;
-  // World pose of the middle of the parcel's top face as the parcel was put down, x along its length; nothing while it is
-  // not in the cell.
+  // World pose of the middle of the parcel's top face as the parcel was put down, x along its length; nothing while it
+  // is not in the cell.
   [[nodiscard]] std::optional<Pose> top(std::size_t parcel) const;
   // Speed of that parcel's middle, world frame; zero when it is not in the cell.
   [[nodiscard]] Vector3 velocity_m_s(std::size_t parcel) const;

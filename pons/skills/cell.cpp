@@ -10,9 +10,12 @@ namespace {
 
 // Planned motion stays this far inside the enforced limits, so that rounding never trips them.
 constexpr double kPlanShare = 0.97;
-// Above this the arm is slower: torque, and the cups' grip against inertia.
-constexpr double kHeavyKg = 2.0;
-constexpr double kHeavyShare = 0.75;
+// Of what the cups hold, how much may be used up by a planned motion; the rest is for jolts and leaks.
+constexpr double kGripShare = 0.5;
+// The tip accelerates up to about this much when the joints use all of theirs.
+constexpr double kFullAcceleration_m_s2 = 16.0;
+constexpr double kSlowestShare = 0.3;
+constexpr double kGravity_m_s2 = 9.81;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
 
@@ -53,11 +56,28 @@ Pose Cell::tip_down(const Vector3& position, double yaw) {
   return pose;
 }
 
-AxisLimits Cell::limits_for(double mass_kg) const {
+AxisLimits Cell::limits_empty() const {
   AxisLimits limits = world.robot.limits;
   limits.speed_rad_s *= kPlanShare;
-  limits.acceleration_rad_s2 *= kPlanShare * (mass_kg > kHeavyKg ? kHeavyShare : 1.0);
+  limits.acceleration_rad_s2 *= kPlanShare;
   limits.jerk_rad_s3 *= kPlanShare;
+  return limits;
+}
+
+// The load's inertia acts half its height below the cups and tips it about one row of them; the other row, `span` away, holds
+// against that with what gravity leaves of its force.
+AxisLimits Cell::limits_loaded(double mass_kg, double height_m) const {
+  const world::Tool& tool = world.robot.tool;
+  double span_m = 0;
+  for (const Vector3& a : tool.cups_m)
+    for (const Vector3& b : tool.cups_m) span_m = std::max(span_m, std::abs(a.x() - b.x()));
+  const double row_n = 0.5 * tool.cup_force_n * static_cast<double>(tool.cups_m.size());
+  const double free_n = std::max(0.0, kGripShare * row_n - 0.5 * mass_kg * kGravity_m_s2);
+  const double tipping_kg_m = std::max(1e-6, mass_kg * 0.5 * height_m);
+  const double allowed_m_s2 = free_n * span_m / tipping_kg_m;
+  const double share = std::clamp(allowed_m_s2 / kFullAcceleration_m_s2, kSlowestShare, 1.0);
+  AxisLimits limits = limits_empty();
+  limits.acceleration_rad_s2 *= share;
   return limits;
 }
 

@@ -44,8 +44,10 @@ class Cell {
 
   // Tip pose, tool pointing down, over (x, y, z) with its x axis at `yaw`.
   [[nodiscard]] static Pose tip_down(const Vector3& position, double yaw);
-  // Limits the arm keeps with this on its cups: planned a little inside those that the cerebellum enforces.
-  [[nodiscard]] AxisLimits limits_for(double mass_kg) const;
+  // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces.
+  [[nodiscard]] AxisLimits limits_empty() const;
+  // Those with a load on the cups: what tips a tall or heavy parcel off them is acceleration.
+  [[nodiscard]] AxisLimits limits_loaded(double mass_kg, double height_m) const;
 
   const world::World& world;
   Arm arm;

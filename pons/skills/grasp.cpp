@@ -17,13 +17,6 @@ constexpr int kRounds = 8;
 
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-std::vector<ObjectBelief> all_but(const std::vector<ObjectBelief>& objects, std::uint32_t track) {
-  std::vector<ObjectBelief> others;
-  for (const ObjectBelief& object : objects)
-    if (object.track != track) others.push_back(object);
-  return others;
-}
-
 Vector3 belt_velocity(const Cell& cell) { return {cell.belt_speed_m_s(), 0, 0}; }
 
 }  // namespace
@@ -61,7 +54,7 @@ Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at, d
     if (q) seed = *q;
     return q;
   };
-  return motion::follow(start, at, path, duration_s, kKnot_s, cell.limits_for(0));
+  return motion::follow(start, at, path, duration_s, kKnot_s, cell.limits_empty());
 }
 
 Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad, const Vector3& offset,
@@ -76,8 +69,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
                            std::optional<double> yaw_rad) {
   Grasp grasp;
   const double object_yaw = std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
-  const auto others = all_but(cell.objects(), object.track);
-  const AxisLimits limits = cell.limits_for(0);
+  const AxisLimits limits = cell.limits_empty();
   const Vector3 up{0, 0, kHover_m};
   const Vector3 come_down = belt_velocity(cell) - Vector3(0, 0, kComeDown_m_s);
 
@@ -95,7 +87,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const auto q = cell.model.inverse(Cell::tip_down(hover, *yaw_rad), seed);
     if (!q) return std::unexpected(q.error());
     seed = *q;
-    way = cell.router.route(start, at, {*q, joint_speed(cell, *q, come_down)}, nullptr, others, limits);
+    way = cell.router.route(start, at, {*q, joint_speed(cell, *q, come_down)}, nullptr, cell.objects(), limits);
     if (!way) return std::unexpected(way.error());
     const double needed_s = to_s(way->back().end() - at);
     const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;

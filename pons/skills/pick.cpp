@@ -19,9 +19,11 @@ constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;   // a prediction off by more is worth a new plan
+constexpr double kUnweighed_kg = 1.5;  // assumed until the wrist has weighed it
 constexpr double kLift_m = 0.09;
 constexpr double kLifted_m = 0.015;   // nothing below supports the load any more
 constexpr double kRetreat_m = 0.08;
+constexpr double kSetDown_m = 0.01;   // over the belt, when let go
 constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
@@ -36,6 +38,7 @@ class Pick final : public task::Skill {
     if (stopped_) return {Status::kRetry, "the arm was stopped", {}};
     switch (phase_) {
       case Phase::kFind: return find(now);
+      case Phase::kRelieve: return relieve(now);
       case Phase::kApproach: return approach(now);
       case Phase::kGrip: return grip(now);
       case Phase::kLift: return lift(now);
@@ -54,12 +57,12 @@ class Pick final : public task::Skill {
   }
 
  private:
-  enum class Phase : std::uint8_t { kFind, kApproach, kGrip, kLift, kPutBack, kRetreat };
+  enum class Phase : std::uint8_t { kFind, kRelieve, kApproach, kGrip, kLift, kPutBack, kRetreat };
 
   Progress find(Time now) {
     if (cell_.held) {
       if (cell_.held->code == code_) return success(now);
-      return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
+      return begin_relieve(now);
     }
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
@@ -85,6 +88,37 @@ class Pick final : public task::Skill {
     return start(*grasp, *object, now);
   }
 
+  // A parcel that an earlier task left on the cups goes back on the belt, past the pick zone, and rides on.
+  Progress begin_relieve(Time now) {
+    const Time from = Arm::splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+    const world::Belt& belt = cell_.world.belt;
+    const Load& load = cell_.held->load;
+    const Vector3 tip{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + load.size_m.z() + kSetDown_m};
+    const auto yaw = nearest_yaw(cell_, state.position, tip, load.yaw_in_tip_rad);
+    if (!yaw) return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
+    const auto q = cell_.model.inverse(Cell::tip_down(tip, *yaw), state.position);
+    if (!q) return {Status::kFailed, q.error().line(), {}};
+    auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
+                                  cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
+    if (!way) return {Status::kRetry, way.error().line(), {}};
+    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
+    released_at_ = way->back().end();
+    phase_ = Phase::kRelieve;
+    return {};
+  }
+
+  Progress relieve(Time now) {
+    if (now < released_at_) return {};
+    cell_.arm.vacuum(false);
+    if (!cell_.arm.all_cups_open() && now < released_at_ + std::chrono::milliseconds(250)) return {};
+    cell_.held.reset();
+    cell_.arm.payload(0, Vector3::Zero());
+    phase_ = Phase::kFind;
+    seen_ = now;
+    return {};
+  }
+
   // The parcel is still too far upstream: hang over the place where it will come within reach.
   Progress wait_for(const ObjectBelief& object, const Grasp& grasp, Time now) {
     if (waiting_) return {};
@@ -96,7 +130,7 @@ class Pick final : public task::Skill {
     const auto q = cell_.model.inverse(Cell::tip_down(point, grasp.yaw_rad), state.position);
     if (!q) return {};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                                        cell_.limits_for(0));
+                                        cell_.limits_empty());
     if (way && cell_.arm.stream(*way)) waiting_ = true;
     return {};
   }
@@ -146,7 +180,7 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
     const Vector3 offset{0.10 * cell_.belt_speed_m_s(), 0, kLift_m};
-    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, Vector3::Zero(), cell_.limits_for(cell_.world.rules.max_mass_kg));
+    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, Vector3::Zero(), cell_.limits_loaded(kUnweighed_kg, target_.size_m.z()));
     if (!up) return {Status::kRetry, up.error().line(), {}};
     if (auto sent = cell_.arm.stream(*up); !sent) return {Status::kRetry, sent.error().line(), {}};
     Held held{.code = code_};
@@ -189,7 +223,7 @@ class Pick final : public task::Skill {
     const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
     const double down_s = 0.3;
     auto down = nudge(cell_, state, from, grasp_.yaw_rad, down_s * belt - Vector3(0, 0, height), belt,
-                      cell_.limits_for(cell_.held->mass_kg));
+                      cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
     if (down) {
       const Time end = down->back().end();
       if (auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.yaw_rad, 0.3)) {
@@ -217,9 +251,9 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const double yaw = phase_ == Phase::kFind ? 0 : grasp_.yaw_rad;
     auto up = phase_ == Phase::kFind || phase_ == Phase::kApproach
-                  ? motion::stop(state, from, cell_.limits_for(0))
-                  : nudge(cell_, state, from, yaw, {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_for(0));
-    if (!up) up = motion::stop(state, from, cell_.limits_for(0));
+                  ? motion::stop(state, from, cell_.limits_empty())
+                  : nudge(cell_, state, from, yaw, {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
+    if (!up) up = motion::stop(state, from, cell_.limits_empty());
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();
     phase_ = Phase::kRetreat;

@@ -14,7 +14,10 @@ namespace {
 using task::Progress;
 using task::Status;
 
-constexpr double kOverRim_m = 0.03;  // between rim and the parcel's underside when it is let go
+constexpr double kOverRim_m = 0.03;   // between rim and the parcel's underside when it is let go
+constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
+constexpr double kHigher_m = 0.05;    // tried next when a mouth is out of reach
+constexpr int kHeights = 3;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
@@ -59,22 +62,30 @@ class Place final : public task::Skill {
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
     const Load& load = cell_.held->load;
-    const Vector3 tip = target->center_m + Vector3(0, 0, kOverRim_m + load.size_m.z());
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-
-    // The parcel's sides along the mouth's; which of the four turns, the arm decides.
-    const auto yaw = nearest_yaw(cell_, state.position, tip, load.yaw_in_tip_rad);
-    if (!yaw) return {Status::kFailed, name_ + " is out of reach", {}};
-    const auto q = cell_.model.inverse(Cell::tip_down(tip, *yaw), state.position);
-    if (!q) return {Status::kFailed, q.error().line(), {}};
+    const auto q = over(*target, state.position);
+    if (!q) return {Status::kFailed, name_ + " is out of reach", {}};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                        cell_.limits_for(cell_.held->mass_kg));
+                                        cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
     phase_ = Phase::kCarry;
     return {};
+  }
+
+  // Over the middle of the mouth, the parcel's sides along the mouth's; which of the four turns, the arm decides.
+  Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
+    const Load& load = cell_.held->load;
+    Vector3 tip = target.center_m + Vector3(0, 0, std::max(kTipOverRim_m, kOverRim_m + load.size_m.z()));
+    Expected<double> yaw = fail("out of reach");
+    for (int height = 0; height < kHeights && !yaw; ++height) {
+      if (height > 0) tip.z() += kHigher_m;
+      yaw = nearest_yaw(cell_, from, tip, load.yaw_in_tip_rad);
+    }
+    if (!yaw) return std::unexpected(yaw.error());
+    return cell_.model.inverse(Cell::tip_down(tip, *yaw), from);
   }
 
   Progress carry(Time now) {
