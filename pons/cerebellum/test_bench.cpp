@@ -7,7 +7,6 @@
 #include <fstream>
 #include <iterator>
 #include <numbers>
-#include <regex>
 
 namespace pons::cerebellum {
 namespace {
@@ -34,23 +33,19 @@ world::Robot make_robot() {
   return robot;
 }
 
-std::string scaled(const std::string& number, double by) { return std::to_string(std::stod(number) * by); }
-
 // The URDF with every mass and inertia scaled, written where tests may write.
 std::filesystem::path scaled_urdf(const std::filesystem::path& urdf, double by) {
   std::ifstream in(urdf);
-  const std::string text((std::istreambuf_iterator<char>(in)), {});
-  const std::regex figure(R"re((mass value|i[xyz][xyz])="([-0-9.e]+)")re");
-  std::string out;
-  auto rest = text.cbegin();
-  for (std::sregex_iterator it(text.begin(), text.end(), figure), last; it != last; ++it) {
-    out.append(rest, (*it)[0].first);
-    out += (*it)[1].str() + "=\"" + scaled((*it)[2].str(), by) + "\"";
-    rest = (*it)[0].second;
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  for (const std::string key : {"mass value=\"", "ixx=\"", "ixy=\"", "ixz=\"", "iyy=\"", "iyz=\"", "izz=\""}) {
+    for (auto at = text.find(key); at != std::string::npos; at = text.find(key, at)) {
+      at += key.size();
+      const auto length = text.find('"', at) - at;
+      text.replace(at, length, std::to_string(std::stod(text.substr(at, length)) * by));
+    }
   }
-  out.append(rest, text.cend());
   const auto path = std::filesystem::path(testing::TempDir()) / ("scaled_" + std::to_string(by) + ".urdf");
-  std::ofstream(path) << out;
+  std::ofstream(path) << text;
   return path;
 }
 

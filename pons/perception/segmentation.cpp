@@ -47,7 +47,7 @@ void Segmenter::find_cores(const TopView& view) {
   auto* const flat = flat_.ptr<std::uint8_t>();
   const int total = view.height.rows * view.height.cols;
   // Coarser cells see the same slope as a larger step.
-  const int step = static_cast<int>(kStep * std::max(1.0, view.cell_m / 0.002));
+  const int step = static_cast<int>(kStep * std::max(1.0, view.cell_m / 0.0025));
   for (int i = 0; i < total; ++i) {
     foreground[i] = height[i] >= least ? 255 : 0;
     flat[i] = height[i] >= least && high[i] - low[i] < step ? 255 : 0;

@@ -27,15 +27,37 @@ struct Rectangle {
   double length = 0, width = 0;  // cells
 };
 
-std::vector<cv::Point> boundary(const std::vector<cv::Point>& cells) {
+// Cells as a picture of their own, with a margin.
+struct Mask {
+  cv::Point corner;
+  cv::Mat1b filled;
+};
+
+Mask mask_of(const std::vector<cv::Point>& cells) {
   const cv::Rect box = cv::boundingRect(cells);
-  const cv::Point corner = box.tl() - cv::Point(1, 1);
-  cv::Mat1b mask(box.height + 2, box.width + 2, std::uint8_t{0});
-  for (const cv::Point& cell : cells) mask(cell - corner) = 1;
+  Mask mask{box.tl() - cv::Point(3, 3), cv::Mat1b(box.height + 6, box.width + 6, std::uint8_t{0})};
+  for (const cv::Point& cell : cells) mask.filled(cell - mask.corner) = 1;
+  return mask;
+}
+
+// Threads of cells along a neighbour's flank do not belong to the face.
+std::vector<cv::Point> without_threads(const std::vector<cv::Point>& cells) {
+  Mask mask = mask_of(cells);
+  cv::morphologyEx(mask.filled, mask.filled, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
+  std::vector<cv::Point> kept;
+  for (const cv::Point& cell : cells) {
+    if (mask.filled(cell - mask.corner) != 0) kept.push_back(cell);
+  }
+  return 2 * kept.size() > cells.size() ? kept : cells;
+}
+
+std::vector<cv::Point> boundary(const std::vector<cv::Point>& cells) {
+  const Mask mask = mask_of(cells);
   std::vector<cv::Point> rim;
   for (const cv::Point& cell : cells) {
-    const cv::Point p = cell - corner;
-    if (mask(p.y, p.x - 1) + mask(p.y, p.x + 1) + mask(p.y - 1, p.x) + mask(p.y + 1, p.x) < 4) rim.push_back(cell);
+    const cv::Point p = cell - mask.corner;
+    const int around = mask.filled(p.y, p.x - 1) + mask.filled(p.y, p.x + 1) + mask.filled(p.y - 1, p.x) + mask.filled(p.y + 1, p.x);
+    if (around < 4) rim.push_back(cell);
   }
   return rim;
 }
@@ -117,7 +139,8 @@ Extent profile(const std::vector<cv::Point>& cells, const Eigen::Vector2d& axis,
   return half_height(counts, low - 0.5);
 }
 
-Rectangle fit_rectangle(const std::vector<cv::Point>& cells, Shape shape) {
+Rectangle fit_rectangle(const std::vector<cv::Point>& all_cells, Shape shape) {
+  const std::vector<cv::Point> cells = without_threads(all_cells);
   const std::vector<cv::Point> rim = boundary(cells);
   std::vector<cv::Point> hull;
   cv::convexHull(rim, hull);

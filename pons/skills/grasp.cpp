@@ -62,7 +62,7 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   const Vector3 from = cell.model.world_from_tip(start.position).translation();
   const auto q = cell.model.inverse(Cell::tip_down(from + offset, yaw_rad), start.position);
   if (!q) return std::unexpected(q.error());
-  return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, limits);
+  return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,

@@ -15,7 +15,7 @@ class MoveTo final : public task::Skill {
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
       moving_ = false;
-      return {};
+      return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{};
     }
     if (moving_) {
       if (now < arrives_) return {};

@@ -15,6 +15,11 @@ using task::Status;
 
 constexpr Duration kVacuumLead = std::chrono::milliseconds(40);   // before the contact
 constexpr Duration kSealWithin = std::chrono::milliseconds(330);  // after it, while riding along
+constexpr Duration kPressAfter = std::chrono::milliseconds(90);   // the contact, when too few cups have sealed
+constexpr double kPressFurther_m = 0.006;
+constexpr double kPressTakes_s = 0.08;
+constexpr int kPresses = 2;
+constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
@@ -24,6 +29,10 @@ constexpr double kLift_m = 0.09;
 constexpr double kLifted_m = 0.015;   // nothing below supports the load any more
 constexpr double kRetreat_m = 0.08;
 constexpr double kSetDown_m = 0.01;   // over the belt, when let go
+constexpr double kBeyond_m = 0.15;    // past the pick zone the arm still reaches down
+constexpr double kSpotStep_m = 0.02;
+constexpr Duration kSetDownTakes = std::chrono::milliseconds(900);
+constexpr Duration kSettle = std::chrono::milliseconds(80);  // after a lift, until the bellows swing no more
 constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
@@ -33,36 +42,39 @@ class Pick final : public task::Skill {
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
       stopped_ = true;
-      return {};
+      return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
     if (stopped_) return {Status::kRetry, "the arm was stopped", {}};
     switch (phase_) {
       case Phase::kFind: return find(now);
-      case Phase::kRelieve: return relieve(now);
       case Phase::kApproach: return approach(now);
       case Phase::kGrip: return grip(now);
       case Phase::kLift: return lift(now);
-      case Phase::kPutBack: return put_back(now);
+      case Phase::kSetDown: return set_down(now);
       case Phase::kRetreat: return retreat(now);
     }
     return {Status::kFailed, "unreachable", {}};
   }
 
   void cancel(Time now) override {
-    if (phase_ == Phase::kLift) {
-      begin_put_back(now, {Status::kFailed, "cancelled", {}});
-    } else if (phase_ != Phase::kPutBack && phase_ != Phase::kRetreat) {
+    cancelled_ = true;
+    if (!cell_.arm.operational()) return;
+    if (phase_ == Phase::kSetDown) {
+      verdict_ = {Status::kFailed, "cancelled", {}};
+    } else if (phase_ == Phase::kLift) {
+      begin_set_down(now, {Status::kFailed, "cancelled", {}});
+    } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
     }
   }
 
  private:
-  enum class Phase : std::uint8_t { kFind, kRelieve, kApproach, kGrip, kLift, kPutBack, kRetreat };
+  enum class Phase : std::uint8_t { kFind, kApproach, kGrip, kLift, kSetDown, kRetreat };
 
   Progress find(Time now) {
     if (cell_.held) {
       if (cell_.held->code == code_) return success(now);
-      return begin_relieve(now);
+      return begin_set_down(now, {});
     }
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
@@ -88,34 +100,59 @@ class Pick final : public task::Skill {
     return start(*grasp, *object, now);
   }
 
-  // A parcel that an earlier task left on the cups goes back on the belt, past the pick zone, and rides on.
-  Progress begin_relieve(Time now) {
+  // What cannot be sorted, or what an earlier task left on the cups, goes back on the belt where there is room, and rides
+  // on into the exception chute.
+  Progress begin_set_down(Time now, Progress verdict) {
+    verdict_ = std::move(verdict);
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-    const world::Belt& belt = cell_.world.belt;
     const Load& load = cell_.held->load;
-    const Vector3 tip{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + load.size_m.z() + kSetDown_m};
-    const auto yaw = nearest_yaw(cell_, state.position, tip, load.yaw_in_tip_rad);
-    if (!yaw) return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
-    const auto q = cell_.model.inverse(Cell::tip_down(tip, *yaw), state.position);
-    if (!q) return {Status::kFailed, q.error().line(), {}};
+    const auto spot = free_spot(from + kSetDownTakes);
+    const auto yaw = spot ? nearest_yaw(cell_, state.position, *spot, load.yaw_in_tip_rad) : Expected<double>(std::unexpected(spot.error()));
+    if (!yaw) return {Status::kRetry, "no room to set down " + cell_.held->code, {}};
+    const auto q = cell_.model.inverse(Cell::tip_down(*spot, *yaw), state.position);
+    if (!q) return {Status::kRetry, q.error().line(), {}};
     auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                  cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
+                                  cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z()));
     if (!way) return {Status::kRetry, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     released_at_ = way->back().end();
-    phase_ = Phase::kRelieve;
+    phase_ = Phase::kSetDown;
     return {};
   }
 
-  Progress relieve(Time now) {
-    if (now < released_at_) return {};
+  // Tip position over the first stretch of belt, from the middle of the pick zone on, that nothing will cover at `time`.
+  Expected<Vector3> free_spot(Time time) {
+    const world::Belt& belt = cell_.world.belt;
+    const Vector3& size = cell_.held->load.size_m;
+    const double own_m = 0.5 * std::hypot(size.x(), size.y());
+    const double z = belt.surface_z_m + size.z() + kSetDown_m;
+    for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m; x += kSpotStep_m) {
+      const bool free = std::none_of(cell_.objects().begin(), cell_.objects().end(), [&](const ObjectBelief& object) {
+        const double other_m = 0.5 * std::hypot(object.size_m.x(), object.size_m.y());
+        return std::abs(cell_.predict(object, time).x() - x) < own_m + other_m + kSpotStep_m;
+      });
+      if (free) return Vector3(x, belt.y_center_m, z);
+    }
+    return fail("the belt is full", "pick");
+  }
+
+  Progress set_down(Time now) {
+    if (now < released_at_) {
+      if (weigh_now(cell_, now) > kPushedBack_kg) return {};
+      released_at_ = now;  // it stands already: its size was misjudged
+      if (!cell_.arm.stop(now)) return {Status::kRetry, "cannot stop", {}};
+    }
     cell_.arm.vacuum(false);
     if (!cell_.arm.all_cups_open() && now < released_at_ + std::chrono::milliseconds(250)) return {};
     cell_.held.reset();
     cell_.arm.payload(0, Vector3::Zero());
-    phase_ = Phase::kFind;
-    seen_ = now;
+    if (verdict_.status == Status::kRunning) {
+      phase_ = Phase::kFind;
+      seen_ = now;
+      return {};
+    }
+    begin_retreat(now, verdict_);
     return {};
   }
 
@@ -168,11 +205,29 @@ class Pick final : public task::Skill {
     const int all = static_cast<int>(cell_.world.robot.tool.cups_m.size());
     const int needed_ticks = cell_.arm.sealed_cups() == all ? 1 : 3;
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
+    if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       cell_.arm.vacuum(false);
       begin_retreat(now, {Status::kRetry, fmt::format("{} of {} cups sealed", cell_.arm.sealed_cups(), all), {}});
     }
     return {};
+  }
+
+  // A parcel that lies askew meets some cups first; pressing on, the bellows give way and the others seal, too.
+  bool press_further(Time now) {
+    const Time from = Arm::splice_time(now);
+    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
+    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.yaw_rad, kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m),
+                      belt, cell_.limits_empty());
+    if (!down) return false;
+    const Time end = down->back().end();
+    const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.yaw_rad, 0.4);
+    if (!along) return false;
+    down->insert(down->end(), along->begin(), along->end());
+    if (!cell_.arm.stream(*down)) return false;
+    grasp_.contact = end;
+    ++presses_;
+    return true;
   }
 
   Progress begin_lift(Time now) {
@@ -204,45 +259,21 @@ class Pick final : public task::Skill {
     scale_.add(cell_, now);
     if (!scale_.ready()) return {};
     const double mass = scale_.mass_kg();
-    cell_.held->mass_kg = std::max(0.0, mass);
-    const double depth = 0.5 * target_.size_m.z();
-    const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
-    cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, depth));
-    if (mass > cell_.world.rules.max_mass_kg) {
-      begin_put_back(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
+    if (mass > cell_.world.rules.max_mass_kg && !settled_) {
+      // Too heavy, or a neighbour drags along: only a reading at rest may condemn it.
+      if (now >= cell_.arm.motion_end() + kSettle) {
+        scale_ = Scale{};
+        settled_ = true;
+      }
       return {};
     }
-    return success(now);
-  }
-
-  void begin_put_back(Time now, Progress verdict) {
-    verdict_ = std::move(verdict);
-    const Time from = Arm::splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    const double height = cell_.model.world_from_tip(state.position).translation().z() - lift_from_.z();
-    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    const double down_s = 0.3;
-    auto down = nudge(cell_, state, from, grasp_.yaw_rad, down_s * belt - Vector3(0, 0, height), belt,
-                      cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
-    if (down) {
-      const Time end = down->back().end();
-      if (auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.yaw_rad, 0.3)) {
-        down->insert(down->end(), along->begin(), along->end());
-      }
-      released_at_ = end;
+    cell_.held->mass_kg = std::max(0.0, mass);
+    const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
+    cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
+    if (mass > cell_.world.rules.max_mass_kg) {
+      return begin_set_down(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
     }
-    if (!down || !cell_.arm.stream(*down)) released_at_ = now;
-    phase_ = Phase::kPutBack;
-  }
-
-  Progress put_back(Time now) {
-    if (now < released_at_) return {};
-    cell_.arm.vacuum(false);
-    if (!cell_.arm.all_cups_open() && now < released_at_ + std::chrono::milliseconds(250)) return {};
-    cell_.held.reset();
-    cell_.arm.payload(0, Vector3::Zero());
-    begin_retreat(now, verdict_);
-    return {};
+    return success(now);
   }
 
   void begin_retreat(Time now, Progress verdict) {
@@ -281,8 +312,8 @@ class Pick final : public task::Skill {
   Scale scale_;
   Progress verdict_;
   std::string last_error_;
-  int sealed_ticks_ = 0;
-  bool waiting_ = false, stopped_ = false;
+  int sealed_ticks_ = 0, presses_ = 0;
+  bool waiting_ = false, stopped_ = false, settled_ = false, cancelled_ = false;
 };
 
 }  // namespace

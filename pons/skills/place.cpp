@@ -34,7 +34,7 @@ class Place final : public task::Skill {
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       phase_ = Phase::kPlan;
-      return {};
+      return cancelled_ ? Progress{Status::kFailed, "cancelled; still held", {}} : Progress{};
     }
     switch (phase_) {
       case Phase::kPlan: return plan(now);
@@ -46,6 +46,7 @@ class Place final : public task::Skill {
   }
 
   void cancel(Time now) override {
+    cancelled_ = true;
     if (phase_ == Phase::kRelease || phase_ == Phase::kHold) return;  // it is over the mouth already
     if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
     phase_ = Phase::kHold;
@@ -123,6 +124,7 @@ class Place final : public task::Skill {
   Time started_, arrives_;
   Phase phase_ = Phase::kPlan;
   int lost_ticks_ = 0;
+  bool cancelled_ = false;
 };
 
 }  // namespace

@@ -13,6 +13,7 @@ constexpr double kBeltMargin_m = 0.015;    // over the bare belt and rims
 constexpr double kObjectMargin_m = 0.020;  // over an object
 constexpr double kObjectGrow_m = 0.030;    // around an object's footprint
 constexpr double kFreeRadius_m = 0.08;     // about both ends, where the skill knows what it does
+constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.045;
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
@@ -37,6 +38,13 @@ std::vector<Vector3> probes(const Load* load) {
 }
 
 }  // namespace
+
+AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
+  AxisLimits wider = limits;
+  wider.acceleration_rad_s2 = limits.acceleration_rad_s2.cwiseMax(kCover * start.acceleration.cwiseAbs());
+  wider.speed_rad_s = limits.speed_rad_s.cwiseMax(kCover * start.speed.cwiseAbs());
+  return wider;
+}
 
 Router::Router(const world::World& world, model::RobotModel model) : world_(world), model_(std::move(model)) {}
 
@@ -78,7 +86,8 @@ Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
 }
 
 Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end, const Load* load,
-                                           std::span<const ObjectBelief> obstacles, const AxisLimits& limits) {
+                                           std::span<const ObjectBelief> obstacles, const AxisLimits& wanted) {
+  const AxisLimits limits = covering(wanted, start);
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
   const double clearance = worst_clearance(*direct, load, obstacles);

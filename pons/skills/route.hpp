@@ -19,6 +19,9 @@ struct Load {
   Vector3 offset_in_tip_m = Vector3::Zero();  // of the middle of its top face from the tip
 };
 
+// Limits that a motion from `start` can keep: tightened in the middle of a motion, they may lie below what it does now.
+[[nodiscard]] AxisLimits covering(const AxisLimits& limits, const AxisState& start);
+
 class Router {
  public:
   // `world` must outlive it.
