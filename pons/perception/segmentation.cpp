@@ -52,11 +52,13 @@ void Segmenter::find_cores(const TopView& view) {
     foreground[i] = height[i] >= least ? 255 : 0;
     flat[i] = height[i] >= least && high[i] - low[i] < step ? 255 : 0;
   }
+  // Along a low step noise leaves bridges; what is cut off with them, grow() gives back.
+  cv::erode(flat_, flat_, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   cv::Mat1i components;
   cv::Mat1i stats;
   cv::Mat1d centres;
   const int count = cv::connectedComponentsWithStats(flat_, components, stats, centres, 4, CV_32S);
-  const double smallest = 0.4 * kSmallest_m2 / (view.cell_m * view.cell_m);
+  const double smallest = 0.25 * kSmallest_m2 / (view.cell_m * view.cell_m);
   std::vector<int> renamed(static_cast<std::size_t>(count), 0);
   int next = 0;
   for (int i = 1; i < count; ++i) {

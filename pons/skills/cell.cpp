@@ -11,10 +11,10 @@ namespace {
 // Planned motion stays this far inside the enforced limits, so that rounding never trips them.
 constexpr double kPlanShare = 0.97;
 // Of what the cups hold, how much may be used up by a planned motion; the rest is for jolts and leaks.
-constexpr double kGripShare = 0.5;
+constexpr double kGripShare = 0.35;
 // The tip accelerates up to about this much when the joints use all of theirs.
 constexpr double kFullAcceleration_m_s2 = 16.0;
-constexpr double kSlowestShare = 0.3;
+constexpr double kSlowestShare = 0.12;
 constexpr double kGravity_m_s2 = 9.81;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
@@ -34,8 +34,25 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
     belt_acceleration_m_s2_ += share * (slope - belt_acceleration_m_s2_);
   }
   last_belt_speed_m_s_ = speed;
+  for (ObjectBelief& object : left_) {
+    object.world_from_top.translation().x() += speed * passed_s;
+    object.velocity_m_s.x() = speed;
+    object.stamp = now;
+  }
+  std::erase_if(left_, [&](const ObjectBelief& o) { return o.world_from_top.translation().x() > world.belt.x_end_m; });
   now_ = now;
   objects_ = std::move(objects);
+  objects_.insert(objects_.end(), left_.begin(), left_.end());
+}
+
+void Cell::left_on_belt(const Load& load, const Vector3& position) {
+  ObjectBelief object;
+  object.stamp = now_;
+  object.world_from_top.translation() = position;
+  object.velocity_m_s.x() = belt_speed_m_s();
+  object.size_m = load.size_m;
+  left_.push_back(object);
+  objects_.push_back(object);
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {

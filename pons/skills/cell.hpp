@@ -38,6 +38,9 @@ class Cell {
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
   [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
 
+  // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it has
+  // ridden off the end.
+  void left_on_belt(const Load& load, const Vector3& position);
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
@@ -60,6 +63,7 @@ class Cell {
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;
+  std::vector<ObjectBelief> left_;  // unlabelled, as of now_
   std::vector<std::uint32_t> forgotten_;
 };
 

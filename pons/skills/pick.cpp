@@ -24,6 +24,7 @@ constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;   // a prediction off by more is worth a new plan
+constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 constexpr double kUnweighed_kg = 1.5;  // assumed until the wrist has weighed it
 constexpr double kLift_m = 0.09;
 constexpr double kLifted_m = 0.015;   // nothing below supports the load any more
@@ -145,6 +146,7 @@ class Pick final : public task::Skill {
     }
     cell_.arm.vacuum(false);
     if (!cell_.arm.all_cups_open() && now < released_at_ + std::chrono::milliseconds(250)) return {};
+    cell_.left_on_belt(cell_.held->load, cell_.model.world_from_tip(cell_.arm.state().position).translation());
     cell_.held.reset();
     cell_.arm.payload(0, Vector3::Zero());
     if (verdict_.status == Status::kRunning) {
@@ -242,6 +244,8 @@ class Pick final : public task::Skill {
     held.load.size_m = target_.size_m;
     held.load.yaw_in_tip_rad = grasp_.yaw_rad - yaw_of(target_);
     cell_.held = held;
+    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
+    cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     cell_.forget(target_.track);
     phase_ = Phase::kLift;
     return {};

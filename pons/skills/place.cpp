@@ -19,6 +19,8 @@ constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are
 constexpr double kHigher_m = 0.05;    // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
+constexpr double kWide_m = 0.28;      // a wider one must hang still to fall through the mouth
+constexpr Duration kSwing = std::chrono::milliseconds(140);
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;   // of the load's mass
@@ -98,7 +100,8 @@ class Place final : public task::Skill {
       const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
       return {Status::kFailed, "dropped", {{"at_m", {tip.x(), tip.y(), tip.z()}}}};
     }
-    if (now + kLetGoEarly < arrives_) return {};
+    const bool wide = cell_.held->load.size_m.head<2>().maxCoeff() > kWide_m;
+    if (now < (wide ? arrives_ + kSwing : arrives_ - kLetGoEarly)) return {};
     cell_.arm.vacuum(false);
     phase_ = Phase::kRelease;
     return {};
