@@ -38,10 +38,12 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
     if (!socket) return std::unexpected(socket.error());
     self->desk = std::make_unique<Desk>(std::move(*socket), *self->bridge, *self->journal);
   }
-  self->crew = std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
+  self->crew =
+      std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
   std::function<void(Time)> visitors;
   if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), visitors);
+  self->bridge_side =
+      std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), visitors);
   return self;
 }
 

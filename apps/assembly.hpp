@@ -26,8 +26,8 @@
 namespace pons::apps {
 
 struct AssemblyOptions {
-  std::filesystem::path journal;                    // ":memory:" for none on disk
-  std::optional<std::filesystem::path> socket;      // where visitors may ask
+  std::filesystem::path journal;                // ":memory:" for none on disk
+  std::optional<std::filesystem::path> socket;  // where visitors may ask
   std::uint64_t seed = 1;
   runner::Pace pace = runner::Pace::kLockstep;
 };

@@ -37,7 +37,8 @@ Json Desk::answer(const std::string& text, Time now) {
     case gate::Operation::kShow: {
       const auto history = journal_.task(asked->task);
       if (!history) return gate::refusal(history.error());
-      if (!*history) return gate::refusal({"no task '" + asked->task + "'", "show", "pons task list shows those there are"});
+      if (!*history)
+        return gate::refusal({"no task '" + asked->task + "'", "show", "pons task list shows those there are"});
       Json events = Json::array();
       for (const bridge::Event& event : (*history)->events) events.push_back(to_json(event));
       return {{"ok", true}, {"task", to_json((*history)->record)}, {"events", std::move(events)}};

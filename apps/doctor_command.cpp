@@ -31,7 +31,8 @@ Finding try_realtime_priority() {
   const int refused = pthread_setschedparam(self, SCHED_FIFO, &wanted);
   pthread_setschedparam(self, policy, &before);
   if (refused == 0) return say(Finding::kGood, "real-time priority", "SCHED_FIFO granted");
-  return say(Finding::kDegraded, "real-time priority", "SCHED_FIFO refused: sudo setcap cap_sys_nice,cap_ipc_lock+ep $(which pons)");
+  return say(Finding::kDegraded, "real-time priority",
+             "SCHED_FIFO refused: sudo setcap cap_sys_nice,cap_ipc_lock+ep $(which pons)");
 }
 
 Finding try_locked_memory() {

@@ -26,8 +26,8 @@ int worlds() {
     }
     std::size_t chutes = 0;
     for (const world::Place& place : world->places) chutes += place.kind == world::PlaceKind::kChute ? 1 : 0;
-    fmt::print("{:<14} {} ({} axes), {} chutes, {} cameras\n", name, world->robot.name, world->robot.home.size(), chutes,
-               world->cameras.size());
+    fmt::print("{:<14} {} ({} axes), {} chutes, {} cameras\n", name, world->robot.name, world->robot.home.size(),
+               chutes, world->cameras.size());
   }
   return code;
 }
@@ -51,10 +51,11 @@ int skills(const std::string& name) {
     return kExitGood;
   }
   const task::SkillType* type = registry.find(name);
-  if (type == nullptr) return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
+  if (type == nullptr)
+    return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
   fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\narguments:\n{}\n", type->name, type->summary,
-             type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")), to_s(type->timeout),
-             type->attempts, type->schema.dump(2));
+             type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")),
+             to_s(type->timeout), type->attempts, type->schema.dump(2));
   return kExitGood;
 }
 

@@ -1,7 +1,7 @@
 // The command line: composes, parses, and runs what was chosen.
 
-#include <cstdio>
 #include <fmt/format.h>
+#include <cstdio>
 
 #include "apps/commands.hpp"
 

@@ -1,9 +1,9 @@
 #include "apps/paths.hpp"
 
+#include <unistd.h>
 #include <cstdlib>
 #include <string>
 #include <system_error>
-#include <unistd.h>
 
 namespace pons::apps {
 

@@ -1,8 +1,8 @@
 #include "apps/progress.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <unistd.h>
+#include <algorithm>
 
 namespace pons::apps {
 namespace {
@@ -14,7 +14,11 @@ constexpr std::int64_t kLines = 10;  // plain lines a run
 }  // namespace
 
 Progress::Progress(std::FILE* out, std::int64_t total)
-    : out_(out), total_(total), began_(std::chrono::steady_clock::now()), drawn_(began_), terminal_(isatty(fileno(out)) == 1) {}
+    : out_(out),
+      total_(total),
+      began_(std::chrono::steady_clock::now()),
+      drawn_(began_),
+      terminal_(isatty(fileno(out)) == 1) {}
 
 void Progress::show(const Figures& figures) {
   const auto now = std::chrono::steady_clock::now();
@@ -29,8 +33,8 @@ void Progress::show(const Figures& figures) {
   if (figures.done / every == shown_ / every && shown_ >= 0) return;
   shown_ = figures.done;
   const double wall_s = std::chrono::duration<double>(now - began_).count();
-  fmt::print(out_, "{:>6} of {} parcels, {:.0f} an hour, {} waiting, {:.0f} s simulated in {:.0f} s\n", figures.done, total_,
-             rate, figures.queue, figures.now.s(), wall_s);
+  fmt::print(out_, "{:>6} of {} parcels, {:.0f} an hour, {} waiting, {:.0f} s simulated in {:.0f} s\n", figures.done,
+             total_, rate, figures.queue, figures.now.s(), wall_s);
   std::fflush(out_);
 }
 
@@ -40,8 +44,8 @@ void Progress::bar(const Figures& figures, double rate) {
   std::string text(static_cast<std::size_t>(filled), '#');
   text.append(static_cast<std::size_t>(kBarWidth - filled), '.');
   const double wall_s = std::chrono::duration<double>(drawn_ - began_).count();
-  fmt::print(out_, "\r[{}] {}/{} parcels  {:.0f}/h  queue {}  {:.0f} s simulated, {:.1f}x real time\x1b[K", text, figures.done,
-             total_, rate, figures.queue, figures.now.s(), wall_s > 0 ? figures.now.s() / wall_s : 0.0);
+  fmt::print(out_, "\r[{}] {}/{} parcels  {:.0f}/h  queue {}  {:.0f} s simulated, {:.1f}x real time\x1b[K", text,
+             figures.done, total_, rate, figures.queue, figures.now.s(), wall_s > 0 ? figures.now.s() / wall_s : 0.0);
   std::fflush(out_);
   shown_ = figures.done;
 }

@@ -16,9 +16,9 @@ class Progress {
 
   struct Figures {
     Time now;
-    std::int64_t done = 0;        // parcels with an outcome
+    std::int64_t done = 0;  // parcels with an outcome
     std::int64_t sorted = 0;
-    std::size_t queue = 0;        // tasks waiting
+    std::size_t queue = 0;  // tasks waiting
   };
   // Draws when enough has changed; cheap otherwise.
   void show(const Figures& figures);

@@ -1,7 +1,7 @@
 // pons task: submit to a running bridge, list and show from it or from a journal at rest.
 
-#include <filesystem>
 #include <fmt/format.h>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -52,10 +52,12 @@ int submit(const TaskOptions& options) {
   const auto text = read_task(options.file);
   if (!text) return bad_input(text.error());
   const Json task = Json::parse(*text, nullptr, false);
-  if (task.is_discarded()) return bad_input({"not JSON", options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
+  if (task.is_discarded())
+    return bad_input({"not JSON", options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
   const auto answer = ask(options, {{"op", "submit"}, {"task", task}});
   if (!answer) return bad_input(answer.error());
-  fmt::print("{}: {}\n", answer->value("id", std::string{}), answer->value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
+  fmt::print("{}: {}\n", answer->value("id", std::string{}),
+             answer->value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
   return kExitGood;
 }
 
@@ -94,8 +96,8 @@ int list(const TaskOptions& options) {
 }
 
 int show(const TaskOptions& options) {
-  const auto answer =
-      options.journal.empty() ? ask(options, {{"op", "show"}, {"id", options.id}}) : from_journal(options.journal, options.id);
+  const auto answer = options.journal.empty() ? ask(options, {{"op", "show"}, {"id", options.id}})
+                                              : from_journal(options.journal, options.id);
   if (!answer) return bad_input(answer.error());
   print_row(answer->at("task"));
   for (const Json& event : answer->at("events")) {

@@ -1,10 +1,11 @@
-// How well perception sees: pose and size of every belief against the simulator's truth, and how many labels are read. The
-// arm stands still with its brakes on; parcels ride by under the cameras, with noise and dropouts as in the world's file.
+// How well perception sees: pose and size of every belief against the simulator's truth, and how many labels are read.
+// The arm stands still with its brakes on; parcels ride by under the cameras, with noise and dropouts as in the world's
+// file.
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fmt/format.h>
 #include <map>
 #include <optional>
 #include <set>
@@ -31,10 +32,12 @@ struct Errors {
     return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
   }
   void print(const char* name) const {
-    fmt::print("{:<10} {:>6} poses   xy {:.2f} / {:.2f} mm   z {:.2f} / {:.2f} mm   yaw {:.2f} / {:.2f} deg   size {:.1f} / {:.1f} mm"
-               "   (median / 95 %)\n",
-               name, xy_m.size(), 1e3 * at(xy_m, 0.5), 1e3 * at(xy_m, 0.95), 1e3 * at(z_m, 0.5), 1e3 * at(z_m, 0.95),
-               57.2958 * at(yaw_rad, 0.5), 57.2958 * at(yaw_rad, 0.95), 1e3 * at(size_m, 0.5), 1e3 * at(size_m, 0.95));
+    fmt::print(
+        "{:<10} {:>6} poses   xy {:.2f} / {:.2f} mm   z {:.2f} / {:.2f} mm   yaw {:.2f} / {:.2f} deg   size {:.1f} / "
+        "{:.1f} mm"
+        "   (median / 95 %)\n",
+        name, xy_m.size(), 1e3 * at(xy_m, 0.5), 1e3 * at(xy_m, 0.95), 1e3 * at(z_m, 0.5), 1e3 * at(z_m, 0.95),
+        57.2958 * at(yaw_rad, 0.5), 57.2958 * at(yaw_rad, 0.95), 1e3 * at(size_m, 0.5), 1e3 * at(size_m, 0.95));
   }
 };
 
@@ -48,7 +51,8 @@ bool counts(const ObjectBelief& belief, const world::World& world) {
 
 class Bench {
  public:
-  Bench(const world::World& world, const world::Manifest& manifest, sim::Simulation& simulation, perception::Perception& perception)
+  Bench(const world::World& world, const world::Manifest& manifest, sim::Simulation& simulation,
+        perception::Perception& perception)
       : world_(world), manifest_(manifest), simulation_(simulation), perception_(perception), truth_(simulation) {}
 
   void run() {
@@ -84,10 +88,13 @@ class Bench {
       }
     }
     for (const std::string& code : codes_) {
-      wrong += std::none_of(manifest_.begin(), manifest_.end(), [&](const auto& row) { return row.parcel_id == code; }) ? 1U : 0U;
+      wrong += std::none_of(manifest_.begin(), manifest_.end(), [&](const auto& row) { return row.parcel_id == code; })
+                   ? 1U
+                   : 0U;
     }
-    fmt::print("labels: {} of {} readable ones read ({:.2f} %), {} codes that no parcel of the manifest has\n", read, readable,
-               100.0 * static_cast<double>(read) / static_cast<double>(std::max<std::size_t>(1, readable)), wrong);
+    fmt::print("labels: {} of {} readable ones read ({:.2f} %), {} codes that no parcel of the manifest has\n", read,
+               readable, 100.0 * static_cast<double>(read) / static_cast<double>(std::max<std::size_t>(1, readable)),
+               wrong);
     fmt::print("beliefs without a parcel: {} of {}\n", ghosts_, beliefs_);
   }
 

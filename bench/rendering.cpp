@@ -1,9 +1,9 @@
 // What a frame costs: colour and depth of the parcel cell with parcels on the belt, median of many, by size.
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <fmt/format.h>
 #include <vector>
 
 #include "apps/paths.hpp"
@@ -49,6 +49,7 @@ int main() {
       ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
     }
     std::sort(ms.begin(), ms.end());
-    fmt::print("{:<10} median {:.1f} ms, 95 % {:.1f} ms\n", world.cameras[i].name, ms[ms.size() / 2], ms[ms.size() * 95 / 100]);
+    fmt::print("{:<10} median {:.1f} ms, 95 % {:.1f} ms\n", world.cameras[i].name, ms[ms.size() / 2],
+               ms[ms.size() * 95 / 100]);
   }
 }

@@ -7,7 +7,7 @@ target_compile_features(pons_flags INTERFACE cxx_std_23)
 # -ffp-contract=off: the same seed gives the same bytes whatever the compiler fuses.
 target_compile_options(pons_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion
   -Wno-missing-field-initializers -Wnon-virtual-dtor -Woverloaded-virtual -Werror -ffp-contract=off
-  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<CONFIG:Release>>:-Wno-maybe-uninitialized>)
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<NOT:$<CONFIG:Debug>>>:-Wno-maybe-uninitialized>)
 target_include_directories(pons_flags INTERFACE "${PROJECT_SOURCE_DIR}")
 
 # pons_module(NAME [SOURCES ...] [TESTS ...] [USES modules ...] [LIBRARIES external targets ...] [TEST_LIBRARIES ...])

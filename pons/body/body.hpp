@@ -15,22 +15,22 @@ namespace pons::body {
 // What the robot measures. Fixed size.
 struct Sensors {
   Time stamp;
-  AxisVector position;                        // rad
-  AxisVector speed;                           // rad/s
-  std::array<double, 3> wrist_force_n{};      // at the flange, flange frame: what the tool and load exert on the arm
-  std::array<double, 3> wrist_torque_nm{};    // likewise
+  AxisVector position;                      // rad
+  AxisVector speed;                         // rad/s
+  std::array<double, 3> wrist_force_n{};    // at the flange, flange frame: what the tool and load exert on the arm
+  std::array<double, 3> wrist_torque_nm{};  // likewise
   std::array<double, kMaxCups> cup_vacuum_kpa{};  // below ambient; 0 = open, about 60 = sealed
-  double belt_travel_m = 0;                   // encoder: how far the belt has run since the start
-  double belt_speed_m_s = 0;                  // encoder
-  bool photo_eye_blocked = false;             // at the belt's entry
-  bool stop_input = false;                    // the body's own stop button or safety chain
+  double belt_travel_m = 0;                       // encoder: how far the belt has run since the start
+  double belt_speed_m_s = 0;                      // encoder
+  bool photo_eye_blocked = false;                 // at the belt's entry
+  bool stop_input = false;                        // the body's own stop button or safety chain
 };
 
 // What the robot is told. Fixed size.
 struct SetPoints {
-  AxisVector torque_nm;                 // one an axis
-  std::uint32_t vacuum_on = 0;          // bit i = cup i
-  bool power = false;                   // false: drives off, brakes on, whatever the torque says
+  AxisVector torque_nm;         // one an axis
+  std::uint32_t vacuum_on = 0;  // bit i = cup i
+  bool power = false;           // false: drives off, brakes on, whatever the torque says
 };
 
 // A robot. One thread calls read and write, in turn, once a tick.

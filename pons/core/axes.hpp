@@ -16,12 +16,12 @@ using AxisVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, sta
 
 // Limits that hold in every tick. Rates are symmetric; all entries are positive except position_min.
 struct AxisLimits {
-  AxisVector position_min;        // rad
-  AxisVector position_max;        // rad
-  AxisVector speed_rad_s;         // rad/s
-  AxisVector acceleration_rad_s2; // rad/s²
-  AxisVector jerk_rad_s3;         // rad/s³
-  AxisVector torque_nm;           // N·m
+  AxisVector position_min;         // rad
+  AxisVector position_max;         // rad
+  AxisVector speed_rad_s;          // rad/s
+  AxisVector acceleration_rad_s2;  // rad/s²
+  AxisVector jerk_rad_s3;          // rad/s³
+  AxisVector torque_nm;            // N·m
 };
 
 // Where a joint-space motion is at one moment.

@@ -21,10 +21,10 @@ struct ObjectBelief {
   double confidence = 0;                   // 0..1: seen how often, how consistently
   double flatness_m = 0;                   // RMS distance of the top's points from their plane
   int frames_seen = 0;
-  Time last_seen;            // when a camera last saw it (stamp may be predicted further)
-  bool crowded = false;      // touches, overlaps or leans on a neighbour
-  std::string code;          // label text, empty until read
-  int label_attempts = 0;    // frames good enough to read a label on it, readable or not
+  Time last_seen;          // when a camera last saw it (stamp may be predicted further)
+  bool crowded = false;    // touches, overlaps or leans on a neighbour
+  std::string code;        // label text, empty until read
+  int label_attempts = 0;  // frames good enough to read a label on it, readable or not
 };
 
 }  // namespace pons

@@ -12,7 +12,7 @@ namespace pons {
 
 // Pinhole, no distortion. The optical frame is x right, y down, z forward (REP-103). Pixel centres are integers.
 struct Intrinsics {
-  int width = 0, height = 0;             // px
+  int width = 0, height = 0;              // px
   double fx = 0, fy = 0, cx = 0, cy = 0;  // px
 };
 

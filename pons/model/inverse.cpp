@@ -23,6 +23,7 @@ constexpr double kMaxStep = 0.5;         // rad or m, of any axis in one iterati
 constexpr double kDamping = 1e-2;        // λ² per squared error
 constexpr double kPull = 0.3;            // share of the way back to the seed, inside the null space
 constexpr double kPullAbove = 1e-3;      // error above which the null space is used
+constexpr double kNear = 0.05;           // m and rad: as near to the seed, a redundant arm takes the least joint motion
 constexpr double kSingularShare = 1e-3;  // of the seed's determinant: closer to singular than this has no side
 
 struct Attempt {
@@ -174,6 +175,11 @@ std::optional<AxisVector> solve_inverse(Chain& chain, const Pose& target, const 
     return attempt.q;
   };
 
+  // Turning the first axis would favour it over the others: a chain of small steps must begin the way that the
+  // pseudo-inverse of the Jacobian says, or a path along it starts with other joint speeds than the arm has.
+  if (seed.size() > 6 && pose_error(target, tip).cwiseAbs().maxCoeff() < kNear) {
+    if (auto q = attempt_from(seed)) return q;
+  }
   const AxisVector turned = turned_towards(chain, target, seed);
   if (auto q = attempt_from(turned)) return q;
   if (auto q = attempt_from(seed)) return q;

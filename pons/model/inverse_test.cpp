@@ -192,5 +192,25 @@ TEST(Inverse, RedundantArmStaysInsideItsLimitsAndNearItsSeed) {
   EXPECT_LT(farthest, 1.6);
 }
 
+TEST(Inverse, RedundantArmTakesSmallStepsByTheLeastJointMotion) {
+  const auto robot = seven_axis_arm();
+  auto model = RobotModel::load(robot).value();
+  Random random(14);
+  for (int i = 0; i < 200; ++i) {
+    AxisVector seed = robot.home;
+    for (auto& angle : seed) angle += random.uniform(-0.3, 0.3);
+    const Vector3 step(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01));
+    Pose target = model.world_from_tip(seed);
+    target.translation() += step;
+    Eigen::Matrix<double, 6, 1> twist = Eigen::Matrix<double, 6, 1>::Zero();
+    twist.head<3>() = step;
+    const Jacobian jacobian = model.tip_jacobian(seed);
+    const AxisVector least = jacobian.completeOrthogonalDecomposition().solve(twist);
+    const auto q = model.inverse(target, seed);
+    ASSERT_TRUE(q.has_value());
+    EXPECT_LT((*q - seed - least).norm(), 0.15 * least.norm() + 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace pons::model

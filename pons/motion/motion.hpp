@@ -30,8 +30,8 @@ struct Waypoint {
 // To standstill as soon as the limits allow, axes together.
 [[nodiscard]] Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& limits);
 
-// Follows path(t), t seconds from `at`, for `duration_s`: fits quintics through samples every `knot_s`, checks every limit.
-// The path must start at `start` (position, speed and acceleration within tolerances stated in the source).
+// Follows path(t), t seconds from `at`, for `duration_s`: fits quintics through samples every `knot_s`, checks every
+// limit. The path must start at `start` (position, speed and acceleration within tolerances stated in the source).
 [[nodiscard]] Expected<Trajectory> follow(const AxisState& start, Time at,
                                           const std::function<Expected<AxisVector>(double)>& path, double duration_s,
                                           double knot_s, const AxisLimits& limits);

@@ -52,6 +52,7 @@ void Segmenter::find_cores(const TopView& view) {
     foreground[i] = height[i] >= least ? 255 : 0;
     flat[i] = height[i] >= least && high[i] - low[i] < step ? 255 : 0;
   }
+  flat_.copyTo(in_core_);
   // Along a low step noise leaves bridges; what is cut off with them, grow() gives back.
   cv::erode(flat_, flat_, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   cv::Mat1i components;
@@ -69,7 +70,6 @@ void Segmenter::find_cores(const TopView& view) {
   const auto* const component = components.ptr<int>();
   for (int i = 0; i < total; ++i) labels[i] = renamed[static_cast<std::size_t>(component[i])];
   segments_.regions.assign(static_cast<std::size_t>(next), Region{});
-  in_core_ = segments_.labels > 0;
 }
 
 // Rims, curved flanks and narrow parts belong to the core from which they can be reached without a step.

@@ -16,6 +16,7 @@ constexpr double kUpright_rad = 3 * std::numbers::pi / 180;
 constexpr double kLeaning_rad = 3.5 * std::numbers::pi / 180;
 constexpr double kFullShape = 0.86;           // an ellipse fills π/4 of its rectangle
 constexpr double kHidden = 0.04;
+constexpr double kNarrowest_m = 0.03;
 constexpr double kBelow = 0.06;
 constexpr double kWhole = 0.90;
 constexpr double kNearlyWhole = 0.95;
@@ -284,7 +285,8 @@ std::vector<Sighting> measure(const TopView& view, const Segments& segments) {
     // A box that only lost a corner to the border is measured as well as a whole one.
     sighting.at_border = region.border_share > kLostCorner || (region.border_share > 0 && sighting.fill < kNearlyWhole);
     sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
-    sighting.complete = !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
+    sighting.sliver = sighting.size_m.y() < kNarrowest_m;
+    sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
     sightings.push_back(sighting);
   }
   // What leans on a lower neighbour hides a part of it, however whole the rest looks.

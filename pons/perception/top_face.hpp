@@ -32,6 +32,7 @@ struct Sighting {
   bool crowded = false;
   bool near_robot = false;
   bool at_border = false;
+  bool sliver = false;          // too narrow for an object: a piece of one
   // Where its top is, on the ground plan: middle and half sides along x and y of `top`.
   [[nodiscard]] bool covers(double x_m, double y_m, double margin_m) const;
 };

@@ -24,7 +24,7 @@ constexpr Duration kSwallow = std::chrono::milliseconds(500);
 
 double turn(double from, double to) { return std::remainder(to - from, std::numbers::pi); }
 
-bool usable(const Sighting& s) { return !s.near_robot && !s.at_border; }
+bool usable(const Sighting& s) { return !s.near_robot && !s.at_border && !s.sliver; }
 
 double size_difference(const Vector3& a, const Vector3& b) { return (a - b).cwiseAbs().maxCoeff(); }
 

@@ -1,7 +1,7 @@
 #include "pons/referee/referee.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
+#include <algorithm>
 #include <map>
 
 namespace pons::referee {
@@ -16,9 +16,9 @@ using task::Outcome;
 // What the journal says of one parcel.
 struct Entry {
   int tasks = 0, successes = 0;
-  bool ended = false;       // every task of it has an outcome
+  bool ended = false;  // every task of it has an outcome
   bool succeeded = false;
-  bool ride = false;        // let go by on purpose
+  bool ride = false;  // let go by on purpose
   std::string last_reason;
 };
 
@@ -65,11 +65,15 @@ class Judge {
     const Entry entry = found == entries_.end() ? Entry{} : found->second;
     if (entry.successes > 1) ++verdict_.duplicated;
     switch (parcel.where) {
-      case Whereabouts::kNotOffered: return;
-      case Whereabouts::kChute: return in_chute(parcel, entry);
-      case Whereabouts::kException: return in_exception(parcel, entry);
+      case Whereabouts::kNotOffered:
+        return;
+      case Whereabouts::kChute:
+        return in_chute(parcel, entry);
+      case Whereabouts::kException:
+        return in_exception(parcel, entry);
       case Whereabouts::kTray:
-      case Whereabouts::kFloor: return below(parcel, entry);
+      case Whereabouts::kFloor:
+        return below(parcel, entry);
       case Whereabouts::kBelt:
       case Whereabouts::kHeld:
       case Whereabouts::kFalling:
@@ -118,7 +122,8 @@ class Judge {
 
   void find(const ParcelTruth& parcel, const Entry& entry, std::string_view what) {
     verdict_.findings.push_back(fmt::format(
-        "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; journal: {}",
+        "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; "
+        "journal: {}",
         parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(), parcel.size_m.y(),
         parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "", parcel.picks, parcel.drops,
         entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason)));
@@ -131,8 +136,8 @@ class Judge {
 
 }  // namespace
 
-Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const sim::ArmTruth& arm, const bridge::Journal& journal,
-                        const Rules& rules, RunEnd end) {
+Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const sim::ArmTruth& arm,
+                        const bridge::Journal& journal, const Rules& rules, RunEnd end) {
   const auto entries = read(journal);
   if (!entries) return std::unexpected(entries.error());
   Verdict verdict;

@@ -27,10 +27,10 @@ struct Verdict {
   int deserved = 0;    // exceptions that had a reason: label, mass, size
   int undeserved = 0;  // exceptions that had none, drops with an entry among them
   int damaged = 0;
-  int unfinished = 0;  // still on the belt or in the hand when the run was broken off
-  std::uint64_t violations = 0;      // axis-steps beyond a limit, as the simulator saw the arm
-  double worst_ratio = 0;            // of measured speed or commanded torque to its limit
-  std::vector<std::string> findings; // one line for each parcel that is not sorted or deservedly excepted
+  int unfinished = 0;                 // still on the belt or in the hand when the run was broken off
+  std::uint64_t violations = 0;       // axis-steps beyond a limit, as the simulator saw the arm
+  double worst_ratio = 0;             // of measured speed or commanded torque to its limit
+  std::vector<std::string> findings;  // one line for each parcel that is not sorted or deservedly excepted
 };
 
 enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };

@@ -34,7 +34,9 @@ class RefereeTest : public ::testing::Test {
     ASSERT_TRUE(journal_->accept(task, Time{}));
   }
   void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
-  void ride(const std::string& code) { ASSERT_TRUE(journal_->event("", Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
+  void ride(const std::string& code) {
+    ASSERT_TRUE(journal_->event("", Time{}, "ride", {{"code", code}, {"reason", "r"}}));
+  }
 
   Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
     auto verdict = referee::judge(parcels, arm_, *journal_, {120, 0.6}, end);
@@ -51,7 +53,8 @@ TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   end("A", Outcome::kSucceeded);
   accept("B", "B");
   end("B", Outcome::kFailed);
-  const Verdict verdict = judge({parcel("A", Whereabouts::kChute, "chute_1"), parcel("B", Whereabouts::kChute, "chute_1")});
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_1"), parcel("B", Whereabouts::kChute, "chute_1")});
   EXPECT_EQ(verdict.offered, 2);
   EXPECT_EQ(verdict.sorted, 1);
   EXPECT_EQ(verdict.lost, 1);
@@ -72,9 +75,9 @@ TEST_F(RefereeTest, ExceptionNeedsAnEntryAndDeservesAReason) {
   end("B", Outcome::kException);
   accept("D", "D");
   end("D", Outcome::kSucceeded);
-  const Verdict verdict = judge({parcel("A", Whereabouts::kException, "exception"), heavy,
-                                 parcel("C", Whereabouts::kException, "exception"),
-                                 parcel("D", Whereabouts::kException, "exception")});
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kException, "exception"), heavy,
+             parcel("C", Whereabouts::kException, "exception"), parcel("D", Whereabouts::kException, "exception")});
   EXPECT_EQ(verdict.undeserved, 1);
   EXPECT_EQ(verdict.deserved, 1);
   EXPECT_EQ(verdict.lost, 2);  // C has no entry; D is not where its outcome says

@@ -111,7 +111,8 @@ void BridgeSide::look_after_arm(Time now) {
     skills_.arm(now);
     return;
   }
-  const bool stopped = state.safety == SafetyState::kProtectiveStop && state.stop_result == link::StopResult::kConfirmed;
+  const bool stopped =
+      state.safety == SafetyState::kProtectiveStop && state.stop_result == link::StopResult::kConfirmed;
   if (stopped && !needs_person(state.cause) && now - *stopped_since_ >= kStandstillBeforeReset) skills_.arm(now);
 }
 
@@ -127,7 +128,8 @@ bool BridgeSide::idle() const { return bridge_.idle(); }
 void BridgeSide::close(Time now) {
   const std::vector<std::string> unseen = dispatcher_.unseen();
   for (const std::string& code : unseen) {
-    bridge_.note("ride", {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},
+    bridge_.note("ride",
+                 {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},
                  now);
   }
   bridge_.note("closed", {{"never_identified", unseen.size()}, {"unlabelled_rides", unlabelled_}}, now);

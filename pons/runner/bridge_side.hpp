@@ -1,5 +1,5 @@
-// Everything that happens at the bridge's pace of 100 Hz, the same in lockstep and in real time: beliefs in, the brain's
-// tasks admitted, skills ticked, outcomes out, visitors answered.
+// Everything that happens at the bridge's pace of 100 Hz, the same in lockstep and in real time: beliefs in, the
+// brain's tasks admitted, skills ticked, outcomes out, visitors answered.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,8 @@ struct SkillPort {
 class BridgeSide {
  public:
   // All must outlive it. `visitors` is called once a period, before the bridge's tick: requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills, std::function<void(Time)> visitors);
+  BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills,
+             std::function<void(Time)> visitors);
 
   // One period. Error: a camera or the journal failed; the run cannot go on.
   [[nodiscard]] Expected<void> tick(Time now, CameraCrew& crew);
@@ -55,8 +56,8 @@ class BridgeSide {
   SkillPort skills_;
   std::function<void(Time)> visitors_;
   Snapshot seen_;
-  std::vector<std::uint32_t> gone_;      // taken off the belt, while snapshots may still show them
-  std::vector<std::uint32_t> forgotten_; // to tell perception with the next frame
+  std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
+  std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   std::optional<Time> stopped_since_;
   Time last_outcome_;
   std::int64_t outcomes_ = 0, succeeded_ = 0, rides_ = 0, stops_ = 0, unlabelled_ = 0;

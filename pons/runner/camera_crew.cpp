@@ -5,8 +5,8 @@
 
 namespace pons::runner {
 
-CameraCrew::CameraCrew(const world::World& world, std::vector<body::Camera*> cameras, perception::Perception& perception,
-                       Pace pace)
+CameraCrew::CameraCrew(const world::World& world, std::vector<body::Camera*> cameras,
+                       perception::Perception& perception, Pace pace)
     : world_(world), cameras_(std::move(cameras)), perception_(perception), pace_(pace), busy_(cameras_.size(), false) {
   for (const world::CameraSpec& spec : world_.cameras) next_shutter_.push_back(Time(from_s(spec.phase_s)));
   worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
@@ -32,8 +32,8 @@ void CameraCrew::open_shutters(Time now, const body::Sensors& sensors) {
     }
     cameras_[camera]->begin(now);
     const std::lock_guard lock(mutex_);
-    shots_.push_back({camera, now, now + latency(camera), {sensors.position, sensors.belt_travel_m},
-                      std::exchange(to_forget_, {})});
+    shots_.push_back(
+        {camera, now, now + latency(camera), {sensors.position, sensors.belt_travel_m}, std::exchange(to_forget_, {})});
     changed_.notify_all();
   }
 }
@@ -66,8 +66,8 @@ Expected<Snapshot> CameraCrew::develop(const Shot& shot, RgbdFrame& frame) {
   frame.camera = world_.cameras[shot.camera].name;
   frame.stamp = shot.stamp;
   perception_.process(frame, shot.moment);
-  Snapshot snapshot{shot.stamp, shot.due, shot.moment.belt_travel_m,
-                    perception_.beliefs(shot.stamp, shot.moment.belt_travel_m), {}};
+  Snapshot snapshot{
+      shot.stamp, shot.due, shot.moment.belt_travel_m, perception_.beliefs(shot.stamp, shot.moment.belt_travel_m), {}};
   for (const world::CameraSpec& camera : world_.cameras) {
     if (camera.watches != "belt") snapshot.occupancy[camera.watches] = perception_.occupancy(camera.watches);
   }
@@ -84,8 +84,8 @@ Expected<std::optional<Snapshot>> CameraCrew::collect(Time now, const std::vecto
     });
   }
   if (error_) return std::unexpected(*error_);
-  // A frame with a shorter latency may overtake: what counts is the newest shutter among those due, and nothing developed
-  // after a frame that is not due yet may leak its knowledge early.
+  // A frame with a shorter latency may overtake: what counts is the newest shutter among those due, and nothing
+  // developed after a frame that is not due yet may leak its knowledge early.
   std::optional<Snapshot> newest;
   while (!snapshots_.empty() && snapshots_.front().due <= now) {
     newest = std::move(snapshots_.front());

@@ -1,6 +1,6 @@
 // Opens the shutters on time and turns frames into beliefs on a thread of its own, so that rendering and vision overlap
-// with physics. Frames are taken in strictly by shutter time and beliefs come out with the camera's modelled latency, so the
-// result does not depend on how fast the thread is.
+// with physics. Frames are taken in strictly by shutter time and beliefs come out with the camera's modelled latency,
+// so the result does not depend on how fast the thread is.
 #pragma once
 
 #include <condition_variable>
@@ -33,8 +33,10 @@ enum class Pace : std::uint8_t { kLockstep, kRealTime };
 
 class CameraCrew {
  public:
-  // All must outlive it. In lockstep, collect() waits for a frame that is due; in real time a late frame is skipped over.
-  CameraCrew(const world::World& world, std::vector<body::Camera*> cameras, perception::Perception& perception, Pace pace);
+  // All must outlive it. In lockstep, collect() waits for a frame that is due; in real time a late frame is skipped
+  // over.
+  CameraCrew(const world::World& world, std::vector<body::Camera*> cameras, perception::Perception& perception,
+             Pace pace);
   ~CameraCrew();
   CameraCrew(const CameraCrew&) = delete;
   CameraCrew& operator=(const CameraCrew&) = delete;
@@ -66,10 +68,10 @@ class CameraCrew {
 
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::vector<bool> busy_;                   // a camera; from shutter to development
-  std::deque<Shot> shots_;                   // waiting for the worker; the front one is in work
-  std::deque<Snapshot> snapshots_;           // developed, by stamp
-  std::vector<std::uint32_t> to_forget_;     // not yet with a shot
+  std::vector<bool> busy_;                // a camera; from shutter to development
+  std::deque<Shot> shots_;                // waiting for the worker; the front one is in work
+  std::deque<Snapshot> snapshots_;        // developed, by stamp
+  std::vector<std::uint32_t> to_forget_;  // not yet with a shot
   std::optional<Error> error_;
   std::jthread worker_;
 };

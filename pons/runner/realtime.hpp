@@ -1,5 +1,5 @@
-// Wall-clock pace: the cerebellum on a thread of its own with real-time priority where it is granted, the body's physics
-// on another, vision on a third, the bridge on the caller's.
+// Wall-clock pace: the cerebellum on a thread of its own with real-time priority where it is granted, the body's
+// physics on another, vision on a third, the bridge on the caller's.
 #pragma once
 
 #include "pons/runner/run.hpp"

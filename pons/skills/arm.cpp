@@ -7,6 +7,7 @@ namespace {
 
 // Two bridge periods: one for the command to arrive under load, one in reserve.
 constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
+constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
 // A cup below this share of the sealed vacuum lets go.
 constexpr double kOpenShare = 0.4;
 
@@ -46,6 +47,15 @@ AxisState Arm::planned(Time time) const {
 Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().end(); }
 
 Time Arm::splice_time(Time now) { return now + kSpliceLead; }
+
+Time Arm::splice_time(Time now, const AxisLimits& limits) const {
+  Time from = splice_time(now);
+  for (; from < motion_end(); from += kSpliceStep) {
+    const AxisState state = planned(from);
+    if ((state.acceleration.cwiseAbs().array() <= limits.acceleration_rad_s2.array()).all()) break;
+  }
+  return from;
+}
 
 Expected<void> Arm::stream(const motion::Trajectory& trajectory) {
   // Half a motion would end moving, so all of it goes or nothing.

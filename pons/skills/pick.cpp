@@ -26,8 +26,8 @@ constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;   // a prediction off by more is worth a new plan
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 constexpr double kUnweighed_kg = 1.5;  // assumed until the wrist has weighed it
-constexpr double kLift_m = 0.09;
-constexpr double kLifted_m = 0.015;   // nothing below supports the load any more
+constexpr double kLift_m = 0.10;
+constexpr double kLifted_m = 0.030;   // nothing below supports the load any more
 constexpr double kRetreat_m = 0.08;
 constexpr double kSetDown_m = 0.01;   // over the belt, when let go
 constexpr double kBeyond_m = 0.15;    // past the pick zone the arm still reaches down
@@ -105,16 +105,17 @@ class Pick final : public task::Skill {
   // on into the exception chute.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
-    const Time from = Arm::splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
     const Load& load = cell_.held->load;
+    const AxisLimits limits = cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z());
+    const Time from = cell_.arm.splice_time(now, limits);
+    const AxisState state = cell_.arm.planned(from);
     const auto spot = free_spot(from + kSetDownTakes);
     const auto yaw = spot ? nearest_yaw(cell_, state.position, *spot, load.yaw_in_tip_rad) : Expected<double>(std::unexpected(spot.error()));
     if (!yaw) return {Status::kRetry, "no room to set down " + cell_.held->code, {}};
     const auto q = cell_.model.inverse(Cell::tip_down(*spot, *yaw), state.position);
     if (!q) return {Status::kRetry, q.error().line(), {}};
     auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                  cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z()));
+                                  limits);
     if (!way) return {Status::kRetry, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     released_at_ = way->back().end();
@@ -237,14 +238,14 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
     const Vector3 offset{0.10 * cell_.belt_speed_m_s(), 0, kLift_m};
-    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, Vector3::Zero(), cell_.limits_loaded(kUnweighed_kg, target_.size_m.z()));
+    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
+    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, Vector3::Zero(), cell_.limits_loaded(std::max(kUnweighed_kg, expected_kg), target_.size_m.z()));
     if (!up) return {Status::kRetry, up.error().line(), {}};
     if (auto sent = cell_.arm.stream(*up); !sent) return {Status::kRetry, sent.error().line(), {}};
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
     held.load.yaw_in_tip_rad = grasp_.yaw_rad - yaw_of(target_);
     cell_.held = held;
-    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     cell_.forget(target_.track);
     phase_ = Phase::kLift;

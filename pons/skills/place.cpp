@@ -65,12 +65,13 @@ class Place final : public task::Skill {
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
     const Load& load = cell_.held->load;
-    const Time from = Arm::splice_time(now);
+    const AxisLimits limits = cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z());
+    const Time from = cell_.arm.splice_time(now, limits);
     const AxisState state = cell_.arm.planned(from);
     const auto q = over(*target, state.position);
     if (!q) return {Status::kFailed, name_ + " is out of reach", {}};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                        cell_.limits_loaded(cell_.held->mass_kg, cell_.held->load.size_m.z()));
+                                        limits);
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();

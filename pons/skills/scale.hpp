@@ -1,6 +1,9 @@
 // Weighs what hangs on the cups from the wrist's force while the arm moves.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include "pons/skills/cell.hpp"
 
 namespace pons::skills {
@@ -10,14 +13,15 @@ class Scale {
  public:
   // With the tool pointing down. Call once a bridge tick while nothing supports the load.
   void add(Cell& cell, Time now);
-  [[nodiscard]] bool ready() const { return samples_ >= kNeeded; }
-  // Mass of the load, kg, tool taken off.
-  [[nodiscard]] double mass_kg() const { return samples_ == 0 ? 0 : sum_kg_ / samples_; }
+  // The last six readings and their halves agree: nothing supports the load any more.
+  [[nodiscard]] bool ready() const;
+  // Mass of the load by the last six readings, kg, tool taken off.
+  [[nodiscard]] double mass_kg() const;
 
  private:
-  static constexpr int kNeeded = 6;
-  int samples_ = 0;
-  double sum_kg_ = 0;
+  static constexpr std::size_t kNeeded = 6;
+  std::array<double, kNeeded> last_kg_{};  // a ring
+  std::size_t samples_ = 0;
 };
 
 // One reading at standstill, kg, tool taken off.

@@ -1,4 +1,5 @@
-// Whatever is wrong, a person gets one line that says what, where and how to mend it; exit code 2; nothing half-written.
+// Whatever is wrong, a person gets one line that says what, where and how to mend it; exit code 2; nothing
+// half-written.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,14 +32,15 @@ class BadInput : public ::testing::Test {
 
   void expect_manifest_refused(const std::string& text, const std::vector<std::string>& parts) {
     write_text(folder_ / "orders.csv", text);
-    expect_refused({"run", "parcel_cell", "--manifest", folder_ / "orders.csv", "--journal", folder_ / "j.db", "--report",
-                    folder_ / "r.json"},
+    expect_refused({"run", "parcel_cell", "--manifest", folder_ / "orders.csv", "--journal", folder_ / "j.db",
+                    "--report", folder_ / "r.json"},
                    parts);
   }
 
   std::vector<std::string> files() {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) names.push_back(entry.path().filename());
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      names.push_back(entry.path().filename());
     std::sort(names.begin(), names.end());
     return names;
   }
@@ -55,7 +57,8 @@ TEST_F(BadInput, Manifests) {
   expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,-1,50\n", {"orders.csv:2", "mass_kg"});
   expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,nan,0.15,0.1,1,50\n", {"orders.csv:2", "length_m"});
   expect_manifest_refused(std::string(kHeader) + "P1,chute_99,box,0.2,0.15,0.1,1,50\n", {"orders.csv:2", "chute_99"});
-  expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,1,50\n\xff\xfe,", {"orders.csv", "UTF-8"});
+  expect_manifest_refused(std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,1,50\n\xff\xfe,",
+                          {"orders.csv", "UTF-8"});
 }
 
 TEST_F(BadInput, AHundredMegabyteLine) {

@@ -1,12 +1,12 @@
 #include "tests/end_to_end/run_pons.hpp"
 
-#include <cstdlib>
 #include <fcntl.h>
-#include <fstream>
 #include <gtest/gtest.h>
-#include <iterator>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 
 namespace pons::tests {
 namespace {

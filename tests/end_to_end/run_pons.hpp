@@ -14,7 +14,8 @@ struct Finished {
 };
 
 // `arguments` are handed over as they are, through no shell. `environment` entries ("NAME=value") are added.
-[[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
+[[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments,
+                                const std::vector<std::string>& environment = {});
 
 // A folder of its own for one test, gone with it.
 class Folder {

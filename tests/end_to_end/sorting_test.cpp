@@ -51,17 +51,20 @@ TEST(Sorting, ThirtyParcelsOfAnySeedAreSortedOrExcepted) {
 TEST(Sorting, OneSeedGivesOneResult) {
   const Folder folder;
   for (const char* name : {"a", "b"}) {
-    const Finished run = run_pons({"run", "parcel_cell", "--parcels", "8", "--seed", "5", "--quiet", "--report", folder / name});
+    const Finished run =
+        run_pons({"run", "parcel_cell", "--parcels", "8", "--seed", "5", "--quiet", "--report", folder / name});
     ASSERT_EQ(run.code, 0) << run.out << run.err;
   }
   EXPECT_EQ(read_json(folder / "a")["state_hash"], read_json(folder / "b")["state_hash"]);
-  ASSERT_EQ(run_pons({"run", "parcel_cell", "--parcels", "8", "--seed", "6", "--quiet", "--report", folder / "c"}).code, 0);
+  ASSERT_EQ(run_pons({"run", "parcel_cell", "--parcels", "8", "--seed", "6", "--quiet", "--report", folder / "c"}).code,
+            0);
   EXPECT_NE(read_json(folder / "a")["state_hash"], read_json(folder / "c")["state_hash"]);
 }
 
 TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   const Folder folder;
-  const Finished run = run_pons({"run", "small_cell", "--parcels", "10", "--seed", "3", "--quiet", "--report", folder / "report.json"});
+  const Finished run =
+      run_pons({"run", "small_cell", "--parcels", "10", "--seed", "3", "--quiet", "--report", folder / "report.json"});
   ASSERT_EQ(run.code, 0) << run.out << run.err;
   expect_clean(read_json(folder / "report.json"));
   EXPECT_GE(read_json(folder / "report.json")["parcels"]["sorted"], 8);
@@ -70,8 +73,9 @@ TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
 TEST(Sorting, BothRunnersAgreeOnEachParcelsOutcome) {
   const Folder folder;
   for (const char* pace : {"--lockstep", "--realtime"}) {
-    const Finished run = run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "21", "--quiet", pace, "--socket",
-                                   folder / (std::string(pace) + ".sock"), "--journal", folder / (std::string(pace) + ".db")});
+    const Finished run =
+        run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "21", "--quiet", pace, "--socket",
+                  folder / (std::string(pace) + ".sock"), "--journal", folder / (std::string(pace) + ".db")});
     ASSERT_EQ(run.code, 0) << pace << "\n" << run.out << run.err;
   }
   EXPECT_EQ(outcomes(folder / "--lockstep.db"), outcomes(folder / "--realtime.db"));
