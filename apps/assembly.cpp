@@ -24,6 +24,12 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   self->simulation = std::move(*simulation);
   auto journal = bridge::Journal::open(options.journal);
   if (!journal) return std::unexpected(journal.error());
+  const auto counts = (*journal)->counts();
+  if (!counts) return std::unexpected(counts.error());
+  if (counts->accepted > 0) {
+    return fail("holds an earlier run", options.journal.string(),
+                "name another file for --journal, or move this one away");
+  }
   self->journal = std::move(*journal);
 
   self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});

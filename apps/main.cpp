@@ -39,6 +39,12 @@ int main(int argc, char** argv) {
     return app.exit(help);
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
+  } catch (const CLI::RequiredError& error) {
+    // CLI11 says only that a command is missing when it knows none of the words.
+    const bool unknown = app.get_subcommands().empty() && argc > 1;
+    const std::string what = unknown ? fmt::format("no command '{}'", argv[1]) : error.what();
+    fmt::print(stderr, "pons: {}; pons --help shows what there is\n", what);
+    return kExitBadInput;
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "pons: {}; pons --help shows what there is\n", error.what());
     return kExitBadInput;

@@ -1,10 +1,10 @@
 // pons run: one run of a world, from the first parcel to the report.
 
-#include <csignal>
-#include <filesystem>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <csignal>
+#include <filesystem>
 
 #include "apps/assembly.hpp"
 #include "apps/commands.hpp"
@@ -42,7 +42,7 @@ void on_interrupt(int) {
 }
 
 void watch_interrupts() {
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = on_interrupt;
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
@@ -54,8 +54,10 @@ Expected<void> writable(const fs::path& file, const char* option) {
   if (file.empty()) return {};
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   std::error_code error;
-  if (!fs::is_directory(folder, error)) return fail("no such folder", folder.string(), std::string("create it, or change ") + option);
-  if (fs::is_directory(file, error)) return fail("is a folder", file.string(), std::string("name a file for ") + option);
+  if (!fs::is_directory(folder, error))
+    return fail("no such folder", folder.string(), std::string("create it, or change ") + option);
+  if (fs::is_directory(file, error))
+    return fail("is a folder", file.string(), std::string("name a file for ") + option);
   if (access(folder.c_str(), W_OK) != 0) return fail("not writable", folder.string(), std::string("change ") + option);
   return {};
 }
@@ -64,8 +66,10 @@ Expected<world::Manifest> manifest_of(const RunOptions& options, const world::Wo
   if (options.manifest.empty()) return world::draw_manifest(world, options.parcels, options.seed);
   auto manifest = world::read_manifest(options.manifest, world);
   if (manifest && options.parcels_given) {
-    if (options.parcels < 1) return fail("--parcels is " + std::to_string(options.parcels), "pons run", "ask for at least 1");
-    if (manifest->size() > static_cast<std::size_t>(options.parcels)) manifest->resize(static_cast<std::size_t>(options.parcels));
+    if (options.parcels < 1)
+      return fail("--parcels is " + std::to_string(options.parcels), "pons run", "ask for at least 1");
+    if (manifest->size() > static_cast<std::size_t>(options.parcels))
+      manifest->resize(static_cast<std::size_t>(options.parcels));
   }
   return manifest;
 }
@@ -141,17 +145,18 @@ Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
 
 // Watches the run: Ctrl-C, the progress bar, and the moment for the picture.
 runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progress, std::int64_t total, bool& pictured) {
-  return {.interrupted = [] { return interrupts > 0; },
-          .progress =
-              [&, total](Time now) {
-                const std::int64_t done = cell.bridge_side->done();
-                if (!options.quiet) progress.show({now, done, cell.bridge_side->succeeded(), cell.bridge->queue_length()});
-                // With something on the cups, halfway: that is what the cell looks like.
-                if (!options.realtime && !options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
-                  pictured = take_picture(cell, options.picture).has_value();
-                }
-              },
-          .limit = Time(from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(total)))};
+  return {
+      .interrupted = [] { return interrupts > 0; },
+      .progress =
+          [&, total](Time now) {
+            const std::int64_t done = cell.bridge_side->done();
+            if (!options.quiet) progress.show({now, done, cell.bridge_side->succeeded(), cell.bridge->queue_length()});
+            // With something on the cups, halfway: that is what the cell looks like.
+            if (!options.realtime && !options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
+              pictured = take_picture(cell, options.picture).has_value();
+            }
+          },
+      .limit = Time(from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(total)))};
 }
 
 int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
@@ -185,6 +190,7 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
     }
     fmt::print("picture: {}\n", options.picture.string());
   }
+  if (!result->loop.degraded.empty()) fmt::print("degraded: {}\n", result->loop.degraded);
   if (!options.journal.empty()) fmt::print("journal: {}\n", options.journal.string());
   if (interrupts > 0) return kExitInterrupted;
   const bool good = result->complete && verdict->lost == 0 && verdict->missorted == 0 && verdict->duplicated == 0 &&
@@ -225,12 +231,15 @@ void add_run(CLI::App& app, Chosen& chosen) {
   auto* parcels = command->add_option("--parcels", options->parcels, "How many parcels (200)");
   command->add_option("--manifest", options->manifest, "CSV file of parcels, instead of drawing them from the seed");
   command->add_option("--seed", options->seed, "What is drawn: parcels, arrivals, noise (1)");
-  auto* lockstep = command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
-  command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")->excludes(lockstep);
+  auto* lockstep =
+      command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
+  command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")
+      ->excludes(lockstep);
   command->add_option("--journal", options->journal, "SQLite file that keeps tasks and outcomes (a temporary one)");
   command->add_option("--report", options->report, "JSON file for the figures of the run");
   command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
-  command->add_option("--socket", options->socket, "Where `pons task` reaches this run (on by default with --realtime)");
+  command->add_option("--socket", options->socket,
+                      "Where `pons task` reaches this run (on by default with --realtime)");
   command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
   command->add_flag("--quiet", options->quiet, "No progress");
   command->callback([options, parcels, &chosen] {

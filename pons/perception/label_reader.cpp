@@ -11,7 +11,7 @@
 namespace pons::perception {
 namespace {
 
-constexpr double kAround_m = 0.012;    // beyond the print, so that the quiet zone is in
+constexpr double kAround_m = 0.012;  // beyond the print, so that the quiet zone is in
 constexpr double kLeastPrint_m2 = 3e-4;
 
 std::optional<cv::Point2d> project(const RgbdFrame& frame, const Vector3& world) {
@@ -24,15 +24,16 @@ std::optional<cv::Point2d> project(const RgbdFrame& frame, const Vector3& world)
 // Where the ray through a pixel meets a height.
 Eigen::Vector2d unproject(const RgbdFrame& frame, const cv::Point2d& pixel, double z_m) {
   const Intrinsics& in = frame.intrinsics;
-  const Vector3 ray = frame.world_from_optical.linear() * Vector3((pixel.x - in.cx) / in.fx, (pixel.y - in.cy) / in.fy, 1);
+  const Vector3 ray =
+      frame.world_from_optical.linear() * Vector3((pixel.x - in.cx) / in.fx, (pixel.y - in.cy) / in.fy, 1);
   const Vector3 from = frame.world_from_optical.translation();
   return (from + ray * ((z_m - from.z()) / ray.z())).head<2>();
 }
 
 }  // namespace
 
-cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture, const Region& region,
-                                 double top_z_m) const {
+cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
+                                 const Region& region, double top_z_m) const {
   cv::Rect cells;
   double printed = 0;
   for (const cv::Point& cell : region.cells) {
@@ -65,8 +66,9 @@ std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, cons
     int scale;
     ZXing::Binarizer binarizer;
   };
-  for (const Attempt& attempt : {Attempt{1, ZXing::Binarizer::LocalAverage}, Attempt{2, ZXing::Binarizer::LocalAverage},
-                                 Attempt{2, ZXing::Binarizer::GlobalHistogram}, Attempt{3, ZXing::Binarizer::LocalAverage}}) {
+  for (const Attempt& attempt :
+       {Attempt{1, ZXing::Binarizer::LocalAverage}, Attempt{2, ZXing::Binarizer::LocalAverage},
+        Attempt{2, ZXing::Binarizer::GlobalHistogram}, Attempt{3, ZXing::Binarizer::LocalAverage}}) {
     const cv::Mat1b* source = &grey_;
     if (attempt.scale > 1) {
       cv::resize(grey_, large_, {}, attempt.scale, attempt.scale, cv::INTER_CUBIC);

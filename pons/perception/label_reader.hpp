@@ -18,17 +18,19 @@ struct LabelRead {
 
 class LabelReader {
  public:
-  // Tries the objects named in `wanted` (indices into `sightings`). In the order of `wanted`; at most one read a sighting.
-  std::vector<LabelRead> read(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture, const Segments& segments,
-                              const std::vector<Sighting>& sightings, const std::vector<std::size_t>& wanted);
+  // Tries the objects named in `wanted` (indices into `sightings`). In the order of `wanted`; at most one read a
+  // sighting.
+  std::vector<LabelRead> read(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
+                              const Segments& segments, const std::vector<Sighting>& sightings,
+                              const std::vector<std::size_t>& wanted);
 
  private:
   struct Found {
     std::string code;
     cv::Point2d middle;  // px, in the frame
   };
-  [[nodiscard]] cv::Rect print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture, const Region& region,
-                                    double top_z_m) const;
+  [[nodiscard]] cv::Rect print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
+                                    const Region& region, double top_z_m) const;
   [[nodiscard]] std::vector<Found> decode(const RgbdFrame& frame, const cv::Rect& area);
 
   cv::Mat1b grey_, large_;

@@ -24,7 +24,9 @@ TEST(LabelTest, ReadsEveryLabelAtAnyAngle) {
     belt.random = random.fork(static_cast<std::uint64_t>(round));
     Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
     for (int i = 0; i < 3; ++i) {
-      belt.things.push_back({.x_m = -0.85 + 0.35 * i, .y_m = random.uniform(-0.1, 0.1), .yaw_rad = random.uniform(-3.1, 3.1),
+      belt.things.push_back({.x_m = -0.85 + 0.35 * i,
+                             .y_m = random.uniform(-0.1, 0.1),
+                             .yaw_rad = random.uniform(-3.1, 3.1),
                              .size_m = {random.uniform(0.12, 0.2), 0.12, random.uniform(0.03, 0.25)},
                              .code = "P00" + std::to_string(1000 + 10 * round + i)});
     }
@@ -42,9 +44,15 @@ TEST(LabelTest, ReadsEveryLabelAtAnyAngle) {
 TEST(LabelTest, GivesEachOfTwoTouchingParcelsItsOwnCode) {
   SyntheticBelt belt;
   Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
-  belt.things = {{.x_m = -0.8, .size_m = {0.2, 0.16, 0.1}, .colour = {160, 120, 80}, .code = "P000001",
+  belt.things = {{.x_m = -0.8,
+                  .size_m = {0.2, 0.16, 0.1},
+                  .colour = {160, 120, 80},
+                  .code = "P000001",
                   .label_offset_m = {0.06, 0.02, 0}},
-                 {.x_m = -0.6, .size_m = {0.2, 0.16, 0.1}, .colour = {110, 130, 150}, .code = "P000002",
+                 {.x_m = -0.6,
+                  .size_m = {0.2, 0.16, 0.1},
+                  .colour = {110, 130, 150},
+                  .code = "P000002",
                   .label_offset_m = {-0.06, 0, 0}}};
   belt.watch(perception, 2);
   belt.wait(0.2);

@@ -23,8 +23,8 @@ struct Perception::Impl {
   Segmenter segmenter;
   LabelReader label_reader;
   Tracker tracker;
-  std::map<std::string, TopViewer, std::less<>> viewers;    // by camera
-  std::map<std::string, TrayWatch, std::less<>> watches;    // by place
+  std::map<std::string, TopViewer, std::less<>> viewers;  // by camera
+  std::map<std::string, TrayWatch, std::less<>> watches;  // by place
 
   Impl(const world::World& the_world, model::RobotModel model)
       : world(the_world), self_filter(std::move(model)), tracker(the_world.belt) {

@@ -1,4 +1,5 @@
-// Frames to beliefs: what lies on the belt, where, how large, with what label; what fell into the tray. Never in the loop.
+// Frames to beliefs: what lies on the belt, where, how large, with what label; what fell into the tray. Never in the
+// loop.
 #pragma once
 
 #include <memory>
@@ -23,17 +24,22 @@ class Perception {
   Perception(const world::World& world, model::RobotModel model);
   ~Perception();
 
-  // Takes in one frame (in the order of their stamps). Frames of a camera that watches the belt update tracks; those of a
-  // camera that watches a place update occupancy().
+  // Takes in one frame (in the order of their stamps). Frames of a camera that watches the belt update tracks; those of
+  // a camera that watches a place update occupancy().
   void process(const RgbdFrame& frame, const Moment& moment);
 
-  // Every live track, predicted to `now` by the belt's travel. Ordered by track.
+  // Every live track, predicted to `now` by the belt's travel. Ordered by track. World frame; where the top leans by
+  // more than 3°, world_from_top leans with it. size_m.z is the top's height above the belt. confidence is 1 − 2⁻ⁿ
+  // after n frames that agree (n = 1 again after a push), halved for each frame that looked and did not find it, and at
+  // most 0.3 while the object is partly hidden or something lies or leans on it: take what hides it first.
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
 
-  // The arm took this one (or it fell): stop predicting it with the belt.
+  // The arm took this one (or it fell): stop predicting it with the belt. Frames shuttered within half a second after
+  // the newest one taken in do not bring it back; what still lies there later is a new track.
   void forget(std::uint32_t track);
 
-  // How many separate things lie in a watched place (the tray), as last seen.
+  // How many separate things lie in a watched place (the tray), as last seen. The place's first three frames must show
+  // it empty. 0 for a place that no camera watches.
   [[nodiscard]] int occupancy(std::string_view place) const;
 
  private:

@@ -90,7 +90,8 @@ TEST(PerceptionTest, TellsTouchingBoxesOfEqualHeightApartByColour) {
 
 TEST(PerceptionTest, TellsTouchingBoxesOfOneColourApartByTheirOutline) {
   Eyes eyes;
-  eyes.belt.things = {{.x_m = -0.8, .size_m = {0.2, 0.2, 0.1}}, {.x_m = -0.625, .y_m = 0.03, .size_m = {0.15, 0.1, 0.1}}};
+  eyes.belt.things = {{.x_m = -0.8, .size_m = {0.2, 0.2, 0.1}},
+                      {.x_m = -0.625, .y_m = 0.03, .size_m = {0.15, 0.1, 0.1}}};
   eyes.belt.watch(eyes.perception, 5);
   const auto beliefs = eyes.beliefs();
   ASSERT_EQ(beliefs.size(), 2u);
@@ -229,8 +230,13 @@ class WithArm : public ::testing::Test {
       for (int i = 0; i <= 16; ++i) {
         const Vector3 at = capsule.from + (capsule.to - capsule.from) * (i / 16.0);
         if (at.z() > 2.4) continue;
-        robot_.push_back({.solid = Solid::kBag, .x_m = at.x(), .y_m = at.y(), .size_m = Vector3::Constant(2 * capsule.radius_m),
-                          .colour = {200, 200, 210}, .base_m = at.z() - capsule.radius_m - 0.9, .fixed = true});
+        robot_.push_back({.solid = Solid::kBag,
+                          .x_m = at.x(),
+                          .y_m = at.y(),
+                          .size_m = Vector3::Constant(2 * capsule.radius_m),
+                          .colour = {200, 200, 210},
+                          .base_m = at.z() - capsule.radius_m - 0.9,
+                          .fixed = true});
       }
     }
   }

@@ -15,7 +15,9 @@ struct Plane {
   Eigen::Vector3d abc = Eigen::Vector3d::Zero();
   double rms_m = 0;  // of the cells it was fitted to, worst 3 % left out
 
-  [[nodiscard]] double at(double x, double y) const { return abc[0] + abc[1] * (x - middle.x()) + abc[2] * (y - middle.y()); }
+  [[nodiscard]] double at(double x, double y) const {
+    return abc[0] + abc[1] * (x - middle.x()) + abc[2] * (y - middle.y());
+  }
   // Filtered noise of a plane stays below half of this limit.
   [[nodiscard]] bool curved() const { return rms_m > 0.0022; }
 };

@@ -10,16 +10,17 @@
 namespace pons::perception {
 namespace {
 
-constexpr double kAboveBelt_m = 0.008;      // thinner things are not objects
+constexpr double kAboveBelt_m = 0.008;  // thinner things are not objects
 constexpr double kSmallest_m2 = 0.0012;
-constexpr int kStep = 65;                   // 6.5 mm between neighbours over three cells is an edge between two surfaces
-constexpr int kGrowStep = 80;               // a cell joins a neighbour's object across at most 8 mm
-constexpr int kLook = 3;                    // cells to look beyond an outline
+constexpr int kStep = 65;      // 6.5 mm between neighbours over three cells is an edge between two surfaces
+constexpr int kGrowStep = 80;  // a cell joins a neighbour's object across at most 8 mm
+constexpr int kLook = 3;       // cells to look beyond an outline
 constexpr int kCrowdedLook = 4;
-constexpr int kHigher = 60;                 // 6 mm
+constexpr int kHigher = 60;  // 6 mm
 constexpr int kMostCuts = 24;
 const std::array<cv::Point, 4> kAround = {cv::Point{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
-const std::array<cv::Point, 8> kAround8 = {cv::Point{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+const std::array<cv::Point, 8> kAround8 = {cv::Point{1, 0}, {1, 1},   {0, 1},  {-1, 1},
+                                           {-1, 0},         {-1, -1}, {0, -1}, {1, -1}};
 
 int typical_height(const TopView& view, const std::vector<cv::Point>& cells) {
   std::vector<std::uint16_t> heights;
@@ -124,8 +125,9 @@ void Segmenter::describe(const TopView& view, Region& region) const {
   const int own_height = typical_height(view, region.core.empty() ? region.cells : region.core);
   for (const cv::Point& cell : region.cells) {
     if ((view.flags(cell) & TopView::kNearRobot) != 0) ++beside_robot;
-    const bool inner = std::ranges::all_of(
-        kAround, [&](const cv::Point& step) { return view.contains(cell + step) && labels(cell + step) == region.label; });
+    const bool inner = std::ranges::all_of(kAround, [&](const cv::Point& step) {
+      return view.contains(cell + step) && labels(cell + step) == region.label;
+    });
     const bool edge = (view.flags(cell) & TopView::kAtBorder) != 0 || cell.x < 2 || cell.y < 2 ||
                       cell.x >= labels.cols - 2 || cell.y >= labels.rows - 2;
     if (inner) continue;
@@ -184,7 +186,8 @@ void Segmenter::split(const TopView& view) {
       // A curve is shaded: its colours say nothing.
       std::optional<Line> line;
       if (!fit_plane(view, region.core).curved()) line = splitter_.by_colour(view, region.core);
-      const bool whole = !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
+      const bool whole =
+          !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
       if (!line && whole) line = splitter_.by_outline(region.core);
       if (!line) break;
       ++cuts;
@@ -213,26 +216,22 @@ const Segments& Segmenter::segment(const TopView& view) {
 
 void Segmenter::drop_small(const TopView& view) {
   const double smallest = kSmallest_m2 / (view.cell_m * view.cell_m);
-  std::erase_if(segments_.regions, [&](const Region& region) { return static_cast<double>(region.cells.size()) < smallest; });
-  std::vector<int> renamed(1024, 0);
-  for (std::size_t i = 0; i < segments_.regions.size(); ++i) {
-    const auto old = static_cast<std::size_t>(segments_.regions[i].label);
-    if (old >= renamed.size()) renamed.resize(old + 1, 0);
-    renamed[old] = static_cast<int>(i) + 1;
-    segments_.regions[i].label = static_cast<int>(i) + 1;
-  }
+  std::vector<int> renamed(segments_.regions.size() + 1, 0);
+  int kept = 0;
   for (Region& region : segments_.regions) {
-    for (int& label : region.higher) {
-      label = static_cast<std::size_t>(label) < renamed.size() ? renamed[static_cast<std::size_t>(label)] : 0;
-    }
+    if (static_cast<double>(region.cells.size()) < smallest) continue;
+    renamed[static_cast<std::size_t>(region.label)] = ++kept;
+  }
+  std::erase_if(segments_.regions,
+                [&](const Region& region) { return renamed[static_cast<std::size_t>(region.label)] == 0; });
+  for (Region& region : segments_.regions) {
+    region.label = renamed[static_cast<std::size_t>(region.label)];
+    for (int& label : region.higher) label = renamed[static_cast<std::size_t>(label)];
     std::erase(region.higher, 0);
   }
   auto* const labels = segments_.labels.ptr<int>();
   const int total = segments_.labels.rows * segments_.labels.cols;
-  for (int i = 0; i < total; ++i) {
-    const auto old = static_cast<std::size_t>(labels[i]);
-    labels[i] = old < renamed.size() ? renamed[old] : 0;
-  }
+  for (int i = 0; i < total; ++i) labels[i] = renamed[static_cast<std::size_t>(labels[i])];
 }
 
 }  // namespace pons::perception

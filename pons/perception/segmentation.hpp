@@ -12,19 +12,19 @@ namespace pons::perception {
 
 // Shares are of the outline's cells.
 struct Region {
-  int label = 0;                  // in Segments::labels
-  std::vector<cv::Point> cells;   // all, row by row
-  std::vector<cv::Point> core;    // those away from steps in height
-  double hidden_share = 0;        // towards the camera nothing was seen: something nearer hides the rest
-  double below_share = 0;         // adjoins something higher
-  bool crowded = false;           // another object within about 8 mm
-  bool near_robot = false;        // beside or under the robot, or in its hand
-  double border_share = 0;        // cut by the picture or the belt's limits
-  std::vector<int> higher;        // labels of the higher neighbours, ascending
+  int label = 0;                 // in Segments::labels
+  std::vector<cv::Point> cells;  // all, row by row
+  std::vector<cv::Point> core;   // those away from steps in height
+  double hidden_share = 0;       // towards the camera nothing was seen: something nearer hides the rest
+  double below_share = 0;        // adjoins something higher
+  bool crowded = false;          // another object within about 8 mm
+  bool near_robot = false;       // beside or under the robot, or in its hand
+  double border_share = 0;       // cut by the picture or the belt's limits
+  std::vector<int> higher;       // labels of the higher neighbours, ascending
 };
 
 struct Segments {
-  cv::Mat1i labels;  // 0: no object
+  cv::Mat1i labels;             // 0: no object
   std::vector<Region> regions;  // regions[i].label == i + 1
 };
 

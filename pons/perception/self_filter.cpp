@@ -11,8 +11,8 @@ namespace {
 constexpr double kNearestSurface_m = 0.05;  // capsules closer to the lens are cut here: no division by zero
 constexpr double kNearRing_m = 0.015;
 
-double squared_distance_to_segment(const Eigen::Vector3f& point, const Eigen::Vector3f& from, const Eigen::Vector3f& along,
-                                   float inverse_squared_length) {
+double squared_distance_to_segment(const Eigen::Vector3f& point, const Eigen::Vector3f& from,
+                                   const Eigen::Vector3f& along, float inverse_squared_length) {
   const Eigen::Vector3f offset = point - from;
   const float share = std::clamp(offset.dot(along) * inverse_squared_length, 0.0F, 1.0F);
   return (offset - share * along).squaredNorm();

@@ -9,17 +9,17 @@
 namespace pons::perception {
 namespace {
 
-constexpr int kPrintContrast = 60;         // grey levels within five cells
-constexpr std::size_t kSamples = 2500;     // cells looked at per object
-constexpr double kPlain = 6;               // grey levels: an object of one colour spreads less
+constexpr int kPrintContrast = 60;      // grey levels within five cells
+constexpr std::size_t kSamples = 2500;  // cells looked at per object
+constexpr double kPlain = 6;            // grey levels: an object of one colour spreads less
 constexpr double kExplained = 0.6;
-constexpr double kContrast = 14;           // grey levels
-constexpr double kSharp = 0.55;            // share of the contrast that must appear right at the line
-constexpr double kRectangle = 0.90;        // fuller patches are one box as far as an outline can tell
-constexpr double kCornerDepth = 4;         // cells
+constexpr double kContrast = 14;     // grey levels
+constexpr double kSharp = 0.55;      // share of the contrast that must appear right at the line
+constexpr double kRectangle = 0.90;  // fuller patches are one box as far as an outline can tell
+constexpr double kCornerDepth = 4;   // cells
 constexpr double kGain = 0.045;
-constexpr double kLengthCost = 0.05;       // of a cut as long as the patch is wide
-constexpr double kPrintCost = 0.5;         // likewise, of one through print
+constexpr double kLengthCost = 0.05;  // of a cut as long as the patch is wide
+constexpr double kPrintCost = 0.5;    // likewise, of one through print
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
 
@@ -51,7 +51,8 @@ std::vector<Line> candidates(const std::vector<cv::Point>& contour) {
   const double orientation = cv::contourArea(polygon, true) > 0 ? 1 : -1;
   std::vector<cv::Point2d> corners, directions;
   for (std::size_t i = 0; i < count; ++i) {
-    const cv::Point2d before = polygon[i] - polygon[(i + count - 1) % count], after = polygon[(i + 1) % count] - polygon[i];
+    const cv::Point2d before = polygon[i] - polygon[(i + count - 1) % count],
+                      after = polygon[(i + 1) % count] - polygon[i];
     const double turn = orientation * before.cross(after);
     if (turn < -0.25 * cv::norm(before) * cv::norm(after)) corners.push_back(polygon[i]);
     if (cv::norm(after) > 4 * kCornerDepth) directions.push_back(after / cv::norm(after));
@@ -98,7 +99,8 @@ Splitter::Cut Splitter::best_cut(double angle_rad, double bin, double total_vari
   std::vector<std::array<float, 4>> sums(bins, {0, 0, 0, 0});
   const auto inverse = static_cast<float>(1 / bin);
   for (const Sample& sample : samples_) {
-    auto& sum = sums[std::min(bins - 1, static_cast<std::size_t>((nx * sample.at.x + ny * sample.at.y - low) * inverse))];
+    auto& sum =
+        sums[std::min(bins - 1, static_cast<std::size_t>((nx * sample.at.x + ny * sample.at.y - low) * inverse))];
     sum[0] += 1, sum[1] += sample.colour[0], sum[2] += sample.colour[1], sum[3] += sample.colour[2];
   }
   cv::Vec4d all(0, 0, 0, 0);
@@ -114,7 +116,8 @@ Splitter::Cut Splitter::best_cut(double angle_rad, double bin, double total_vari
                                left[3] / left[0] - right[3] / right[0]);
     const double explained = left[0] * right[0] / (all[0] * all[0]) * squared(difference) / total_variance;
     if (explained > best.explained) {
-      best = {angle_rad, static_cast<double>(low) + bin * static_cast<double>(i + 1), explained, std::sqrt(squared(difference))};
+      best = {angle_rad, static_cast<double>(low) + bin * static_cast<double>(i + 1), explained,
+              std::sqrt(squared(difference))};
     }
   }
   return best;
@@ -130,7 +133,8 @@ bool Splitter::sharp(const Cut& cut) const {
     if (s > -9 && s < -1) before += cv::Vec3d(sample.colour), ++count_before;
     if (s > 1 && s < 9) after += cv::Vec3d(sample.colour), ++count_after;
   }
-  if (count_before < 5 || count_after < 5) return true;  // print or a gap lies between: nothing speaks against two objects
+  if (count_before < 5 || count_after < 5)
+    return true;  // print or a gap lies between: nothing speaks against two objects
   return std::sqrt(squared(before / count_before - after / count_after)) > kSharp * cut.contrast;
 }
 

@@ -1,5 +1,5 @@
-// Where to cut a patch of equal height that is more than one object. Two convex things that do not overlap can always be
-// told apart by a straight line, so lines are all it looks for.
+// Where to cut a patch of equal height that is more than one object. Two convex things that do not overlap can always
+// be told apart by a straight line, so lines are all it looks for.
 #pragma once
 
 #include <opencv2/core.hpp>

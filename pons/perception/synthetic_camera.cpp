@@ -50,9 +50,11 @@ std::vector<std::vector<bool>> modules_of(const std::string& code) {
   if (code.empty()) return {};
   const auto qr = qrcodegen::QrCode::encodeText(code.c_str(), qrcodegen::QrCode::Ecc::MEDIUM);
   const int side = qr.getSize() + 4;
-  std::vector<std::vector<bool>> dark(static_cast<std::size_t>(side), std::vector<bool>(static_cast<std::size_t>(side)));
+  std::vector<std::vector<bool>> dark(static_cast<std::size_t>(side),
+                                      std::vector<bool>(static_cast<std::size_t>(side)));
   for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) dark[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = qr.getModule(x - 2, y - 2);
+    for (int x = 0; x < side; ++x)
+      dark[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] = qr.getModule(x - 2, y - 2);
   }
   return dark;
 }
@@ -70,9 +72,7 @@ std::array<std::uint8_t, 3> colour_at(const Placed& placed, const Vector3& at) {
 
 }  // namespace
 
-Vector3 Thing::top(double travel_m) const {
-  return {x_m + (fixed ? 0 : travel_m), y_m, 0.9 + base_m + size_m.z()};
-}
+Vector3 Thing::top(double travel_m) const { return {x_m + (fixed ? 0 : travel_m), y_m, 0.9 + base_m + size_m.z()}; }
 
 world::World belt_world() {
   world::World world;

@@ -19,10 +19,10 @@ struct Thing {
   double x_m = 0, y_m = 0, yaw_rad = 0;
   Vector3 size_m = Vector3(0.2, 0.15, 0.1);
   std::array<std::uint8_t, 3> colour = {150, 120, 80};
-  std::string code = {};        // a QR label in the middle of a box's top
-  double base_m = 0;            // above the belt
-  double tilt_rad = 0;          // about its y
-  bool fixed = false;           // does not ride on the belt
+  std::string code = {};  // a QR label in the middle of a box's top
+  double base_m = 0;      // above the belt
+  double tilt_rad = 0;    // about its y
+  bool fixed = false;     // does not ride on the belt
   Vector3 label_offset_m = Vector3::Zero();
 
   [[nodiscard]] Vector3 top(double travel_m) const;  // world

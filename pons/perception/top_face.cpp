@@ -14,13 +14,13 @@ namespace {
 constexpr double kOnPlane_m = 0.005;
 constexpr double kUpright_rad = 3 * std::numbers::pi / 180;
 constexpr double kLeaning_rad = 3.5 * std::numbers::pi / 180;
-constexpr double kFullShape = 0.86;           // an ellipse fills π/4 of its rectangle
+constexpr double kFullShape = 0.86;  // an ellipse fills π/4 of its rectangle
 constexpr double kHidden = 0.04;
 constexpr double kNarrowest_m = 0.03;
 constexpr double kBelow = 0.06;
 constexpr double kWhole = 0.90;
 constexpr double kNearlyWhole = 0.95;
-constexpr double kLostCorner = 0.10;      // of the outline
+constexpr double kLostCorner = 0.10;  // of the outline
 
 struct Rectangle {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // cells
@@ -57,7 +57,8 @@ std::vector<cv::Point> boundary(const std::vector<cv::Point>& cells) {
   std::vector<cv::Point> rim;
   for (const cv::Point& cell : cells) {
     const cv::Point p = cell - mask.corner;
-    const int around = mask.filled(p.y, p.x - 1) + mask.filled(p.y, p.x + 1) + mask.filled(p.y - 1, p.x) + mask.filled(p.y + 1, p.x);
+    const int around =
+        mask.filled(p.y, p.x - 1) + mask.filled(p.y, p.x + 1) + mask.filled(p.y - 1, p.x) + mask.filled(p.y + 1, p.x);
     if (around < 4) rim.push_back(cell);
   }
   return rim;
@@ -77,7 +78,8 @@ double refined_yaw(const std::vector<cv::Point>& rim, const Rectangle& start) {
       const double dx = cell.x - start.middle.x(), dy = cell.y - start.middle.y();
       const double along = c * dx + s * dy, across = -s * dx + c * dy;
       const double from_end = start.length / 2 - std::abs(along), from_side = start.width / 2 - std::abs(across);
-      const bool on_long = std::abs(from_side) < reach && from_end > 4, on_short = std::abs(from_end) < reach && from_side > 4;
+      const bool on_long = std::abs(from_side) < reach && from_end > 4,
+                 on_short = std::abs(from_end) < reach && from_side > 4;
       if (on_long == on_short) continue;
       Side& side = sides[on_long ? (across > 0 ? 0U : 1U) : (along > 0 ? 2U : 3U)];
       const double a = on_long ? along : across, b = on_long ? across : -along;
@@ -175,12 +177,14 @@ Rectangle fit_rectangle(const std::vector<cv::Point>& all_cells, Shape shape) {
   return rectangle;
 }
 
-double height_near(const TopView& view, const std::vector<cv::Point>& cells, const Rectangle& at, double along, double across) {
+double height_near(const TopView& view, const std::vector<cv::Point>& cells, const Rectangle& at, double along,
+                   double across) {
   const double c = std::cos(at.yaw), s = std::sin(at.yaw);
   std::vector<std::uint16_t> heights;
   for (const cv::Point& cell : cells) {
     const double dx = cell.x - at.middle.x(), dy = cell.y - at.middle.y();
-    if (std::abs(c * dx + s * dy) <= along && std::abs(-s * dx + c * dy) <= across) heights.push_back(view.height(cell));
+    if (std::abs(c * dx + s * dy) <= along && std::abs(-s * dx + c * dy) <= across)
+      heights.push_back(view.height(cell));
   }
   if (heights.empty()) return 0;
   const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);

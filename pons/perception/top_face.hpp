@@ -19,20 +19,20 @@ enum class Shape : std::uint8_t {
 // What one frame says of one object. The frame `top`: middle of the top face (tube: of the ridge; bag: above the
 // centroid), x along the longer side, z the face's normal where it leans by more than 3°, else straight up.
 struct Sighting {
-  int label = 0;                // in Segments::labels
+  int label = 0;  // in Segments::labels
   Pose world_from_top = Pose::Identity();
-  double yaw_rad = 0;           // about world z; modulo π
+  double yaw_rad = 0;                // about world z; modulo π
   Vector3 size_m = Vector3::Zero();  // along x, along y, height of the top above the belt
-  double flatness_m = 0;        // RMS distance of the top from its plane
+  double flatness_m = 0;             // RMS distance of the top from its plane
   double tilt_rad = 0;
-  double fill = 0;              // share of the rectangle that was seen
+  double fill = 0;  // share of the rectangle that was seen
   Shape shape = Shape::kFlat;
-  bool complete = false;        // the whole outline was seen: pose and size mean something
-  bool covered = false;         // something lies or leans on it
+  bool complete = false;  // the whole outline was seen: pose and size mean something
+  bool covered = false;   // something lies or leans on it
   bool crowded = false;
   bool near_robot = false;
   bool at_border = false;
-  bool sliver = false;          // too narrow for an object: a piece of one
+  bool sliver = false;  // too narrow for an object: a piece of one
   // Where its top is, on the ground plan: middle and half sides along x and y of `top`.
   [[nodiscard]] bool covers(double x_m, double y_m, double margin_m) const;
 };

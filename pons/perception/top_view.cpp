@@ -8,17 +8,19 @@
 namespace pons::perception {
 namespace {
 
-constexpr double kOverhang_m = 0.06;      // how far a parcel may stick out over the belt's sides and still be measured whole
-constexpr double kTallest_m = 0.6;        // above the belt; what is higher does not lie on it
+constexpr double kOverhang_m =
+    0.06;                           // how far a parcel may stick out over the belt's sides and still be measured whole
+constexpr double kTallest_m = 0.6;  // above the belt; what is higher does not lie on it
 constexpr double kFinestCell_m = 0.0025;
-constexpr double kBare_m = 0.006;         // lower readings are of the belt
-constexpr int kSameSurface = 80;          // 8 mm: readings of one cell that far below its highest are of what lies behind
-constexpr std::size_t kSurrounded = 5;    // of 8 neighbours: along the edge of hidden belt there are 3
-constexpr int kBorder = 2;                // samples
+constexpr double kBare_m = 0.006;       // lower readings are of the belt
+constexpr int kSameSurface = 80;        // 8 mm: readings of one cell that far below its highest are of what lies behind
+constexpr std::size_t kSurrounded = 5;  // of 8 neighbours: along the edge of hidden belt there are 3
+constexpr int kBorder = 2;              // samples
 
 }  // namespace
 
-TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling_(frame.intrinsics), belt_(belt) {
+TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt)
+    : sampling_(frame.intrinsics), world_from_optical_(frame.world_from_optical) {
   const Pose& pose = frame.world_from_optical;
   const Pose optical_from_world = pose.inverse();
   double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
@@ -28,7 +30,8 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling
         const double y = belt.y_center_m + side * (belt.width_m + 2 * kOverhang_m);
         const Vector3 point = optical_from_world * Vector3(x, y, belt.surface_z_m + z);
         const double depth = std::max(0.05, point.z());
-        const double u = sampling_.cx + sampling_.fx * point.x() / depth, v = sampling_.cy + sampling_.fy * point.y() / depth;
+        const double u = sampling_.cx + sampling_.fx * point.x() / depth,
+                     v = sampling_.cy + sampling_.fy * point.y() / depth;
         left = std::min(left, u), right = std::max(right, u), top = std::min(top, v), bottom = std::max(bottom, v);
       }
     }
@@ -71,8 +74,8 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt) : sampling
 bool TopViewer::fits(const RgbdFrame& frame) const {
   const Sampling other(frame.intrinsics);
   return other.width == sampling_.width && other.height == sampling_.height && other.fx == sampling_.fx &&
-         other.fy == sampling_.fy && other.cx == sampling_.cx && other.cy == sampling_.cy && other.step == sampling_.step &&
-         (frame.world_from_optical.translation() - view_.camera_m).norm() < 1e-9;
+         other.fy == sampling_.fy && other.cx == sampling_.cx && other.cy == sampling_.cy &&
+         other.step == sampling_.step && frame.world_from_optical.isApprox(world_from_optical_, 1e-9);
 }
 
 // Plain loops over rows of floats without branches: the compiler turns them into vector code.
@@ -98,7 +101,8 @@ void TopViewer::project(const RgbdFrame& frame) {
     for (int i = 0; i < window_.width; ++i) {
       const float x = from_x + depth[i] * ray_x[i] * inverse_cell, y = from_y + depth[i] * ray_y[i] * inverse_cell;
       const float z = from_z + depth[i] * ray_z[i];
-      const bool inside = (depth[i] > 0) & (x >= 0) & (y >= 0) & (x < limit_x) & (y < limit_y) & (z > -0.4F) & (z < 3.0F);
+      const bool inside =
+          (depth[i] > 0) & (x >= 0) & (y >= 0) & (x < limit_x) & (y < limit_y) & (z > -0.4F) & (z < 3.0F);
       const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
       const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
       const float steps = static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F;
@@ -167,7 +171,8 @@ void TopViewer::fill_pinholes() {
       if (raw[i] > 0 || raw[i - 1] + raw[i + 1] == 0) continue;
       std::array<int, 8> around{};
       std::size_t known = 0;
-      for (const int j : {i - stride - 1, i - stride, i - stride + 1, i - 1, i + 1, i + stride - 1, i + stride, i + stride + 1}) {
+      for (const int j :
+           {i - stride - 1, i - stride, i - stride + 1, i - 1, i + 1, i + stride - 1, i + stride, i + stride + 1}) {
         if (raw[j] == 0) continue;
         std::size_t place = known++;
         for (; place > 0 && raw[around[place - 1]] > raw[j]; --place) around[place] = around[place - 1];

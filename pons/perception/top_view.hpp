@@ -1,5 +1,6 @@
-// A depth picture turned into a map seen from straight above: metric, without perspective, the same for any camera pose.
-// Hidden belt stays unknown instead of being guessed, so an object's outline can be told from the edge of what was seen.
+// A depth picture turned into a map seen from straight above: metric, without perspective, the same for any camera
+// pose. Hidden belt stays unknown instead of being guessed, so an object's outline can be told from the edge of what
+// was seen.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -13,17 +14,17 @@ namespace pons::perception {
 
 // Columns run along world +x, rows along world +y. Cell (row, column) covers cell_m × cell_m from its lower corner.
 struct TopView {
-  static constexpr std::uint16_t kUnknown = 0;  // in `height`: nothing was seen there
-  static constexpr int kLevel = 5000;           // in `height`: the belt's surface; one step is 0.1 mm
-  static constexpr std::uint8_t kNearRobot = 1;   // in `flags`: seen beside the robot, so perhaps hidden by it in part
-  static constexpr std::uint8_t kAtBorder = 2;    // seen at the picture's border or the belt's limits, so perhaps cut
+  static constexpr std::uint16_t kUnknown = 0;   // in `height`: nothing was seen there
+  static constexpr int kLevel = 5000;            // in `height`: the belt's surface; one step is 0.1 mm
+  static constexpr std::uint8_t kNearRobot = 1;  // in `flags`: seen beside the robot, so perhaps hidden by it in part
+  static constexpr std::uint8_t kAtBorder = 2;   // seen at the picture's border or the belt's limits, so perhaps cut
 
   double cell_m = 0;
-  double x0_m = 0, y0_m = 0;   // world, lower corner of cell (0, 0)
-  double surface_z_m = 0;      // world
+  double x0_m = 0, y0_m = 0;           // world, lower corner of cell (0, 0)
+  double surface_z_m = 0;              // world
   Vector3 camera_m = Vector3::Zero();  // world
-  cv::Mat1w height;            // median filtered
-  cv::Mat3b colour;            // red, green, blue; black where nothing stands on the belt
+  cv::Mat1w height;                    // median filtered
+  cv::Mat3b colour;                    // red, green, blue; black where nothing stands on the belt
   cv::Mat1b flags;
 
   [[nodiscard]] static double metres(std::uint16_t height) { return 1e-4 * (height - kLevel); }
@@ -61,11 +62,11 @@ class TopViewer {
   void fill_pinholes();
 
   Sampling sampling_;
-  world::Belt belt_;
-  cv::Rect window_;              // of the sampled picture: what can see the belt
+  Pose world_from_optical_;
+  cv::Rect window_;                           // of the sampled picture: what can see the belt
   std::vector<float> ray_x_, ray_y_, ray_z_;  // world direction of each sample in the window, optical z = 1
   std::vector<float> depth_row_;
-  std::vector<int> cell_of_;     // −1: nothing there
+  std::vector<int> cell_of_;  // −1: nothing there
   std::vector<std::uint16_t> height_of_;
   cv::Mat1w highest_, filled_;
   cv::Mat1i sum_, count_;

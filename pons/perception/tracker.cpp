@@ -8,18 +8,18 @@ namespace pons::perception {
 namespace {
 
 constexpr double kGate_m = 0.07;
-constexpr double kRescue_m = 0.30;        // how far a push may carry an object between two frames
+constexpr double kRescue_m = 0.30;  // how far a push may carry an object between two frames
 constexpr double kSameSize_m = 0.012;
 constexpr double kOtherSize_m = 0.030;
 constexpr double kDisturbed_m = 0.015;
 constexpr double kDisturbed_rad = 6 * std::numbers::pi / 180;
-constexpr double kSquare_m = 0.012;       // sides closer than that may swap between frames
+constexpr double kSquare_m = 0.012;  // sides closer than that may swap between frames
 constexpr double kRoundBag_m = 0.035;
-constexpr std::size_t kMemory = 16;       // observations averaged
+constexpr std::size_t kMemory = 16;  // observations averaged
 constexpr std::size_t kMotionMemory = 4;
-constexpr double kMoved_m = 0.009;        // over the motion memory: more than noise
+constexpr double kMoved_m = 0.009;  // over the motion memory: more than noise
 constexpr int kDoubts = 4;
-constexpr double kDoubtful = 0.3;         // confidence of what is partly hidden
+constexpr double kDoubtful = 0.3;  // confidence of what is partly hidden
 constexpr Duration kSwallow = std::chrono::milliseconds(500);
 
 double turn(double from, double to) { return std::remainder(to - from, std::numbers::pi); }
@@ -96,8 +96,14 @@ Tracker::Estimate Tracker::estimate(const std::deque<Observation>& observations)
 
 Tracker::Observation Tracker::observe(const Track* track, const Sighting& sighting, Time stamp, double travel_m) const {
   const Vector3 top = sighting.world_from_top.translation();
-  Observation o{stamp,          top.x() - travel_m,   top.y(), top.z(), sighting.yaw_rad, sighting.size_m,
-                sighting.flatness_m, sighting.covered || !sighting.complete};
+  Observation o{stamp,
+                top.x() - travel_m,
+                top.y(),
+                top.z(),
+                sighting.yaw_rad,
+                sighting.size_m,
+                sighting.flatness_m,
+                sighting.covered || !sighting.complete};
   if (track == nullptr) return o;
   // Which of two nearly equal sides is the longer one is a matter of noise: keep the track's choice.
   const double reference = track->estimate.yaw_rad;
@@ -164,7 +170,8 @@ std::vector<int> Tracker::associate(const std::vector<Sighting>& sightings, Time
 }
 
 // An object that was pushed turns up elsewhere with the size it had.
-void Tracker::rescue(const std::vector<Sighting>& sightings, Time stamp, double travel_m, std::vector<int>& track_of) const {
+void Tracker::rescue(const std::vector<Sighting>& sightings, Time stamp, double travel_m,
+                     std::vector<int>& track_of) const {
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     if (std::ranges::find(track_of, static_cast<int>(t)) != track_of.end() || tracks_[t].forgotten) continue;
     double nearest = kRescue_m;
@@ -233,8 +240,8 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
 }
 
 // True when a camera looked at the place where it should be and saw the belt, or something known to be another.
-bool Tracker::visibly_gone(const Track& track, const TopView& view, const Segments& segments, const std::vector<bool>& known,
-                           Time stamp, double travel_m) const {
+bool Tracker::visibly_gone(const Track& track, const TopView& view, const Segments& segments,
+                           const std::vector<bool>& known, Time stamp, double travel_m) const {
   const Eigen::Vector2d middle = track.estimate.at(stamp) + Eigen::Vector2d(travel_m, 0);
   const double c = std::cos(track.estimate.yaw_rad), s = std::sin(track.estimate.yaw_rad);
   const std::uint16_t bare = TopView::steps(0.008);

@@ -20,8 +20,8 @@ class Tracker {
   explicit Tracker(const world::Belt& belt);
 
   // Takes in one frame's sightings; says which track each became, 0 for none. Frames in the order of their stamps.
-  std::vector<std::uint32_t> update(const TopView& view, const Segments& segments, const std::vector<Sighting>& sightings,
-                                    Time stamp, double belt_travel_m);
+  std::vector<std::uint32_t> update(const TopView& view, const Segments& segments,
+                                    const std::vector<Sighting>& sightings, Time stamp, double belt_travel_m);
 
   // A frame good enough to read this one's label.
   void label_attempt(std::uint32_t track);
@@ -54,13 +54,13 @@ class Tracker {
     std::uint32_t id = 0;
     std::deque<Observation> observations;  // since it was last disturbed, oldest first
     Estimate estimate;
-    Sighting last;            // the last one that counted
+    Sighting last;  // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
     bool crowded = false, covered = false;  // when last seen
     std::string code, other_code;
     int reads = 0, other_reads = 0, label_attempts = 0;
-    bool forgotten = false;   // only kept to swallow frames from before it was taken
+    bool forgotten = false;  // only kept to swallow frames from before it was taken
     Time forgotten_until;
   };
   struct Passage {

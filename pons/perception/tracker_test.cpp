@@ -59,7 +59,8 @@ TEST(TrackerTest, KeepsTheAxesOfASquareThatFlips) {
   }
   const auto beliefs = bench.tracker.beliefs(bench.now, 0);
   ASSERT_EQ(beliefs.size(), 1u);
-  EXPECT_NEAR(std::atan2(beliefs[0].world_from_top.linear()(1, 0), beliefs[0].world_from_top.linear()(0, 0)), 0.2, 1e-6);
+  EXPECT_NEAR(std::atan2(beliefs[0].world_from_top.linear()(1, 0), beliefs[0].world_from_top.linear()(0, 0)), 0.2,
+              1e-6);
   EXPECT_GT(beliefs[0].confidence, 0.9);
 }
 

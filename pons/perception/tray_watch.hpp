@@ -9,8 +9,8 @@
 
 namespace pons::perception {
 
-// The first kLearn frames show the empty place; afterwards whatever stands 15 mm nearer to the camera, inside the place,
-// is a thing.
+// The first kLearn frames show the empty place; afterwards whatever stands 15 mm nearer to the camera, inside the
+// place, is a thing.
 class TrayWatch {
  public:
   static constexpr int kLearn = 3;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <numbers>
 #include <optional>
@@ -17,6 +18,13 @@ constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; 
 
 constexpr int kArmBits = 4;
 
+// MuJoCo says what and where on lines of their own.
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
 Expected<SpecPtr> parse(const std::filesystem::path& file) {
   std::error_code code;
   if (!std::filesystem::is_regular_file(file, code)) {
@@ -24,7 +32,7 @@ Expected<SpecPtr> parse(const std::filesystem::path& file) {
   }
   char text[1024] = "";
   SpecPtr spec(mj_parseXML(file.c_str(), nullptr, text, sizeof text));
-  if (!spec) return fail(text, file.string(), "mend the XML there");
+  if (!spec) return fail(one_line(text), file.string(), "mend the XML there");
   return spec;
 }
 
@@ -78,7 +86,7 @@ Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix, co
   mjsBody* root = mjs_asBody(mjs_firstChild(mjs_findBody(child, "world"), mjOBJ_BODY, 0));
   if (root == nullptr) return fail("there is no body", file.string(), "give it one root body");
   mjsElement* attached = mjs_attach(frame->element, root->element, prefix, "");
-  if (attached == nullptr) return fail(mjs_getError(mjs_getSpec(frame->element)), file.string(), "mend it");
+  if (attached == nullptr) return fail(one_line(mjs_getError(mjs_getSpec(frame->element))), file.string(), "mend it");
   return mjs_asBody(attached);
 }
 
@@ -269,7 +277,8 @@ void classify(Composed& cell) {
 Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
   Composed cell;
   cell.model.reset(mj_compile(scene, nullptr));
-  if (!cell.model) return fail(mjs_getError(scene), world.scene_mjcf.string(), "mend the scene, the URDF or the tool");
+  if (!cell.model)
+    return fail(one_line(mjs_getError(scene)), world.scene_mjcf.string(), "mend the scene, the URDF or the tool");
   const mjModel* model = cell.model.get();
   auto belt = id_of(model, mjOBJ_GEOM, "belt", world.scene_mjcf);
   if (!belt) return std::unexpected(belt.error());

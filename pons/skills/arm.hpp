@@ -27,8 +27,8 @@ class Arm {
   [[nodiscard]] Time motion_end() const;
   // The earliest moment from which a motion may be replaced: the link and the loop need some ticks.
   [[nodiscard]] static Time splice_time(Time now);
-  // The earliest one at which the motion under way already keeps `limits`: a heavy load must not inherit the haste of what
-  // came before.
+  // The earliest one at which the motion under way already keeps `limits`: a heavy load must not inherit the haste of
+  // what came before.
   [[nodiscard]] Time splice_time(Time now, const AxisLimits& limits) const;
 
   // Replaces what was asked for from trajectory.front().start on. Error: the link is full.

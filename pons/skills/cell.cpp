@@ -56,7 +56,8 @@ void Cell::left_on_belt(const Load& load, const Vector3& position) {
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {
-  const auto found = std::find_if(objects_.begin(), objects_.end(), [&](const ObjectBelief& o) { return o.code == code; });
+  const auto found =
+      std::find_if(objects_.begin(), objects_.end(), [&](const ObjectBelief& o) { return o.code == code; });
   return found == objects_.end() ? nullptr : &*found;
 }
 
@@ -81,8 +82,8 @@ AxisLimits Cell::limits_empty() const {
   return limits;
 }
 
-// The load's inertia acts half its height below the cups and tips it about one row of them; the other row, `span` away, holds
-// against that with what gravity leaves of its force.
+// The load's inertia acts half its height below the cups and tips it about one row of them; the other row, `span` away,
+// holds against that with what gravity leaves of its force.
 AxisLimits Cell::limits_loaded(double mass_kg, double height_m) const {
   const world::Tool& tool = world.robot.tool;
   double span_m = 0;

@@ -1,5 +1,5 @@
-// What all arm skills share: the world, the arm, what is believed to lie where, and what hangs on the cups. One object a
-// bridge, one thread.
+// What all arm skills share: the world, the arm, what is believed to lie where, and what hangs on the cups. One object
+// a bridge, one thread.
 #pragma once
 
 #include <cstdint>
@@ -38,8 +38,8 @@ class Cell {
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
   [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
 
-  // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it has
-  // ridden off the end.
+  // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
+  // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }

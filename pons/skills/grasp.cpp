@@ -7,10 +7,10 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kHover_m = 0.035;         // the straight part above the parcel
-constexpr double kComeDown_m_s = 0.25;     // speed there
-constexpr double kPress_m = 0.006;         // bellows pressed together at the contact
-constexpr double kRide_s = 0.40;           // along with the belt, while vacuum builds
+constexpr double kHover_m = 0.035;      // the straight part above the parcel
+constexpr double kComeDown_m_s = 0.25;  // speed there
+constexpr double kPress_m = 0.006;      // bellows pressed together at the contact
+constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
 constexpr int kRounds = 8;
@@ -26,7 +26,8 @@ AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed
   Eigen::Matrix<double, 6, 1> twist = Eigen::Matrix<double, 6, 1>::Zero();
   twist.head<3>() = tip_speed_m_s;
   // Damped: near a singular pose the speed is wrong by a little rather than infinite.
-  const Eigen::Matrix<double, 6, 6> gram = jacobian * jacobian.transpose() + 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
+  const Eigen::Matrix<double, 6, 6> gram =
+      jacobian * jacobian.transpose() + 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
   return jacobian.transpose() * gram.ldlt().solve(twist);
 }
 

@@ -9,7 +9,7 @@ struct Grasp {
   motion::Trajectory trajectory;  // to the contact, then along with the belt
   Time hover;                     // over the parcel, coming down
   Time contact;
-  double yaw_rad = 0;             // of the tip, world frame
+  double yaw_rad = 0;                       // of the tip, world frame
   Vector3 contact_point = Vector3::Zero();  // tip at `contact`, world frame
 };
 
@@ -21,7 +21,8 @@ struct Grasp {
 [[nodiscard]] AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed_m_s);
 
 // The tip yaw, one of the object's four, that turns the arm least from q.
-[[nodiscard]] Expected<double> nearest_yaw(Cell& cell, const AxisVector& q, const Vector3& position, double object_yaw_rad);
+[[nodiscard]] Expected<double> nearest_yaw(Cell& cell, const AxisVector& q, const Vector3& position,
+                                           double object_yaw_rad);
 
 // The earliest grasp from `start` at `at`. With `yaw_rad` given that grip is kept. Errors: out of reach, no clear way.
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
@@ -29,6 +30,7 @@ struct Grasp {
 
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad,
-                                                 const Vector3& offset, const Vector3& tip_speed, const AxisLimits& limits);
+                                                 const Vector3& offset, const Vector3& tip_speed,
+                                                 const AxisLimits& limits);
 
 }  // namespace pons::skills

@@ -26,8 +26,9 @@ class MoveTo final : public task::Skill {
     const auto q = target(state.position);
     if (!q) return {Status::kFailed, q.error().line(), {}};
     const Load* load = cell_.held ? &cell_.held->load : nullptr;
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, load, cell_.objects(),
-                                        cell_.held ? cell_.limits_loaded(cell_.held->mass_kg, load->size_m.z()) : cell_.limits_empty());
+    const auto way = cell_.router.route(
+        state, from, {*q, AxisVector::Zero(q->size())}, load, cell_.objects(),
+        cell_.held ? cell_.limits_loaded(cell_.held->mass_kg, load->size_m.z()) : cell_.limits_empty());
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();

@@ -1,8 +1,8 @@
 #include "pons/skills/pick.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
@@ -23,18 +23,24 @@ constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load s
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
-constexpr double kMoved_m = 0.0015;   // a prediction off by more is worth a new plan
+constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
-constexpr double kUnweighed_kg = 1.5;  // assumed until the wrist has weighed it
+constexpr double kUnweighed_kg = 1.5;   // assumed until the wrist has weighed it
 constexpr double kLift_m = 0.10;
-constexpr double kLifted_m = 0.030;   // nothing below supports the load any more
+constexpr double kHighestLift_m = 0.25;
+constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
+constexpr double kClear_m = 0.02;  // by this much
+constexpr double kLiftTakes_s = 0.35;
+constexpr double kRideLifted_s = 0.5;  // with the belt after the lift, until the next motion takes over
+constexpr double kLifted_m = 0.030;    // nothing below supports the load any more
 constexpr double kRetreat_m = 0.08;
-constexpr double kSetDown_m = 0.01;   // over the belt, when let go
-constexpr double kBeyond_m = 0.15;    // past the pick zone the arm still reaches down
+constexpr double kSetDown_m = 0.01;  // over the belt, when let go
+constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
+constexpr double kRoom_m = 0.02;  // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(900);
 constexpr Duration kSettle = std::chrono::milliseconds(80);  // after a lift, until the bellows swing no more
-constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
+constexpr double kWait_m = 0.15;                             // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
  public:
@@ -47,12 +53,18 @@ class Pick final : public task::Skill {
     }
     if (stopped_) return {Status::kRetry, "the arm was stopped", {}};
     switch (phase_) {
-      case Phase::kFind: return find(now);
-      case Phase::kApproach: return approach(now);
-      case Phase::kGrip: return grip(now);
-      case Phase::kLift: return lift(now);
-      case Phase::kSetDown: return set_down(now);
-      case Phase::kRetreat: return retreat(now);
+      case Phase::kFind:
+        return find(now);
+      case Phase::kApproach:
+        return approach(now);
+      case Phase::kGrip:
+        return grip(now);
+      case Phase::kLift:
+        return lift(now);
+      case Phase::kSetDown:
+        return set_down(now);
+      case Phase::kRetreat:
+        return retreat(now);
     }
     return {Status::kFailed, "unreachable", {}};
   }
@@ -101,21 +113,20 @@ class Pick final : public task::Skill {
     return start(*grasp, *object, now);
   }
 
-  // What cannot be sorted, or what an earlier task left on the cups, goes back on the belt where there is room, and rides
-  // on into the exception chute.
+  // What cannot be sorted, or what an earlier task left on the cups, goes back on the belt where there is room, and
+  // rides on into the exception chute.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
     const Load& load = cell_.held->load;
     const AxisLimits limits = cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z());
     const Time from = cell_.arm.splice_time(now, limits);
     const AxisState state = cell_.arm.planned(from);
-    const auto spot = free_spot(from + kSetDownTakes);
-    const auto yaw = spot ? nearest_yaw(cell_, state.position, *spot, load.yaw_in_tip_rad) : Expected<double>(std::unexpected(spot.error()));
+    const Vector3 spot = free_spot(from + kSetDownTakes);
+    const auto yaw = nearest_yaw(cell_, state.position, spot, load.yaw_in_tip_rad);
     if (!yaw) return {Status::kRetry, "no room to set down " + cell_.held->code, {}};
-    const auto q = cell_.model.inverse(Cell::tip_down(*spot, *yaw), state.position);
+    const auto q = cell_.model.inverse(Cell::tip_down(spot, *yaw), state.position);
     if (!q) return {Status::kRetry, q.error().line(), {}};
-    auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                  limits);
+    auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(), limits);
     if (!way) return {Status::kRetry, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     released_at_ = way->back().end();
@@ -123,20 +134,25 @@ class Pick final : public task::Skill {
     return {};
   }
 
-  // Tip position over the first stretch of belt, from the middle of the pick zone on, that nothing will cover at `time`.
-  Expected<Vector3> free_spot(Time time) {
+  // Tip position over the belt, from the middle of the pick zone on: the first with room enough at `time`, else the one
+  // with the most.
+  [[nodiscard]] Vector3 free_spot(Time time) const {
     const world::Belt& belt = cell_.world.belt;
     const Vector3& size = cell_.held->load.size_m;
-    const double own_m = 0.5 * std::hypot(size.x(), size.y());
-    const double z = belt.surface_z_m + size.z() + kSetDown_m;
-    for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m; x += kSpotStep_m) {
-      const bool free = std::none_of(cell_.objects().begin(), cell_.objects().end(), [&](const ObjectBelief& object) {
-        const double other_m = 0.5 * std::hypot(object.size_m.x(), object.size_m.y());
-        return std::abs(cell_.predict(object, time).x() - x) < own_m + other_m + kSpotStep_m;
-      });
-      if (free) return Vector3(x, belt.y_center_m, z);
+    Vector3 spot{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + size.z() + kSetDown_m};
+    double most_m = -1;
+    for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m;
+         x += kSpotStep_m) {
+      double room_m = kRoom_m;
+      for (const ObjectBelief& object : cell_.objects()) {
+        const double both_m = 0.5 * (size.head<2>().norm() + object.size_m.head<2>().norm());
+        room_m = std::min(room_m, std::abs(cell_.predict(object, time).x() - x) - both_m);
+      }
+      if (room_m <= most_m) continue;
+      most_m = room_m;
+      spot.x() = x;
     }
-    return fail("the belt is full", "pick");
+    return spot;
   }
 
   Progress set_down(Time now) {
@@ -220,8 +236,8 @@ class Pick final : public task::Skill {
   bool press_further(Time now) {
     const Time from = Arm::splice_time(now);
     const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.yaw_rad, kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m),
-                      belt, cell_.limits_empty());
+    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.yaw_rad,
+                      kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt, cell_.limits_empty());
     if (!down) return false;
     const Time end = down->back().end();
     const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.yaw_rad, 0.4);
@@ -237,10 +253,18 @@ class Pick final : public task::Skill {
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    const Vector3 offset{0.10 * cell_.belt_speed_m_s(), 0, kLift_m};
+    // Along with the belt until the load hangs clear of its neighbours: they ride on.
+    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
+    const Vector3 offset = kLiftTakes_s * belt + Vector3(0, 0, lift_height());
     const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
-    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, Vector3::Zero(), cell_.limits_loaded(std::max(kUnweighed_kg, expected_kg), target_.size_m.z()));
+    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, belt,
+                    cell_.limits_loaded(std::max(kUnweighed_kg, expected_kg), target_.size_m.z()));
     if (!up) return {Status::kRetry, up.error().line(), {}};
+    lift_end_ = up->back().end();
+    const auto along =
+        ride(cell_, motion::sample(*up, lift_end_, cell_.model.axes()), lift_end_, grasp_.yaw_rad, kRideLifted_s);
+    if (!along) return {Status::kRetry, along.error().line(), {}};
+    up->insert(up->end(), along->begin(), along->end());
     if (auto sent = cell_.arm.stream(*up); !sent) return {Status::kRetry, sent.error().line(), {}};
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
@@ -250,6 +274,21 @@ class Pick final : public task::Skill {
     cell_.forget(target_.track);
     phase_ = Phase::kLift;
     return {};
+  }
+
+  // High enough that the load's underside clears whatever stands close to it.
+  [[nodiscard]] double lift_height() const {
+    double height = kLift_m;
+    const Vector3 top = target_.world_from_top.translation();
+    const double own_m = 0.5 * target_.size_m.head<2>().norm() + kClose_m;
+    for (const ObjectBelief& object : cell_.objects()) {
+      if (object.track == target_.track) continue;
+      const Vector3 other = object.world_from_top.translation();
+      const double apart_m = (other - cell_.predict(target_, object.stamp)).head<2>().norm();
+      if (apart_m > own_m + 0.5 * object.size_m.head<2>().norm()) continue;
+      height = std::max(height, other.z() - (top.z() - target_.size_m.z()) + kClear_m);
+    }
+    return std::min(height, kHighestLift_m);
   }
 
   Progress lift(Time now) {
@@ -262,11 +301,11 @@ class Pick final : public task::Skill {
     }
     if (height < kLifted_m) return {};
     scale_.add(cell_, now);
-    if (!scale_.ready()) return {};
+    if (!scale_.ready() && now < lift_end_ + kSettle) return {};
     const double mass = scale_.mass_kg();
     if (mass > cell_.world.rules.max_mass_kg && !settled_) {
       // Too heavy, or a neighbour drags along: only a reading at rest may condemn it.
-      if (now >= cell_.arm.motion_end() + kSettle) {
+      if (now >= lift_end_ + kSettle) {
         scale_ = Scale{};
         settled_ = true;
       }
@@ -288,7 +327,8 @@ class Pick final : public task::Skill {
     const double yaw = phase_ == Phase::kFind ? 0 : grasp_.yaw_rad;
     auto up = phase_ == Phase::kFind || phase_ == Phase::kApproach
                   ? motion::stop(state, from, cell_.limits_empty())
-                  : nudge(cell_, state, from, yaw, {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
+                  : nudge(cell_, state, from, yaw, {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(),
+                          cell_.limits_empty());
     if (!up) up = motion::stop(state, from, cell_.limits_empty());
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();
@@ -298,7 +338,9 @@ class Pick final : public task::Skill {
   Progress retreat(Time now) { return now < retreated_at_ ? Progress{} : verdict_; }
 
   Progress success(Time now) {
-    return {Status::kSucceeded, {}, {{"mass_kg", cell_.held->mass_kg}, {"sealed", cell_.arm.sealed_cups()}, {"seconds", to_s(now - started_)}}};
+    return {Status::kSucceeded,
+            {},
+            {{"mass_kg", cell_.held->mass_kg}, {"sealed", cell_.arm.sealed_cups()}, {"seconds", to_s(now - started_)}}};
   }
 
   static double yaw_of(const ObjectBelief& object) {
@@ -309,7 +351,7 @@ class Pick final : public task::Skill {
 
   Cell& cell_;
   std::string code_;
-  Time started_, seen_, planned_, released_at_, retreated_at_;
+  Time started_, seen_, planned_, lift_end_, released_at_, retreated_at_;
   Phase phase_ = Phase::kFind;
   Grasp grasp_;
   ObjectBelief target_;

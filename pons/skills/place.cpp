@@ -1,8 +1,8 @@
 #include "pons/skills/place.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <numbers>
 
 #include "pons/skills/grasp.hpp"
@@ -14,16 +14,16 @@ namespace {
 using task::Progress;
 using task::Status;
 
-constexpr double kOverRim_m = 0.03;   // between rim and the parcel's underside when it is let go
+constexpr double kOverRim_m = 0.03;     // between rim and the parcel's underside when it is let go
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
-constexpr double kHigher_m = 0.05;    // tried next when a mouth is out of reach
+constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kWide_m = 0.28;      // a wider one must hang still to fall through the mouth
+constexpr double kWide_m = 0.28;  // a wider one must hang still to fall through the mouth
 constexpr Duration kSwing = std::chrono::milliseconds(140);
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
-constexpr double kGoneShare = 0.4;   // of the load's mass
+constexpr double kGoneShare = 0.4;                           // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
 constexpr int kLostTicks = 3;
 
@@ -39,10 +39,14 @@ class Place final : public task::Skill {
       return cancelled_ ? Progress{Status::kFailed, "cancelled; still held", {}} : Progress{};
     }
     switch (phase_) {
-      case Phase::kPlan: return plan(now);
-      case Phase::kCarry: return carry(now);
-      case Phase::kRelease: return release(now);
-      case Phase::kHold: return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
+      case Phase::kPlan:
+        return plan(now);
+      case Phase::kCarry:
+        return carry(now);
+      case Phase::kRelease:
+        return release(now);
+      case Phase::kHold:
+        return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
     }
     return {Status::kFailed, "unreachable", {}};
   }
@@ -70,8 +74,7 @@ class Place final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto q = over(*target, state.position);
     if (!q) return {Status::kFailed, name_ + " is out of reach", {}};
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(),
-                                        limits);
+    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(), limits);
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
@@ -120,7 +123,8 @@ class Place final : public task::Skill {
 
   Progress late(Time now) {
     if (now < arrives_ + kLetGoWithin) return {};
-    return {Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_, now)), {}};
+    return {
+        Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_, now)), {}};
   }
 
   Cell& cell_;

@@ -32,7 +32,8 @@ std::vector<Vector3> probes(const Load* load) {
   const Eigen::AngleAxisd turn(load->yaw_in_tip_rad, Vector3::UnitZ());
   for (const double x : {-0.5, 0.0, 0.5})
     for (const double y : {-0.5, 0.0, 0.5}) {
-      points.push_back(load->offset_in_tip_m + turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z()));
+      points.push_back(load->offset_in_tip_m +
+                       turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z()));
     }
   return points;
 }
@@ -85,8 +86,9 @@ Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
   return model_.inverse(pose, q);
 }
 
-Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end, const Load* load,
-                                           std::span<const ObjectBelief> obstacles, const AxisLimits& wanted) {
+Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
+                                           const Load* load, std::span<const ObjectBelief> obstacles,
+                                           const AxisLimits& wanted) {
   const AxisLimits limits = covering(wanted, start);
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
@@ -103,7 +105,8 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   }
   Error reason{"no clear way", "route", "the cell is too crowded or the end is out of reach"};
   for (const double extra : {0.02, 0.07, 0.14}) {
-    const double height = std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z)) + extra;
+    const double height =
+        std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z)) + extra;
     const auto over_start = raised(start.position, height);
     const auto over_end = raised(end.position, height);
     const auto over_middle = raised(middle, height);

@@ -14,8 +14,8 @@ namespace pons::skills {
 
 // What the tool drags along: a box below the tip, its top face at the tip.
 struct Load {
-  Vector3 size_m = Vector3::Zero();  // along its own axes
-  double yaw_in_tip_rad = 0;         // of its x axis, about the tip's z
+  Vector3 size_m = Vector3::Zero();           // along its own axes
+  double yaw_in_tip_rad = 0;                  // of its x axis, about the tip's z
   Vector3 offset_in_tip_m = Vector3::Zero();  // of the middle of its top face from the tip
 };
 
@@ -27,8 +27,8 @@ class Router {
   // `world` must outlive it.
   Router(const world::World& world, model::RobotModel model);
 
-  // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims. Close to both ends the
-  // way is as asked. Errors: no clear way found, or an end that cannot be reached.
+  // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims. Close to both ends
+  // the way is as asked. Errors: no clear way found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits);

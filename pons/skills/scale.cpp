@@ -32,7 +32,8 @@ void Scale::add(Cell& cell, Time now) { last_kg_[samples_++ % kNeeded] = weigh_n
 bool Scale::ready() const {
   if (samples_ < kNeeded) return false;
   double older_kg = 0, newer_kg = 0;
-  for (std::size_t i = 0; i < kNeeded; ++i) (i < kNeeded / 2 ? older_kg : newer_kg) += last_kg_[(samples_ + i) % kNeeded];
+  for (std::size_t i = 0; i < kNeeded; ++i)
+    (i < kNeeded / 2 ? older_kg : newer_kg) += last_kg_[(samples_ + i) % kNeeded];
   constexpr double kHalf = kNeeded / 2;
   return std::abs(newer_kg - older_kg) / kHalf < std::max(kAgreeLeast_kg, kAgreeShare * mass_kg());
 }
