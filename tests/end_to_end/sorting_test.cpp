@@ -48,6 +48,30 @@ TEST(Sorting, ThirtyParcelsAreSortedOrExceptedAndAccountedFor) {
   for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
 }
 
+TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
+  const Folder folder;
+  const Finished run =
+      run_pons({"run", "small_cell", "--parcels", "10", "--seed", "3", "--quiet", "--report", folder / "report.json"});
+  ASSERT_GE(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  expect_accounted_for(report);
+  EXPECT_GE(report["parcels"]["sorted"], 8) << run.out;
+}
+
+// Real time has no promise about a busy machine, but must end by itself and leave everything whole.
+TEST(Sorting, RealTimeEndsByItselfAndLeavesJournalAndReportWhole) {
+  const Folder folder;
+  const Finished run =
+      run_pons({"run", "parcel_cell", "--parcels", "2", "--seed", "1", "--quiet", "--realtime", "--socket",
+                folder / "pons.sock", "--report", folder / "report.json", "--journal", folder / "j.db"});
+  ASSERT_GE(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  EXPECT_GT(report["loop"]["ticks"], 5000);
+  EXPECT_EQ(report["parcels"]["duplicated"], 0);
+  for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
+  EXPECT_FALSE(std::filesystem::exists(folder / "pons.sock"));
+}
+
 TEST(Sorting, OneSeedGivesOneResult) {
   const Folder folder;
   const auto hash = [&](const char* seed, const char* name) -> std::string {
