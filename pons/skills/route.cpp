@@ -17,10 +17,6 @@ constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.045;
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
-struct Probe {
-  Vector3 point;  // tip frame; z points away from the tool, down
-};
-
 // Points of tool or load that come lowest.
 std::vector<Vector3> probes(const Load* load) {
   std::vector<Vector3> points;

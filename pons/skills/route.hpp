@@ -34,7 +34,6 @@ class Router {
                                                    const AxisLimits& limits);
 
  private:
-  struct Candidate;
   [[nodiscard]] double floor_z(double x, double y, Time time, std::span<const ObjectBelief> obstacles) const;
   [[nodiscard]] double worst_clearance(const motion::Trajectory& trajectory, const Load* load,
                                        std::span<const ObjectBelief> obstacles);
