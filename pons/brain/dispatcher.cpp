@@ -11,6 +11,9 @@ namespace {
 
 constexpr int kFramesToTrust = 3;
 constexpr double kSizeMargin_m = 0.01;  // a measured size is not the true one
+constexpr double kSure = 0.5;           // of the confidence: below it something hides a part of the object
+constexpr double kOverlap_m = 0.01;     // footprints that share less only touch
+constexpr int kMostTries = 3;
 
 // Where a camera's downstream edge meets the belt, over its whole width; nothing when it does not look at the belt.
 std::optional<double> view_end_m(const world::CameraSpec& camera, const world::Belt& belt) {
@@ -53,29 +56,55 @@ double speed_m_s(const ObjectBelief& belief, const world::Belt& belt) {
   return std::max(seen > 0 ? seen : belt.speed_m_s, belt.speed_m_s * (1 - belt.speed_variation));
 }
 
+// Whether the footprint of `a`, shrunk a little, and that of `b` share ground: two rectangles are apart when they are
+// along a side of one of them.
+bool overlaps(const ObjectBelief& a, const ObjectBelief& b) {
+  const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
+  for (const ObjectBelief* one : {&a, &b}) {
+    for (const Eigen::Index side : {0, 1}) {
+      const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
+      double reach_m = -kOverlap_m;
+      for (const ObjectBelief* each : {&a, &b}) {
+        for (const Eigen::Index s : {0, 1}) {
+          reach_m += 0.5 * each->size_m[s] * std::abs(along.dot(each->world_from_top.linear().col(s).head<2>()));
+        }
+      }
+      if (std::abs(along.dot(between.head<2>())) > reach_m) return false;
+    }
+  }
+  return true;
+}
+
+bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
+  return std::any_of(all.begin(), all.end(), [&](const ObjectBelief& other) {
+    return other.track != belief.track &&
+           other.world_from_top.translation().z() > belief.world_from_top.translation().z() && overlaps(belief, other);
+  });
+}
+
 }  // namespace
 
 Dispatcher::Dispatcher(Orders orders, const world::World& world)
     : orders_(std::move(orders)), world_(world), label_view_end_m_(brain::label_view_end_m(world)) {}
 
-void Dispatcher::already(std::string_view id) { already_.emplace(id); }
-
 void Dispatcher::heard(std::string_view id, task::Outcome outcome) {
-  const auto found = known_.find(id);
-  if (found != known_.end() && outcome == task::Outcome::kSucceeded) found->second.sorted = true;
+  const auto asked = asked_.find(id);
+  if (asked == asked_.end()) return;
+  Known& known = known_.find(asked->second)->second;
+  known.sorted = outcome == task::Outcome::kSucceeded;
+  known.failed = outcome == task::Outcome::kFailed && known.tries < kMostTries;
+  if (known.failed) decided_.erase(known.track);
 }
 
 Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now) {
-  std::set<std::uint32_t> live;
-  for (const ObjectBelief& belief : beliefs) live.insert(belief.track);
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
-    if (!decided_.contains(belief.track)) decide(belief, live, now, decisions);
+    if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
   }
   return decisions;
 }
 
-void Dispatcher::decide(const ObjectBelief& belief, const std::set<std::uint32_t>& live, Time now,
+void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                         Decisions& decisions) {
   const double x_m = belief.world_from_top.translation().x();
   const bool in_reach = x_m <= world_.belt.pick_x_max_m;
@@ -87,19 +116,30 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::set<std::uint32_t
 
   const auto order = orders_.find(belief.code);
   if (order == orders_.end()) return ride(belief, kRideUnknown, decisions);
-  const auto [known, first] = known_.try_emplace(belief.code, Known{belief.track, false});
-  if (!first) {
-    if (live.contains(known->second.track) || known->second.sorted) return ride(belief, kRideTwice, decisions);
+  Known& known = known_[belief.code];
+  if (known.tries > 0 && !known.failed) {
+    const bool live = std::ranges::find(all, known.track, &ObjectBelief::track) != all.end();
+    if (live || known.sorted) return ride(belief, kRideTwice, decisions);
     // The earlier track was lost, not the parcel: its task stands.
-    known->second.track = belief.track;
+    known.track = belief.track;
     decided_.insert(belief.track);
     return;
   }
-  if (already_.contains(belief.code)) return ride(belief, kRideTwice, decisions);
   if (too_large(belief)) return ride(belief, kRideTooLarge, decisions);
   if (!in_reach) return ride(belief, kRideLate, decisions);
+  if (must_wait(belief)) return;
+  if (belief.confidence < kSure && is_covered(belief, all)) return ride(belief, kRideCovered, decisions);
   decided_.insert(belief.track);
-  decisions.tasks.push_back(task_for(belief, order->second, now));
+  known.track = belief.track;
+  known.failed = false;
+  ++known.tries;
+  decisions.tasks.push_back(task_for(belief, order->second, known.tries, now));
+  asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);
+}
+
+// Taken now, what lies or leans on it would come along. As long as a camera looks, it may still see it bare.
+bool Dispatcher::must_wait(const ObjectBelief& belief) const {
+  return belief.confidence < kSure && belief.world_from_top.translation().x() < label_view_end_m_;
 }
 
 bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
@@ -112,13 +152,13 @@ bool Dispatcher::too_large(const ObjectBelief& belief) const {
   return belief.size_m.maxCoeff() > world_.rules.max_size_m + kSizeMargin_m;
 }
 
-Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, Time now) const {
+Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
   const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / speed_m_s(belief, belt);
   // The same for all, so that it keeps their order: what a belt that slows down may add.
   const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
                          (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));
-  return {{"id", belief.code},
+  return {{"id", tries == 1 ? belief.code : belief.code + "." + std::to_string(tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
           {"deadline_s", now.s() + left_s + slack_s},
           {"steps",
@@ -128,13 +168,15 @@ Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, Time n
 
 void Dispatcher::ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions) {
   decided_.insert(belief.track);
+  if (!belief.code.empty()) known_[belief.code].rode = true;
   decisions.rides.push_back({belief.track, belief.code, std::string(reason)});
 }
 
 std::vector<std::string> Dispatcher::unseen() const {
   std::vector<std::string> codes;
   for (const auto& [code, order] : orders_) {
-    if (!known_.contains(code)) codes.push_back(code);
+    const auto known = known_.find(code);
+    if (known == known_.end() || (known->second.tries == 0 && !known->second.rode)) codes.push_back(code);
   }
   return codes;
 }

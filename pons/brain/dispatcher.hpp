@@ -40,26 +40,26 @@ inline constexpr std::string_view kRideUnknown = "unknown code";
 inline constexpr std::string_view kRideTooLarge = "too large";
 inline constexpr std::string_view kRideTwice = "code seen twice";
 inline constexpr std::string_view kRideLate = "identified out of reach";
+inline constexpr std::string_view kRideCovered = "covered by another";
 
 struct Decisions {
   std::vector<Json> tasks;  // to submit, in this order; an id comes once in the dispatcher's life
-  std::vector<Ride> rides;  // a track comes once
+  std::vector<Ride> rides;
 };
 
-// Pure and deterministic; one thread.
+// Asks for a parcel by its code; for one whose task failed and that turns up again, by code and try ("P000123.2"). What
+// lies on or leans on another is asked for first. Pure and deterministic; one thread.
 class Dispatcher {
  public:
   // `world` must outlive it.
   Dispatcher(Orders orders, const world::World& world);
 
-  // This id is in the journal already: never ask for it.
-  void already(std::string_view id);
   // `beliefs` are all live tracks, predicted to `now`.
   [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now);
   // The outcome of a task that it asked for; others are ignored.
   void heard(std::string_view id, task::Outcome outcome);
 
-  // Orders whose code was never seen, in their order.
+  // Orders that nothing was decided about, in their order.
   [[nodiscard]] std::vector<std::string> unseen() const;
   // Where, along the belt, labels can no longer be read (m).
   [[nodiscard]] double label_view_end_m() const { return label_view_end_m_; }
@@ -67,20 +67,24 @@ class Dispatcher {
  private:
   struct Known {
     std::uint32_t track = 0;  // that carries the code now
-    bool sorted = false;      // its task succeeded: whoever else shows the code is a copy
+    int tries = 0;            // tasks asked for
+    bool sorted = false;      // one of them succeeded: whoever else shows the code is a copy
+    bool rode = false;        // it was let go by
+    bool failed = false;      // the last one failed, and the parcel may turn up again
   };
 
-  void decide(const ObjectBelief& belief, const std::set<std::uint32_t>& live, Time now, Decisions& decisions);
+  void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);
+  [[nodiscard]] bool must_wait(const ObjectBelief& belief) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] bool too_large(const ObjectBelief& belief) const;
-  [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, Time now) const;
+  [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);
 
   Orders orders_;
   const world::World& world_;
   double label_view_end_m_;
-  std::map<std::string, Known, std::less<>> known_;  // codes seen on some track
-  std::set<std::string, std::less<>> already_;
+  std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
+  std::map<std::string, std::string, std::less<>> asked_;  // code by task id
   std::set<std::uint32_t> decided_;  // tracks
 };
 

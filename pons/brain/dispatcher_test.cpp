@@ -41,6 +41,7 @@ ObjectBelief parcel(std::uint32_t track, double x_m, const std::string& code = "
   belief.velocity_m_s = Vector3(0.5, 0, 0);
   belief.size_m = Vector3(0.3, 0.2, 0.1);
   belief.frames_seen = 5;
+  belief.confidence = 0.97;
   belief.code = code;
   return belief;
 }
@@ -139,9 +140,51 @@ TEST_F(DispatcherTest, ACopyOfASortedParcelRides) {
   EXPECT_EQ(only_reason(dispatcher_.observe({parcel(2, 0, "P1")}, at(9))), kRideTwice);
 }
 
-TEST_F(DispatcherTest, NeverAsksForWhatTheJournalHas) {
-  dispatcher_.already("P1");
-  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(1, 0, "P1")}, at(0))), kRideTwice);
+TEST_F(DispatcherTest, AsksAgainForWhatFailedAndTurnsUp) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
+  dispatcher_.heard("P1", task::Outcome::kFailed);
+  const Decisions again = dispatcher_.observe({parcel(2, 0.2, "P1")}, at(3));
+  ASSERT_EQ(again.tasks.size(), 1u);
+  EXPECT_EQ(again.tasks[0].at("id"), "P1.2");
+  EXPECT_EQ(again.tasks[0].at("steps").at(0).at("arguments"), (Json{{"object", "P1"}}));
+  dispatcher_.heard("P1.2", task::Outcome::kException);
+  const Decisions never = dispatcher_.observe({parcel(2, 0.3, "P1"), parcel(3, 0.3, "P2")}, at(4));
+  ASSERT_EQ(never.tasks.size(), 1u);
+  EXPECT_EQ(never.tasks[0].at("id"), "P2");
+}
+
+TEST_F(DispatcherTest, AsksAtMostThreeTimes) {
+  for (std::uint32_t track = 1; track <= 5; ++track) {
+    const Decisions decisions = dispatcher_.observe({parcel(track, 0, "P1")}, at(track));
+    EXPECT_EQ(decisions.tasks.size(), track <= 3 ? 1u : 0u);
+    for (const Json& task : decisions.tasks) dispatcher_.heard(task.at("id").get<std::string>(), task::Outcome::kFailed);
+  }
+}
+
+TEST_F(DispatcherTest, TakesWhatLiesAboveFirst) {
+  ObjectBelief lower = parcel(1, 0.2, "P1"), upper = parcel(2, 0.1, "P2");
+  lower.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  const Decisions first = dispatcher_.observe({lower, upper}, at(0));
+  ASSERT_EQ(first.tasks.size(), 1u);
+  EXPECT_EQ(first.tasks[0].at("id"), "P2");
+  EXPECT_EQ(dispatcher_.unseen(), (std::vector<std::string>{"P1", "P3"}));
+  lower.confidence = 0.9;
+  EXPECT_EQ(dispatcher_.observe({lower}, at(1)).tasks.size(), 1u);
+}
+
+TEST_F(DispatcherTest, WhatStaysCoveredBeyondTheCameraRides) {
+  ObjectBelief lower = parcel(1, 0.6, "P1"), upper = parcel(2, 0.5, "P9");
+  lower.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  const Decisions covered = dispatcher_.observe({lower, upper}, at(0));
+  EXPECT_TRUE(covered.tasks.empty());
+  ASSERT_EQ(covered.rides.size(), 2u);
+  EXPECT_EQ(covered.rides[0].reason, kRideCovered);
+  ObjectBelief beside = parcel(4, 0.6, "P2");
+  beside.confidence = 0.3;
+  upper.world_from_top.translation().x() = 0.9 + 0.01;
+  EXPECT_EQ(dispatcher_.observe({beside, upper}, at(0)).tasks.size(), 1u);
 }
 
 TEST_F(DispatcherTest, WithoutALabelCameraTheReachIsTheEnd) {

@@ -50,7 +50,7 @@ Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
     if (event.kind != "ride") continue;
     Entry& entry = entries[event.detail.value("code", std::string{})];
     entry.ride = true;
-    entry.last_reason = event.detail.value("reason", std::string{});
+    if (entry.tasks == 0) entry.last_reason = event.detail.value("reason", std::string{});
   }
   return entries;
 }

@@ -5,17 +5,21 @@
 #include <numbers>
 #include <utility>
 
+#include "pons/skills/grip.hpp"
+
 namespace pons::skills {
 namespace {
 
 // Planned motion stays this far inside the enforced limits, so that rounding never trips them.
 constexpr double kPlanShare = 0.97;
-// Of what the cups hold, how much may be used up by a planned motion; the rest is for jolts and leaks.
+// A swinging load drives the arm beyond what was planned: so much room for that.
+constexpr double kLoadedSpeedShare = 0.92;
+// Of what the cups hold, how much a planned motion may use up: a load on bellows swings to about twice, at a reversal
+// thrice, what it would take were it rigid.
 constexpr double kGripShare = 0.35;
-// The tip accelerates up to about this much when the joints use all of theirs.
-constexpr double kFullAcceleration_m_s2 = 16.0;
-constexpr double kSlowestShare = 0.12;
-constexpr double kGravity_m_s2 = 9.81;
+constexpr double kSlowestShare = 0.10;
+constexpr double kBoldest = 0.5, kTimid = 0.9;  // of one correction
+constexpr double kUnsure_kg = 0.1;              // the scale's
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
 
@@ -82,21 +86,27 @@ AxisLimits Cell::limits_empty() const {
   return limits;
 }
 
-// The load's inertia acts half its height below the cups and tips it about one row of them; the other row, `span` away,
-// holds against that with what gravity leaves of its force.
-AxisLimits Cell::limits_loaded(double mass_kg, double height_m) const {
-  const world::Tool& tool = world.robot.tool;
-  double span_m = 0;
-  for (const Vector3& a : tool.cups_m)
-    for (const Vector3& b : tool.cups_m) span_m = std::max(span_m, std::abs(a.x() - b.x()));
-  const double row_n = 0.5 * tool.cup_force_n * static_cast<double>(tool.cups_m.size());
-  const double free_n = std::max(0.0, kGripShare * row_n - 0.5 * mass_kg * kGravity_m_s2);
-  const double tipping_kg_m = std::max(1e-6, mass_kg * 0.5 * height_m);
-  const double allowed_m_s2 = free_n * span_m / tipping_kg_m;
-  const double share = std::clamp(allowed_m_s2 / kFullAcceleration_m_s2, kSlowestShare, 1.0);
+AxisLimits Cell::limits_loaded(double share) const {
   AxisLimits limits = limits_empty();
+  limits.speed_rad_s *= kLoadedSpeedShare;
   limits.acceleration_rad_s2 *= share;
   return limits;
+}
+
+Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal) {
+  double share = 1;
+  for (;;) {
+    const AxisLimits limits = limits_loaded(share);
+    const Time from = arm.splice_time(now, limits);
+    const AxisState state = arm.planned(from);
+    const auto q = goal(state.position);
+    if (!q) return std::unexpected(q.error());
+    auto way = router.route(state, from, {*q, AxisVector::Zero(q->size())}, &held->load, objects_, limits);
+    if (!way) return way;
+    const double use = grip_use(model, world.robot.tool, held->load, held->mass_kg + kUnsure_kg, *way);
+    if (use <= kGripShare || share <= kSlowestShare) return way;
+    share = std::max(kSlowestShare, share * std::clamp(kGripShare / use, kBoldest, kTimid));
+  }
 }
 
 }  // namespace pons::skills

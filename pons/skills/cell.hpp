@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,8 +50,11 @@ class Cell {
   [[nodiscard]] static Pose tip_down(const Vector3& position, double yaw);
   // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces.
   [[nodiscard]] AxisLimits limits_empty() const;
-  // Those with a load on the cups: what tips a tall or heavy parcel off them is acceleration.
-  [[nodiscard]] AxisLimits limits_loaded(double mass_kg, double height_m) const;
+  // Where a carry shall end, joints, given those it starts from.
+  using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;
+  // The fastest way for what is held, from the present motion to standstill at `goal`, that leaves the cups a reserve.
+  // Something must be held. Errors: those of the goal and of the router.
+  [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal);
 
   const world::World& world;
   Arm arm;
@@ -59,6 +63,8 @@ class Cell {
   std::optional<Held> held;
 
  private:
+  [[nodiscard]] AxisLimits limits_loaded(double share) const;
+
   Time now_;
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace pons::skills {
 namespace {
@@ -14,10 +15,29 @@ constexpr double kRide_s = 0.40;        // along with the belt, while vacuum bui
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
 constexpr int kRounds = 8;
+// A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
+constexpr double kLift_m_s2 = 5.0;
+constexpr double kRideLifted_s = 0.5;  // until the next motion takes over
 
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
 Vector3 belt_velocity(const Cell& cell) { return {cell.belt_speed_m_s(), 0, 0}; }
+
+// The tip's largest vertical acceleration, by second differences.
+double most_upward_m_s2(Cell& cell, const motion::Trajectory& trajectory) {
+  constexpr double kStep_s = 0.01;
+  const auto height = [&](Time time) {
+    return cell.model.world_from_tip(motion::sample(trajectory, time, cell.model.axes()).position).translation().z();
+  };
+  const Time begin = trajectory.front().start, end = trajectory.back().end();
+  double before = height(begin), now = height(begin + from_s(kStep_s)), most = 0;
+  for (Time time = begin + from_s(2 * kStep_s); time < end; time += from_s(kStep_s)) {
+    const double next = height(time);
+    most = std::max(most, std::abs(before - 2 * now + next) / (kStep_s * kStep_s));
+    before = std::exchange(now, next);
+  }
+  return most;
+}
 
 }  // namespace
 
@@ -64,6 +84,29 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   const auto q = cell.model.inverse(Cell::tip_down(from + offset, yaw_rad), start.position);
   if (!q) return std::unexpected(q.error());
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
+}
+
+Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad, double height_m) {
+  const Vector3 belt = belt_velocity(cell);
+  AxisLimits limits = cell.limits_empty();
+  Expected<motion::Trajectory> up = fail("out of reach", "lift");
+  double takes_s = 0.4;
+  for (int round = 0; round < kRounds; ++round) {
+    up = nudge(cell, start, at, yaw_rad, takes_s * belt + Vector3(0, 0, height_m), belt, limits);
+    if (!up) return std::unexpected(up.error());
+    takes_s = to_s(up->back().end() - at);
+    const double too_hard = most_upward_m_s2(cell, *up) / kLift_m_s2;
+    if (too_hard <= 1) break;
+    limits.acceleration_rad_s2 /= std::clamp(too_hard, 1.05, 2.0);
+    limits.jerk_rad_s3 /= std::clamp(too_hard, 1.05, 2.0);
+  }
+  const Time top = up->back().end();
+  const AxisState lifted = motion::sample(*up, top, cell.model.axes());
+  auto on = ride(cell, lifted, top, yaw_rad, kRideLifted_s);
+  if (!on) on = motion::stop(lifted, top, cell.limits_empty());
+  if (!on) return std::unexpected(on.error());
+  append(*up, *on);
+  return Lift{std::move(*up), top};
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,

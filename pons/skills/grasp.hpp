@@ -28,6 +28,13 @@ struct Grasp {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          std::optional<double> yaw_rad);
 
+// Straight up with a load on the cups, riding along with the belt, so that neighbours stay where they are.
+struct Lift {
+  motion::Trajectory trajectory;  // goes on with the belt above the top, as far as the arm reaches, and ends at rest
+  Time top;                       // when the height is reached
+};
+[[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad, double height_m);
+
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad,
                                                  const Vector3& offset, const Vector3& tip_speed,

@@ -21,14 +21,7 @@ class MoveTo final : public task::Skill {
       if (now < arrives_) return {};
       return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{Status::kSucceeded, {}, {}};
     }
-    const Time from = Arm::splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    const auto q = target(state.position);
-    if (!q) return {Status::kFailed, q.error().line(), {}};
-    const Load* load = cell_.held ? &cell_.held->load : nullptr;
-    const auto way = cell_.router.route(
-        state, from, {*q, AxisVector::Zero(q->size())}, load, cell_.objects(),
-        cell_.held ? cell_.limits_loaded(cell_.held->mass_kg, load->size_m.z()) : cell_.limits_empty());
+    const auto way = cell_.held ? cell_.carry(now, [&](const AxisVector& from) { return target(from); }) : empty(now);
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
@@ -49,6 +42,15 @@ class MoveTo final : public task::Skill {
     if (place == nullptr) return fail("no place '" + place_ + "' in this world", "move_to");
     const double depth = cell_.held ? cell_.held->load.size_m.z() : 0;
     return cell_.model.inverse(Cell::tip_down(place->center_m + Vector3(0, 0, kAbove_m + depth), 0), from);
+  }
+
+  Expected<motion::Trajectory> empty(Time now) {
+    const Time from = Arm::splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+    const auto q = target(state.position);
+    if (!q) return std::unexpected(q.error());
+    return cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
+                              cell_.limits_empty());
   }
 
   Cell& cell_;

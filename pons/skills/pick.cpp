@@ -16,7 +16,8 @@ using task::Status;
 constexpr Duration kVacuumLead = std::chrono::milliseconds(40);   // before the contact
 constexpr Duration kSealWithin = std::chrono::milliseconds(330);  // after it, while riding along
 constexpr Duration kPressAfter = std::chrono::milliseconds(90);   // the contact, when too few cups have sealed
-constexpr double kPressFurther_m = 0.006;
+constexpr double kPressFurther_m = 0.003;
+constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
 constexpr double kPressTakes_s = 0.08;
 constexpr int kPresses = 2;
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
@@ -25,21 +26,19 @@ constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead o
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
-constexpr double kUnweighed_kg = 1.5;   // assumed until the wrist has weighed it
 constexpr double kLift_m = 0.10;
 constexpr double kHighestLift_m = 0.25;
 constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
 constexpr double kClear_m = 0.02;  // by this much
-constexpr double kLiftTakes_s = 0.35;
-constexpr double kRideLifted_s = 0.5;  // with the belt after the lift, until the next motion takes over
-constexpr double kLifted_m = 0.030;    // nothing below supports the load any more
+constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
+constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
 constexpr double kSetDown_m = 0.01;  // over the belt, when let go
 constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;  // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(900);
-constexpr Duration kSettle = std::chrono::milliseconds(80);  // after a lift, until the bellows swing no more
+constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr double kWait_m = 0.15;                             // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
@@ -92,7 +91,7 @@ class Pick final : public task::Skill {
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
       if (now - seen_ < kUnseenFor) return {};
-      return {Status::kException, "lost from sight", {}};
+      return {Status::kFailed, "lost from sight", {}};
     }
     seen_ = now;
     if (object->world_from_top.translation().x() > cell_.world.belt.pick_x_max_m) {
@@ -117,16 +116,12 @@ class Pick final : public task::Skill {
   // rides on into the exception chute.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
-    const Load& load = cell_.held->load;
-    const AxisLimits limits = cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z());
-    const Time from = cell_.arm.splice_time(now, limits);
-    const AxisState state = cell_.arm.planned(from);
-    const Vector3 spot = free_spot(from + kSetDownTakes);
-    const auto yaw = nearest_yaw(cell_, state.position, spot, load.yaw_in_tip_rad);
-    if (!yaw) return {Status::kRetry, "no room to set down " + cell_.held->code, {}};
-    const auto q = cell_.model.inverse(Cell::tip_down(spot, *yaw), state.position);
-    if (!q) return {Status::kRetry, q.error().line(), {}};
-    auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(), limits);
+    const auto way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
+      const Vector3 spot = free_spot(now + kSetDownTakes);
+      const auto yaw = nearest_yaw(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
+      if (!yaw) return fail("no room on the belt", cell_.held->code);
+      return cell_.model.inverse(Cell::tip_down(spot, *yaw), from);
+    });
     if (!way) return {Status::kRetry, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     released_at_ = way->back().end();
@@ -157,7 +152,7 @@ class Pick final : public task::Skill {
 
   Progress set_down(Time now) {
     if (now < released_at_) {
-      if (weigh_now(cell_, now) > kPushedBack_kg) return {};
+      if (weigh_now(cell_) > kPushedBack_kg) return {};
       released_at_ = now;  // it stands already: its size was misjudged
       if (!cell_.arm.stop(now)) return {Status::kRetry, "cannot stop", {}};
     }
@@ -234,6 +229,7 @@ class Pick final : public task::Skill {
 
   // A parcel that lies askew meets some cups first; pressing on, the bellows give way and the others seal, too.
   bool press_further(Time now) {
+    if (weigh_now(cell_) < -kPressedHard_kg) return false;
     const Time from = Arm::splice_time(now);
     const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
     auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.yaw_rad,
@@ -253,19 +249,11 @@ class Pick final : public task::Skill {
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    // Along with the belt until the load hangs clear of its neighbours: they ride on.
-    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    const Vector3 offset = kLiftTakes_s * belt + Vector3(0, 0, lift_height());
-    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
-    auto up = nudge(cell_, state, from, grasp_.yaw_rad, offset, belt,
-                    cell_.limits_loaded(std::max(kUnweighed_kg, expected_kg), target_.size_m.z()));
+    const auto up = skills::lift(cell_, state, from, grasp_.yaw_rad, lift_height());
     if (!up) return {Status::kRetry, up.error().line(), {}};
-    lift_end_ = up->back().end();
-    const auto along =
-        ride(cell_, motion::sample(*up, lift_end_, cell_.model.axes()), lift_end_, grasp_.yaw_rad, kRideLifted_s);
-    if (!along) return {Status::kRetry, along.error().line(), {}};
-    up->insert(up->end(), along->begin(), along->end());
-    if (auto sent = cell_.arm.stream(*up); !sent) return {Status::kRetry, sent.error().line(), {}};
+    if (auto sent = cell_.arm.stream(up->trajectory); !sent) return {Status::kRetry, sent.error().line(), {}};
+    lift_end_ = up->top;
+    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
     held.load.yaw_in_tip_rad = grasp_.yaw_rad - yaw_of(target_);
@@ -300,21 +288,18 @@ class Pick final : public task::Skill {
       return {};
     }
     if (height < kLifted_m) return {};
-    scale_.add(cell_, now);
-    if (!scale_.ready() && now < lift_end_ + kSettle) return {};
-    const double mass = scale_.mass_kg();
-    if (mass > cell_.world.rules.max_mass_kg && !settled_) {
-      // Too heavy, or a neighbour drags along: only a reading at rest may condemn it.
-      if (now >= lift_end_ + kSettle) {
-        scale_ = Scale{};
-        settled_ = true;
-      }
-      return {};
-    }
+    scale_.add(cell_);
+    const std::optional<double> weighed = scale_.mass_kg(cell_);
+    const bool at_rest = now >= lift_end_ + kWeighAtRest;
+    const double limit = cell_.world.rules.max_mass_kg;
+    // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
+    const bool unsure = !weighed || target_.crowded || *weighed > (1 - kNearLimit) * limit;
+    if (unsure && !at_rest) return {};
+    const double mass = weighed.value_or(limit);
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
-    if (mass > cell_.world.rules.max_mass_kg) {
+    if (mass > limit) {
       return begin_set_down(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
     }
     return success(now);
@@ -360,7 +345,7 @@ class Pick final : public task::Skill {
   Progress verdict_;
   std::string last_error_;
   int sealed_ticks_ = 0, presses_ = 0;
-  bool waiting_ = false, stopped_ = false, settled_ = false, cancelled_ = false;
+  bool waiting_ = false, stopped_ = false, cancelled_ = false;
 };
 
 }  // namespace

@@ -68,14 +68,8 @@ class Place final : public task::Skill {
     }
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
-    const Load& load = cell_.held->load;
-    const AxisLimits limits = cell_.limits_loaded(cell_.held->mass_kg, load.size_m.z());
-    const Time from = cell_.arm.splice_time(now, limits);
-    const AxisState state = cell_.arm.planned(from);
-    const auto q = over(*target, state.position);
-    if (!q) return {Status::kFailed, name_ + " is out of reach", {}};
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, &load, cell_.objects(), limits);
-    if (!way) return {Status::kFailed, way.error().line(), {}};
+    const auto way = cell_.carry(now, [&](const AxisVector& from) { return over(*target, from); });
+    if (!way) return {Status::kFailed, name_ + ": " + way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
     phase_ = Phase::kCarry;
@@ -113,7 +107,7 @@ class Place final : public task::Skill {
 
   Progress release(Time now) {
     if (now < arrives_ + kRested || !cell_.arm.all_cups_open()) return late(now);
-    const double felt_kg = weigh_now(cell_, now);
+    const double felt_kg = weigh_now(cell_);
     if (felt_kg > std::max(kGoneLeast_kg, kGoneShare * cell_.held->mass_kg)) return late(now);
     const std::string code = cell_.held->code;
     cell_.held.reset();
@@ -124,7 +118,7 @@ class Place final : public task::Skill {
   Progress late(Time now) {
     if (now < arrives_ + kLetGoWithin) return {};
     return {
-        Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_, now)), {}};
+        Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_)), {}};
   }
 
   Cell& cell_;

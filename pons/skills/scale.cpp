@@ -7,41 +7,49 @@ namespace pons::skills {
 namespace {
 
 constexpr double kGravity_m_s2 = 9.81;
-constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.25;
-constexpr Duration kHalfStep = std::chrono::milliseconds(5);
-
-// Upward acceleration of the tip as planned, from its speed shortly before and after.
-double tip_acceleration_z(Cell& cell, Time time) {
-  const auto speed_z = [&](Time at) {
-    const AxisState state = cell.arm.planned(at);
-    return (cell.model.tip_jacobian(state.position) * state.speed)(2);
-  };
-  return (speed_z(time + kHalfStep) - speed_z(time - kHalfStep)) / to_s(2 * kHalfStep);
-}
+constexpr double kSpan_s = 0.15;  // the slowest swing of a load on the bellows
+constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 
 }  // namespace
 
-double weigh_now(Cell& cell, Time now) {
+double weigh_now(Cell& cell) {
   // The flange's z points down, so a hanging mass pulls along it.
-  const double force_n = cell.arm.state().wrist_force_n[2];
-  return force_n / (kGravity_m_s2 + tip_acceleration_z(cell, now)) - cell.world.robot.tool.mass_kg;
+  return cell.arm.state().wrist_force_n[2] / kGravity_m_s2 - cell.world.robot.tool.mass_kg;
 }
 
-void Scale::add(Cell& cell, Time now) { last_kg_[samples_++ % kNeeded] = weigh_now(cell, now); }
-
-bool Scale::ready() const {
-  if (samples_ < kNeeded) return false;
-  double older_kg = 0, newer_kg = 0;
-  for (std::size_t i = 0; i < kNeeded; ++i)
-    (i < kNeeded / 2 ? older_kg : newer_kg) += last_kg_[(samples_ + i) % kNeeded];
-  constexpr double kHalf = kNeeded / 2;
-  return std::abs(newer_kg - older_kg) / kHalf < std::max(kAgreeLeast_kg, kAgreeShare * mass_kg());
+void Scale::add(Cell& cell) {
+  const link::State& state = cell.arm.state();
+  if (!readings_.empty() && state.stamp.s() <= readings_.back().time_s) return;
+  const double speed_m_s = (cell.model.tip_jacobian(state.position) * state.speed)(2);
+  readings_.push_back({state.stamp.s(), state.wrist_force_n[2], speed_m_s});
 }
 
-double Scale::mass_kg() const {
-  double sum_kg = 0;
-  for (const double kg : last_kg_) sum_kg += kg;
-  return sum_kg / static_cast<double>(kNeeded);
+// Of tool and load together, by the trapezoidal rule.
+double Scale::mass_kg(std::size_t first, std::size_t last) const {
+  double impulse = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    impulse += 0.5 * (readings_[i].force_n + readings_[i + 1].force_n) * (readings_[i + 1].time_s - readings_[i].time_s);
+  }
+  const double span_s = readings_[last].time_s - readings_[first].time_s;
+  const double per_kg = kGravity_m_s2 * span_s + readings_[last].speed_m_s - readings_[first].speed_m_s;
+  return impulse / std::max(per_kg, 0.1 * kGravity_m_s2 * span_s);
+}
+
+std::optional<double> Scale::mass_kg(const Cell& cell) const {
+  const double tool_kg = cell.world.robot.tool.mass_kg;
+  if (readings_.size() < 3) return std::nullopt;
+  const std::size_t last = readings_.size() - 1;
+  const auto since = [&](double span_s) {
+    std::size_t first = last;
+    while (first > 0 && readings_[last].time_s - readings_[first].time_s < span_s) --first;
+    return first;
+  };
+  const std::size_t first = since(kSpan_s), middle = since(kSpan_s / 2);
+  if (readings_[last].time_s - readings_[first].time_s < kSpan_s) return std::nullopt;
+  const double whole_kg = mass_kg(first, last) - tool_kg;
+  const double change_kg = std::abs(mass_kg(first, middle) - mass_kg(middle, last));
+  if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
+  return whole_kg;
 }
 
 }  // namespace pons::skills

@@ -1,30 +1,33 @@
 // Weighs what hangs on the cups from the wrist's force while the arm moves.
 #pragma once
 
-#include <array>
-#include <cstddef>
+#include <optional>
+#include <vector>
 
 #include "pons/skills/cell.hpp"
 
 namespace pons::skills {
 
-// Averages m = F/(g + a) over bridge ticks: the bellows swing at about 17 Hz, so a reading counts from six ticks on.
+// The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
+// ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed.
 class Scale {
  public:
   // With the tool pointing down. Call once a bridge tick while nothing supports the load.
-  void add(Cell& cell, Time now);
-  // The last six readings and their halves agree: nothing supports the load any more.
-  [[nodiscard]] bool ready() const;
-  // Mass of the load by the last six readings, kg, tool taken off.
-  [[nodiscard]] double mass_kg() const;
+  void add(Cell& cell);
+  // Mass of the load over the latest readings, kg, tool taken off; nothing until they span a swing and their halves
+  // agree: until then something may still bear a part of it.
+  [[nodiscard]] std::optional<double> mass_kg(const Cell& cell) const;
 
  private:
-  static constexpr std::size_t kNeeded = 6;
-  std::array<double, kNeeded> last_kg_{};  // a ring
-  std::size_t samples_ = 0;
+  struct Reading {
+    double time_s, force_n, speed_m_s;
+  };
+  [[nodiscard]] double mass_kg(std::size_t first, std::size_t last) const;
+
+  std::vector<Reading> readings_;
 };
 
 // One reading at standstill, kg, tool taken off.
-[[nodiscard]] double weigh_now(Cell& cell, Time now);
+[[nodiscard]] double weigh_now(Cell& cell);
 
 }  // namespace pons::skills
