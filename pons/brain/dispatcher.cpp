@@ -10,9 +10,10 @@ namespace pons::brain {
 namespace {
 
 constexpr int kFramesToTrust = 3;
-constexpr double kSizeMargin_m = 0.01;  // a measured size is not the true one
-constexpr double kSure = 0.5;           // of the confidence: below it something hides a part of the object
-constexpr double kOverlap_m = 0.01;     // footprints that share less only touch
+constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
+constexpr double kSure = 0.5;            // of the confidence: below it something hides a part of the object
+constexpr double kOverlap_m = 0.01;      // footprints that share less only touch
+constexpr double kUpright = 0.9986;      // cosine of 3 degrees
 constexpr int kMostTries = 3;
 
 // Where a camera's downstream edge meets the belt, over its whole width; nothing when it does not look at the belt.
@@ -75,11 +76,22 @@ bool overlaps(const ObjectBelief& a, const ObjectBelief& b) {
   return true;
 }
 
+bool leans(const ObjectBelief& belief) { return belief.world_from_top.linear()(2, 2) < kUpright; }
+
+// What leans lies on what stands, however high; else the higher one is above.
+bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
+  if (leans(upper) != leans(lower)) return leans(upper);
+  return upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
+}
+
+// Seen whole, nothing lies on it; and what is only hidden from the camera has nobody above.
 bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
-  return std::any_of(all.begin(), all.end(), [&](const ObjectBelief& other) {
-    return other.track != belief.track &&
-           other.world_from_top.translation().z() > belief.world_from_top.translation().z() && overlaps(belief, other);
-  });
+  return belief.confidence < kSure && std::any_of(
+                                          all.begin(), all.end(),
+                                          [&](const ObjectBelief& other) {
+                                            return other.track != belief.track && lies_on(other, belief) &&
+                                                   overlaps(belief, other);
+                                          });
 }
 
 }  // namespace
@@ -127,19 +139,17 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   }
   if (too_large(belief)) return ride(belief, kRideTooLarge, decisions);
   if (!in_reach) return ride(belief, kRideLate, decisions);
-  if (must_wait(belief)) return;
-  if (belief.confidence < kSure && is_covered(belief, all)) return ride(belief, kRideCovered, decisions);
+  if (is_covered(belief, all)) {
+    // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare.
+    if (x_m < label_view_end_m_) return;
+    return ride(belief, kRideCovered, decisions);
+  }
   decided_.insert(belief.track);
   known.track = belief.track;
   known.failed = false;
   ++known.tries;
   decisions.tasks.push_back(task_for(belief, order->second, known.tries, now));
   asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);
-}
-
-// Taken now, what lies or leans on it would come along. As long as a camera looks, it may still see it bare.
-bool Dispatcher::must_wait(const ObjectBelief& belief) const {
-  return belief.confidence < kSure && belief.world_from_top.translation().x() < label_view_end_m_;
 }
 
 bool Dispatcher::past_label_view(const ObjectBelief& belief) const {

@@ -74,7 +74,6 @@ class Dispatcher {
   };
 
   void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);
-  [[nodiscard]] bool must_wait(const ObjectBelief& belief) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] bool too_large(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
@@ -85,7 +84,7 @@ class Dispatcher {
   double label_view_end_m_;
   std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
   std::map<std::string, std::string, std::less<>> asked_;  // code by task id
-  std::set<std::uint32_t> decided_;  // tracks
+  std::set<std::uint32_t> decided_;                        // tracks
 };
 
 }  // namespace pons::brain

@@ -157,7 +157,8 @@ TEST_F(DispatcherTest, AsksAtMostThreeTimes) {
   for (std::uint32_t track = 1; track <= 5; ++track) {
     const Decisions decisions = dispatcher_.observe({parcel(track, 0, "P1")}, at(track));
     EXPECT_EQ(decisions.tasks.size(), track <= 3 ? 1u : 0u);
-    for (const Json& task : decisions.tasks) dispatcher_.heard(task.at("id").get<std::string>(), task::Outcome::kFailed);
+    for (const Json& task : decisions.tasks)
+      dispatcher_.heard(task.at("id").get<std::string>(), task::Outcome::kFailed);
   }
 }
 

@@ -98,11 +98,8 @@ std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& 
                                          const Segments& segments, const std::vector<Sighting>& sightings,
                                          const std::vector<std::size_t>& wanted) {
   std::vector<LabelRead> reads;
-  const auto already = [&](std::size_t sighting) {
-    return std::ranges::find(reads, sighting, &LabelRead::sighting) != reads.end();
-  };
   for (const std::size_t index : wanted) {
-    if (already(index)) continue;
+    if (std::ranges::find(reads, index, &LabelRead::sighting) != reads.end()) continue;
     const double top_z_m = sightings[index].world_from_top.translation().z();
     const cv::Rect area = print_area(frame, view, texture, segments.regions[index], top_z_m);
     if (area.width < 20 || area.height < 20) continue;
@@ -110,8 +107,8 @@ std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& 
       const Eigen::Vector2d at = unproject(frame, found.middle, top_z_m);
       const cv::Point cell = view.cell(at.x(), at.y());
       const int label = view.contains(cell) ? segments.labels(cell) : 0;
-      if (label == 0 || already(static_cast<std::size_t>(label - 1))) continue;
-      reads.push_back({found.code, static_cast<std::size_t>(label - 1)});
+      if (label == 0 || std::ranges::find(reads, found.code, &LabelRead::code) != reads.end()) continue;
+      reads.push_back({found.code, static_cast<std::size_t>(label - 1), {at.x(), at.y(), top_z_m}});
     }
   }
   return reads;

@@ -14,12 +14,13 @@ namespace pons::perception {
 struct LabelRead {
   std::string code;
   std::size_t sighting = 0;  // whose top face the label's middle lies on
+  Vector3 middle_m;          // world
 };
 
 class LabelReader {
  public:
-  // Tries the objects named in `wanted` (indices into `sightings`). In the order of `wanted`; at most one read a
-  // sighting.
+  // Tries the objects named in `wanted` (indices into `sightings`). In the order of `wanted`; no code twice. Two codes
+  // on one sighting are two objects that were taken for one.
   std::vector<LabelRead> read(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
                               const Segments& segments, const std::vector<Sighting>& sightings,
                               const std::vector<std::size_t>& wanted);

@@ -25,6 +25,7 @@ struct Perception::Impl {
   Tracker tracker;
   std::map<std::string, TopViewer, std::less<>> viewers;  // by camera
   std::map<std::string, TrayWatch, std::less<>> watches;  // by place
+  std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
 
   Impl(const world::World& the_world, model::RobotModel model)
       : world(the_world), self_filter(std::move(model)), tracker(the_world.belt) {
@@ -34,10 +35,23 @@ struct Perception::Impl {
     }
   }
 
+  [[nodiscard]] std::vector<LabelMark> marks(const TopView& view, double belt_travel_m);
   void see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment);
   void read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
-                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks);
+                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks,
+                   double belt_travel_m);
 };
+
+// Those in view; of the others, what has ridden out of it will not come back.
+std::vector<LabelMark> Perception::Impl::marks(const TopView& view, double belt_travel_m) {
+  std::vector<LabelMark> seen;
+  std::erase_if(shared, [&](const auto& label) { return label.second.x() + belt_travel_m > world.belt.x_end_m; });
+  for (const auto& [code, middle] : shared) {
+    const cv::Point cell = view.cell(middle.x() + belt_travel_m, middle.y());
+    if (view.contains(cell)) seen.push_back({code, cell});
+  }
+  return seen;
+}
 
 void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment) {
   auto viewer = viewers.find(frame.camera);
@@ -46,22 +60,29 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   }
   const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
   const TopView& view = viewer->second.build(frame, robot);
-  const Segments& segments = segmenter.segment(view);
+  const Segments& segments = segmenter.segment(view, marks(view, moment.belt_travel_m));
   const std::vector<Sighting> sightings = measure(view, segments);
   const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
-  if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks);
+  if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks, moment.belt_travel_m);
 }
 
 void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
-                                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks) {
+                                   const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks,
+                                   double belt_travel_m) {
   std::vector<std::size_t> wanted;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (tracks[i] == 0) continue;
     if (sightings[i].complete && !sightings[i].covered) tracker.label_attempt(tracks[i]);
     if (tracker.wants_label(tracks[i])) wanted.push_back(i);
   }
-  for (const LabelRead& read : label_reader.read(frame, view, segmenter.texture(), segments, sightings, wanted)) {
-    tracker.label_read(tracks[read.sighting], read.code);
+  const std::vector<LabelRead> reads = label_reader.read(frame, view, segmenter.texture(), segments, sightings, wanted);
+  for (const LabelRead& read : reads) {
+    // Two on one are two objects taken for one: with the next frame they are told apart.
+    if (std::ranges::count(reads, read.sighting, &LabelRead::sighting) == 1) {
+      tracker.label_read(tracks[read.sighting], read.code);
+    } else {
+      shared[read.code] = read.middle_m - Vector3(belt_travel_m, 0, 0);
+    }
   }
 }
 

@@ -18,6 +18,7 @@ constexpr int kLook = 3;       // cells to look beyond an outline
 constexpr int kCrowdedLook = 4;
 constexpr int kHigher = 60;  // 6 mm
 constexpr int kMostCuts = 24;
+constexpr double kHalfLabel_m = 0.025;  // a label's middle is at least so far from its object's edge
 const std::array<cv::Point, 4> kAround = {cv::Point{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 const std::array<cv::Point, 8> kAround8 = {cv::Point{1, 0}, {1, 1},   {0, 1},  {-1, 1},
                                            {-1, 0},         {-1, -1}, {0, -1}, {1, -1}};
@@ -196,13 +197,31 @@ void Segmenter::split(const TopView& view) {
   }
 }
 
-const Segments& Segmenter::segment(const TopView& view) {
+void Segmenter::split_by_labels(const TopView& view, const std::vector<LabelMark>& marks) {
+  const auto region_of = [&](const LabelMark& mark) {
+    const cv::Point cell = mark.middle;
+    return view.contains(cell) ? segments_.labels(cell) : 0;
+  };
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    for (std::size_t j = i + 1; j < marks.size(); ++j) {
+      const int label = region_of(marks[i]);
+      if (label == 0 || region_of(marks[j]) != label) continue;
+      const auto index = static_cast<std::size_t>(label - 1);
+      const auto line = splitter_.between(view, segments_.regions[index].cells, marks[i].middle, marks[j].middle,
+                                          kHalfLabel_m / view.cell_m);
+      if (line) cut(index, *line);
+    }
+  }
+}
+
+const Segments& Segmenter::segment(const TopView& view, const std::vector<LabelMark>& marks) {
   find_cores(view);
   grow(view);
   collect();
   for (Region& region : segments_.regions) describe(view, region);
   const std::size_t before = segments_.regions.size();
   split(view);
+  split_by_labels(view, marks);
   // What a hand holds stays one thing: pieces of it keep the mark of the whole.
   for (Region& region : segments_.regions) {
     if (segments_.regions.size() == before) break;

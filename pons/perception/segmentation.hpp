@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "pons/perception/splitter.hpp"
@@ -28,10 +29,16 @@ struct Segments {
   std::vector<Region> regions;  // regions[i].label == i + 1
 };
 
+// Where a label was read: its code and its middle, in cells.
+struct LabelMark {
+  std::string code;
+  cv::Point2d middle;
+};
+
 class Segmenter {
  public:
-  // The result is good until the next call.
-  const Segments& segment(const TopView& view);
+  // No region keeps two of `marks`: every object has one code. The result is good until the next call.
+  const Segments& segment(const TopView& view, const std::vector<LabelMark>& marks = {});
   // Cells with fine print (a label's modules), of the last call.
   [[nodiscard]] const cv::Mat1b& texture() const { return splitter_.texture(); }
 
@@ -40,6 +47,7 @@ class Segmenter {
   void grow(const TopView& view);
   void collect();
   void split(const TopView& view);
+  void split_by_labels(const TopView& view, const std::vector<LabelMark>& marks);
   void describe(const TopView& view, Region& region) const;
   void cut(std::size_t region, const Line& line);
   void drop_small(const TopView& view);

@@ -88,7 +88,7 @@ void Splitter::prepare(const TopView& view) {
   cv::dilate(texture_, texture_, kernel);
 }
 
-Splitter::Cut Splitter::best_cut(double angle_rad, double bin, double total_variance) const {
+Splitter::Cut Splitter::best_cut(double angle_rad, double bin, double total_variance, double from, double to) const {
   const auto nx = static_cast<float>(std::cos(angle_rad)), ny = static_cast<float>(std::sin(angle_rad));
   float low = 1e9F, high = -1e9F;
   for (const Sample& sample : samples_) {
@@ -112,12 +112,13 @@ Splitter::Cut Splitter::best_cut(double angle_rad, double bin, double total_vari
     left += cv::Vec4d(sums[i][0], sums[i][1], sums[i][2], sums[i][3]);
     const cv::Vec4d right = all - left;
     if (left[0] < least || right[0] < least) continue;
+    const double offset = static_cast<double>(low) + bin * static_cast<double>(i + 1);
+    if (offset < from || offset > to) continue;
     const cv::Vec3d difference(left[1] / left[0] - right[1] / right[0], left[2] / left[0] - right[2] / right[0],
                                left[3] / left[0] - right[3] / right[0]);
     const double explained = left[0] * right[0] / (all[0] * all[0]) * squared(difference) / total_variance;
     if (explained > best.explained) {
-      best = {angle_rad, static_cast<double>(low) + bin * static_cast<double>(i + 1), explained,
-              std::sqrt(squared(difference))};
+      best = {angle_rad, offset, explained, std::sqrt(squared(difference))};
     }
   }
   return best;
@@ -168,6 +169,38 @@ std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<c
     if (cut.explained > best.explained) best = cut;
   }
   if (best.explained < kExplained || best.contrast < kContrast || !sharp(best)) return std::nullopt;
+  return Line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
+}
+
+std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, cv::Point2d one,
+                                      cv::Point2d other, double clear) {
+  constexpr float kGreyPerMillimetre = 5;
+  samples_.clear();
+  const std::size_t stride = std::max<std::size_t>(1, cells.size() / kSamples);
+  cv::Vec3d sum(0, 0, 0);
+  double squares = 0;
+  for (std::size_t i = 0; i < cells.size(); i += stride) {
+    if (texture_(cells[i]) != 0) continue;
+    const cv::Vec3b& colour = view.colour(cells[i]);
+    const cv::Vec3f features(colour[0], colour[2],
+                             kGreyPerMillimetre * static_cast<float>(1e3 * TopView::metres(view.height(cells[i]))));
+    samples_.push_back({cells[i], features});
+    sum += cv::Vec3d(features);
+    squares += squared(cv::Vec3d(features));
+  }
+  if (samples_.size() < 80) return std::nullopt;
+  const auto count = static_cast<double>(samples_.size());
+  const double variance = std::max(1.0, squares / count - squared(sum / count));
+
+  Cut best;
+  for (int degrees = 0; degrees < 180; degrees += 3) {
+    const double angle = degrees * std::numbers::pi / 180;
+    const cv::Point2d normal(std::cos(angle), std::sin(angle));
+    const double a = normal.dot(one), b = normal.dot(other);
+    const Cut cut = best_cut(angle, 1, variance, std::min(a, b) + clear, std::max(a, b) - clear);
+    if (cut.explained > best.explained) best = cut;
+  }
+  if (best.explained <= 0) return std::nullopt;
   return Line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
 }
 

@@ -25,6 +25,10 @@ class Splitter {
 
   // A line between two plain colours with a sharp edge. Maximises the variance between both sides (Otsu 1979).
   [[nodiscard]] std::optional<Line> by_colour(const TopView& view, const std::vector<cv::Point>& cells);
+  // The line between the middles of two labels (in cells, each `clear` cells from the line at least) that tells colour
+  // and height of the two sides apart best.
+  [[nodiscard]] std::optional<Line> between(const TopView& view, const std::vector<cv::Point>& cells, cv::Point2d one,
+                                            cv::Point2d other, double clear);
   // A line through an inward corner of the outline that leaves two better rectangles and cuts no print; the shortest of
   // nearly equal ones.
   [[nodiscard]] std::optional<Line> by_outline(const std::vector<cv::Point>& cells) const;
@@ -39,7 +43,9 @@ class Splitter {
     double explained = 0;  // share of the colour's variance
     double contrast = 0;   // distance between the two sides' means
   };
-  [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance) const;
+  // Of the cuts at that angle with an offset between `from` and `to`.
+  [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance, double from = -1e9,
+                             double to = 1e9) const;
   [[nodiscard]] bool sharp(const Cut& cut) const;
 
   cv::Mat1b texture_, grey_, brightest_, darkest_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "pons/sim/truth.hpp"
 
@@ -29,13 +30,14 @@ bool above(const world::Place& place, const Vector3& point) {
 
 // What the step's contacts say about one slot.
 struct Touch {
-  double press_n = 0, squeeze_n = 0;
+  double press_n = 0, cups_n = 0, squeeze_n = 0;
 };
 
 struct Track {
   int parcel = -1;
   bool lifted = false, gripped = false, sinking = false;
-  double gripped_at_m = 0;  // height of the middle when the cups took hold
+  std::array<double, kWindow> press_n{};  // of the last steps
+  double gripped_at_m = 0;                // height of the middle when the cups took hold
   double fell_from_m = 0;
   const world::Place* inside = nullptr;  // chute, exception or tray it is in
   Time since;                            // … or has been at rest outside of everything
@@ -105,7 +107,6 @@ void Ledger::Impl::feel(const Composed& cell, const mjData* data, const Gripper&
                         std::array<Touch, kSlots>& touches) const {
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
-    if (contact.efc_address < 0) continue;
     for (std::size_t side = 0; side < 2; ++side) {
       const auto geom = static_cast<std::size_t>(contact.geom[side]);
       const auto other = static_cast<std::size_t>(contact.geom[1 - side]);
@@ -114,7 +115,7 @@ void Ledger::Impl::feel(const Composed& cell, const mjData* data, const Gripper&
       const bool robot = cell.parts[other] == Part::kArm || cell.parts[other] == Part::kCup;
       const Track& track = tracks[static_cast<std::size_t>(slot)];
       if (!robot && !track.lifted) continue;
-      double force[6];
+      double force[6];  // zero for a contact within the lips' gap: there adhesion alone acts
       mj_contactForce(cell.model.get(), data, i, force);
       Touch& touch = touches[static_cast<std::size_t>(slot)];
       if (!robot) {
@@ -126,7 +127,7 @@ void Ledger::Impl::feel(const Composed& cell, const mjData* data, const Gripper&
       for (std::size_t cup = 0; cup < cell.cups.size(); ++cup) {
         if (cell.cups[cup].geom == contact.geom[1 - side]) pull = gripper.pull_n(cup);
       }
-      touch.press_n += std::max(0.0, force[0] - pull);
+      (pull > 0 ? touch.cups_n : touch.press_n) += force[0] - pull;
     }
   }
 }
@@ -277,7 +278,9 @@ void Ledger::update(const Composed& cell, const mjData* data, const Gripper& gri
     ParcelTruth& parcel = impl_->parcels[static_cast<std::size_t>(track.parcel)];
     const Vector3 at(data->qpos[slot.qpos], data->qpos[slot.qpos + 1], data->qpos[slot.qpos + 2]);
     const Vector3 speed(data->qvel[slot.dof], data->qvel[slot.dof + 1], data->qvel[slot.dof + 2]);
-    parcel.max_press_n = std::max(parcel.max_press_n, touches[i].press_n);
+    track.press_n[impl_->window_at] = touches[i].press_n + std::max(0.0, touches[i].cups_n);
+    const double press_n = std::accumulate(track.press_n.begin(), track.press_n.end(), 0.0) / kWindow;
+    parcel.max_press_n = std::max(parcel.max_press_n, press_n);
     parcel.max_squeeze_n = std::max(parcel.max_squeeze_n, touches[i].squeeze_n);
     impl_->follow_grip(track, parcel, at, speed, gripper.grip(static_cast<int>(i)), vacuum_on);
     impl_->follow_fall(track, parcel, at, speed);

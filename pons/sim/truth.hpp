@@ -34,7 +34,7 @@ struct ParcelTruth {
   Whereabouts where = Whereabouts::kNotOffered;
   std::string place;         // the place's name for kChute, kException and kTray, else name(where)
   Time arrived;              // when it came to rest there
-  double max_press_n = 0;    // largest sum of the arm's and tool's net normal forces on it in one step
+  double max_press_n = 0;    // largest sum of the arm's and tool's net normal forces on it, over 10 ms
   double max_squeeze_n = 0;  // largest single contact with anything else while it was held
   double max_drop_m = 0;     // deepest fall: from where it began to sink unheld to where it stopped
   int picks = 0;             // times it was lifted off by the cups

@@ -24,16 +24,16 @@ Wrench wrench(const std::array<Pose, 3>& poses, const Load& load, double mass_kg
   const Vector3 tip_from_com = load.offset_in_tip_m + Vector3(0, 0, 0.5 * load.size_m.z());
   const Vector3 acceleration =
       (poses[0] * tip_from_com - 2 * (poses[1] * tip_from_com) + poses[2] * tip_from_com) / (kStep_s * kStep_s);
-  const Vector3 spin_up = (turn_between(poses[1].linear(), poses[2].linear()) -
-                           turn_between(poses[0].linear(), poses[1].linear())) /
-                          (kStep_s * kStep_s);
+  const Vector3 spin_up =
+      (turn_between(poses[1].linear(), poses[2].linear()) - turn_between(poses[0].linear(), poses[1].linear())) /
+      (kStep_s * kStep_s);
   const Vector3 square = load.size_m.cwiseProduct(load.size_m);
-  const Eigen::Matrix3d tip_from_load =
-      Eigen::AngleAxisd(load.yaw_in_tip_rad, Vector3::UnitZ()).toRotationMatrix();
-  const Vector3 inertia = mass_kg / 12 * Vector3(square.y() + square.z(), square.x() + square.z(), square.x() + square.y());
+  const Eigen::Matrix3d tip_from_load = Eigen::AngleAxisd(load.yaw_in_tip_rad, Vector3::UnitZ()).toRotationMatrix();
+  const Vector3 inertia =
+      mass_kg / 12 * Vector3(square.y() + square.z(), square.x() + square.z(), square.x() + square.y());
   const Vector3 force = mass_kg * (poses[1].linear().transpose() * (acceleration - kGravity_m_s2));
-  return {force, tip_from_com.cross(force) +
-                     tip_from_load * inertia.asDiagonal() * (tip_from_load.transpose() * spin_up)};
+  return {force,
+          tip_from_com.cross(force) + tip_from_load * inertia.asDiagonal() * (tip_from_load.transpose() * spin_up)};
 }
 
 double use(const world::Tool& tool, const Wrench& asked) {

@@ -28,18 +28,20 @@ constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a n
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 constexpr double kLift_m = 0.10;
 constexpr double kHighestLift_m = 0.25;
-constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
-constexpr double kClear_m = 0.02;  // by this much
+constexpr double kClose_m = 0.05;    // neighbours within this of the footprint are lifted over
+constexpr double kClear_m = 0.02;    // by this much
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kSetDown_m = 0.01;  // over the belt, when let go
+constexpr double kSetDown_m = 0.03;  // over the belt, when let go: a heavy load hangs lower than its size says
 constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
-constexpr double kRoom_m = 0.02;  // to the next parcel is enough
-constexpr Duration kSetDownTakes = std::chrono::milliseconds(900);
+constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
+constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
+constexpr int kSetDownRounds = 3;
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
-constexpr double kWait_m = 0.15;                             // over the parcels, where the arm waits for one to come
+constexpr double kWaitOver_m = 0.06;                               // the others, which pass below
+constexpr double kWait_m = 0.15;  // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
  public:
@@ -116,13 +118,19 @@ class Pick final : public task::Skill {
   // rides on into the exception chute.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
-    const auto way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
-      const Vector3 spot = free_spot(now + kSetDownTakes);
-      const auto yaw = nearest_yaw(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
-      if (!yaw) return fail("no room on the belt", cell_.held->code);
-      return cell_.model.inverse(Cell::tip_down(spot, *yaw), from);
-    });
-    if (!way) return {Status::kRetry, way.error().line(), {}};
+    // Where there will be room depends on when it gets there, and that on where.
+    Time arrives = now + kSetDownTakes;
+    Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
+    for (int round = 0; round < kSetDownRounds; ++round) {
+      way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
+        const Vector3 spot = free_spot(arrives);
+        const auto yaw = nearest_yaw(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
+        if (!yaw) return fail("no room on the belt", cell_.held->code);
+        return cell_.model.inverse(Cell::tip_down(spot, *yaw), from);
+      });
+      if (!way) return {Status::kRetry, way.error().line(), {}};
+      arrives = way->back().end();
+    }
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     released_at_ = way->back().end();
     phase_ = Phase::kSetDown;
@@ -178,6 +186,9 @@ class Pick final : public task::Skill {
     Vector3 point = grasp.contact_point;
     point.x() = cell_.world.belt.pick_x_min_m + 0.02;
     point.z() = object.world_from_top.translation().z() + kWait_m;
+    for (const ObjectBelief& other : cell_.objects()) {
+      point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
+    }
     const auto q = cell_.model.inverse(Cell::tip_down(point, grasp.yaw_rad), state.position);
     if (!q) return {};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
@@ -293,8 +304,9 @@ class Pick final : public task::Skill {
     const bool at_rest = now >= lift_end_ + kWeighAtRest;
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
-    const bool unsure = !weighed || target_.crowded || *weighed > (1 - kNearLimit) * limit;
-    if (unsure && !at_rest) return {};
+    const bool heavy = weighed && *weighed > (1 - kNearLimit) * limit;
+    if ((!weighed || heavy) && !at_rest) return {};
+    if (target_.crowded && now < lift_end_) return {};
     const double mass = weighed.value_or(limit);
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;

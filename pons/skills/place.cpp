@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
@@ -18,6 +19,8 @@ constexpr double kOverRim_m = 0.03;     // between rim and the parcel's undersid
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
 constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
+constexpr double kLoose_m = 0.035;  // a shorter one falls through with its swing
+constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kWide_m = 0.28;  // a wider one must hang still to fall through the mouth
 constexpr Duration kSwing = std::chrono::milliseconds(140);
@@ -76,17 +79,40 @@ class Place final : public task::Skill {
     return {};
   }
 
-  // Over the middle of the mouth, the parcel's sides along the mouth's; which of the four turns, the arm decides.
+  // Over the middle of the mouth, the parcel's sides along the mouth's; which of the turns, the arm decides.
   Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
-    const Load& load = cell_.held->load;
-    Vector3 tip = target.center_m + Vector3(0, 0, std::max(kTipOverRim_m, kOverRim_m + load.size_m.z()));
-    Expected<double> yaw = fail("out of reach");
-    for (int height = 0; height < kHeights && !yaw; ++height) {
-      if (height > 0) tip.z() += kHigher_m;
-      yaw = nearest_yaw(cell_, from, tip, load.yaw_in_tip_rad);
+    const bool tight = cell_.held->load.size_m.x() > target.size_m.head<2>().minCoeff() - kLoose_m;
+    // A long one goes in end first, if the arm can; flat it would lie across the rim.
+    for (const double tilt : tight ? std::vector{kEndFirst_rad, 0.0} : std::vector{0.0}) {
+      for (int height = 0; height < kHeights; ++height) {
+        if (auto q = nearest(target, tilt, kHigher_m * height, from)) return q;
+      }
     }
-    if (!yaw) return std::unexpected(yaw.error());
-    return cell_.model.inverse(Cell::tip_down(tip, *yaw), from);
+    return fail("out of reach", name_);
+  }
+
+  Expected<AxisVector> nearest(const world::Place& target, double tilt, double higher_m, const AxisVector& from) {
+    const Load& load = cell_.held->load;
+    const double underside_m = load.size_m.z() * std::cos(tilt) + 0.5 * load.size_m.x() * std::sin(tilt);
+    const Vector3 tip = target.center_m + Vector3(0, 0, higher_m + std::max(kTipOverRim_m, kOverRim_m + underside_m));
+    const Eigen::AngleAxisd tip_from_load(load.yaw_in_tip_rad, Vector3::UnitZ());
+    Expected<AxisVector> best = fail("out of reach", name_);
+    double least = 0;
+    for (int turn = 0; turn < 8; ++turn) {
+      const double yaw = load.yaw_in_tip_rad + 0.5 * std::numbers::pi * (turn % 4);
+      Pose pose = Cell::tip_down(tip, yaw);
+      pose.rotate(Eigen::AngleAxisd(turn < 4 ? tilt : -tilt, tip_from_load * Vector3::UnitY()));
+      // The middle of the load, not of its top face, over the middle of the mouth.
+      const Vector3 middle = pose.linear() * Vector3(0, 0, 0.5 * load.size_m.z());
+      pose.translation().head<2>() -= middle.head<2>();
+      const auto q = cell_.model.inverse(pose, from);
+      if (!q) continue;
+      const double turned = (*q - from).cwiseAbs().maxCoeff();
+      if (best && turned >= least) continue;
+      best = q;
+      least = turned;
+    }
+    return best;
   }
 
   Progress carry(Time now) {
@@ -117,8 +143,7 @@ class Place final : public task::Skill {
 
   Progress late(Time now) {
     if (now < arrives_ + kLetGoWithin) return {};
-    return {
-        Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_)), {}};
+    return {Status::kFailed, fmt::format("does not let go: the wrist still feels {:.2f} kg", weigh_now(cell_)), {}};
   }
 
   Cell& cell_;

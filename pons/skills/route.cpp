@@ -9,12 +9,17 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kBeltMargin_m = 0.015;    // over the bare belt and rims
+constexpr double kBeltMargin_m = 0.015;    // over the bare belt and beside it
 constexpr double kObjectMargin_m = 0.020;  // over an object
-constexpr double kObjectGrow_m = 0.030;    // around an object's footprint
-constexpr double kFreeRadius_m = 0.08;     // about both ends, where the skill knows what it does
+constexpr double kObjectGrow_m = 0.030;    // around an object's footprint,
+constexpr double kEndGrow_m = 0.003;       // and close to both ends, where the skill knows what it does
+constexpr double kEndRadius_m = 0.08;
+constexpr double kSink_m = 0.005;  // what comes from between others may leave as low as it is
 constexpr double kCover = 1.0 + 1e-6;
-constexpr double kToolRadius_m = 0.045;
+constexpr double kToolRadius_m = 0.038;
+constexpr double kSwing_rad = 0.06;       // how far a load may swing out of level
+constexpr double kUnseenHeight_m = 0.20;  // of what may come along the belt
+constexpr double kUnseenLength_m = 0.30;  // of which so much is in view before it is believed
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
 // Points of tool or load that come lowest.
@@ -26,12 +31,37 @@ std::vector<Vector3> probes(const Load* load) {
     return points;
   }
   const Eigen::AngleAxisd turn(load->yaw_in_tip_rad, Vector3::UnitZ());
-  for (const double x : {-0.5, 0.0, 0.5})
-    for (const double y : {-0.5, 0.0, 0.5}) {
+  for (const double x : {-0.5, -0.25, 0.0, 0.25, 0.5})
+    for (const double y : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
+      const double lower_m = kSwing_rad * std::hypot(x * load->size_m.x(), y * load->size_m.y());
       points.push_back(load->offset_in_tip_m +
-                       turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z()));
+                       turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z() + lower_m));
     }
   return points;
+}
+
+// How far along the belt the cameras that watch it have not seen everything.
+double unseen_end_m(const world::World& world) {
+  double end_m = world.belt.x_start_m;
+  for (const world::CameraSpec& camera : world.cameras) {
+    if (camera.watches != "belt") continue;
+    // The left edge of a picture whose x axis lies along the belt; of others the belt's start remains.
+    const double side = std::tan(camera.fovy_rad / 2) * camera.width / camera.height;
+    const Vector3 ray = camera.world_from_optical.linear() * Vector3(-side, 0, 1);
+    const Vector3 eye = camera.world_from_optical.translation();
+    if (ray.z() >= 0) continue;
+    const double edge_m = eye.x() + ray.x() * (world.belt.surface_z_m - eye.z()) / ray.z();
+    end_m = std::max(end_m, std::min(edge_m, eye.x()) + kUnseenLength_m);
+  }
+  return end_m;
+}
+
+double rims_z_m(const world::World& world) {
+  double highest = 0;
+  for (const world::Place& place : world.places) {
+    if (place.kind == world::PlaceKind::kChute) highest = std::max(highest, place.center_m.z());
+  }
+  return highest;
 }
 
 }  // namespace
@@ -43,14 +73,22 @@ AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
   return wider;
 }
 
-Router::Router(const world::World& world, model::RobotModel model) : world_(world), model_(std::move(model)) {}
+Router::Router(const world::World& world, model::RobotModel model)
+    : world_(world), unseen_end_m_(unseen_end_m(world)), rims_z_m_(rims_z_m(world)), model_(std::move(model)) {}
 
-double Router::floor_z(double x, double y, Time time, std::span<const ObjectBelief> obstacles) const {
-  double floor = world_.belt.surface_z_m + kBeltMargin_m;
+// What a point over (x, y) must stay above at `time`, when the way was planned at `begin`.
+double Router::floor_z(double x, double y, Time time, Time begin, double grow_m,
+                       std::span<const ObjectBelief> obstacles) const {
+  const world::Belt& belt = world_.belt;
+  const bool over_belt = std::abs(y - belt.y_center_m) < 0.5 * belt.width_m + kBeltMargin_m;
+  double floor = over_belt ? belt.surface_z_m + kBeltMargin_m : rims_z_m_;
+  if (over_belt && x < unseen_end_m_ + to_s(time - begin) * belt.speed_m_s) floor += kUnseenHeight_m;
   for (const ObjectBelief& object : obstacles) {
     const Vector3 middle = object.world_from_top.translation() + to_s(time - object.stamp) * object.velocity_m_s;
-    const double reach = 0.5 * std::hypot(object.size_m.x(), object.size_m.y()) + kObjectGrow_m;
-    if (std::hypot(x - middle.x(), y - middle.y()) < reach) floor = std::max(floor, middle.z() + kObjectMargin_m);
+    const Vector3 off = object.world_from_top.linear().transpose() * Vector3(x - middle.x(), y - middle.y(), 0);
+    const bool over =
+        std::abs(off.x()) < 0.5 * object.size_m.x() + grow_m && std::abs(off.y()) < 0.5 * object.size_m.y() + grow_m;
+    if (over) floor = std::max(floor, middle.z() + kObjectMargin_m);
   }
   return floor;
 }
@@ -61,16 +99,21 @@ double Router::worst_clearance(const motion::Trajectory& trajectory, const Load*
   const std::vector<Vector3> points = probes(load);
   const Eigen::Index axes = model_.axes();
   const Time begin = trajectory.front().start, end = trajectory.back().end();
-  const Vector3 first = model_.world_from_tip(motion::sample(trajectory, begin, axes).position).translation();
-  const Vector3 last = model_.world_from_tip(motion::sample(trajectory, end, axes).position).translation();
+  const Pose first = model_.world_from_tip(motion::sample(trajectory, begin, axes).position);
+  const Pose last = model_.world_from_tip(motion::sample(trajectory, end, axes).position);
+  const auto close = [](const Pose& a, const Pose& b) {
+    return (a.translation() - b.translation()).head<2>().norm() < kEndRadius_m;
+  };
   double worst = std::numeric_limits<double>::infinity();
   for (Time time = begin; time < end; time += kCheckEvery) {
     const Pose world_from_tip = model_.world_from_tip(motion::sample(trajectory, time, axes).position);
-    const Vector3 tip = world_from_tip.translation();
-    if ((tip - first).head<2>().norm() < kFreeRadius_m || (tip - last).head<2>().norm() < kFreeRadius_m) continue;
+    const bool leaving = close(world_from_tip, first);
+    const double grow_m = leaving || close(world_from_tip, last) ? kEndGrow_m : kObjectGrow_m;
     for (const Vector3& point : points) {
       const Vector3 low = world_from_tip * point;
-      worst = std::min(worst, low.z() - floor_z(low.x(), low.y(), time, obstacles));
+      double floor = floor_z(low.x(), low.y(), time, begin, grow_m, obstacles);
+      if (leaving) floor = std::min(floor, (first * point).z() - kSink_m);
+      worst = std::min(worst, low.z() - floor);
     }
   }
   return worst;

@@ -27,19 +27,22 @@ class Router {
   // `world` must outlive it.
   Router(const world::World& world, model::RobotModel model);
 
-  // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims. Close to both ends
-  // the way is as asked. Errors: no clear way found, or an end that cannot be reached.
+  // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims: with a margin,
+  // close to both ends without. Errors: no clear way found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits);
 
  private:
-  [[nodiscard]] double floor_z(double x, double y, Time time, std::span<const ObjectBelief> obstacles) const;
+  [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double grow_m,
+                               std::span<const ObjectBelief> obstacles) const;
   [[nodiscard]] double worst_clearance(const motion::Trajectory& trajectory, const Load* load,
                                        std::span<const ObjectBelief> obstacles);
   [[nodiscard]] Expected<AxisVector> raised(const AxisVector& q, double tip_z);
 
   const world::World& world_;
+  double unseen_end_m_;  // upstream of it something may lie that no camera has seen yet
+  double rims_z_m_;      // of the highest chute
   model::RobotModel model_;
 };
 

@@ -28,7 +28,8 @@ void Scale::add(Cell& cell) {
 double Scale::mass_kg(std::size_t first, std::size_t last) const {
   double impulse = 0;
   for (std::size_t i = first; i < last; ++i) {
-    impulse += 0.5 * (readings_[i].force_n + readings_[i + 1].force_n) * (readings_[i + 1].time_s - readings_[i].time_s);
+    impulse +=
+        0.5 * (readings_[i].force_n + readings_[i + 1].force_n) * (readings_[i + 1].time_s - readings_[i].time_s);
   }
   const double span_s = readings_[last].time_s - readings_[first].time_s;
   const double per_kg = kGravity_m_s2 * span_s + readings_[last].speed_m_s - readings_[first].speed_m_s;
