@@ -96,19 +96,20 @@ class Pick final : public task::Skill {
       return {Status::kFailed, "lost from sight", {}};
     }
     seen_ = now;
-    if (object->world_from_top.translation().x() > cell_.world.belt.pick_x_max_m) {
+    const world::Belt& belt = cell_.world.belt;
+    if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
       return {Status::kException, "rode past the pick zone", {}};
     }
     const Time from = Arm::splice_time(now);
     auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
     if (!grasp) {
       // Out of reach upstream is a matter of waiting; the same beyond is not.
-      if (object->world_from_top.translation().x() < cell_.world.belt.pick_x_min_m) return {};
+      if (object->world_from_top.translation().x() < 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m)) return {};
       last_error_ = grasp.error().line();
       return now - started_ < std::chrono::seconds(2) ? Progress{} : Progress{Status::kRetry, last_error_, {}};
     }
-    if (grasp->contact_point.x() < cell_.world.belt.pick_x_min_m) return wait_for(*object, *grasp, now);
-    if (grasp->contact_point.x() > cell_.world.belt.pick_x_max_m) {
+    if (grasp->contact_point.x() < belt.pick_x_min_m) return wait_for(*object, *grasp, now);
+    if (grasp->contact_point.x() > belt.pick_x_max_m) {
       return {Status::kException, "would ride past the pick zone", {}};
     }
     return start(*grasp, *object, now);

@@ -135,10 +135,11 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   if (clearance >= 0) return direct;
 
   const AxisVector middle = 0.5 * (start.position + end.position);
-  const double depth = load == nullptr ? 0.0 : load->size_m.z();
+  double depth = 0;  // of the load's lowest point below the tip
+  for (const Vector3& point : probes(load)) depth = std::max(depth, point.z());
   const double start_z = model_.world_from_tip(start.position).translation().z();
   const double end_z = model_.world_from_tip(end.position).translation().z();
-  double lowest = world_.belt.surface_z_m + kBeltMargin_m + depth;
+  double lowest = world_.belt.surface_z_m + kBeltMargin_m + kUnseenHeight_m + depth;
   for (const ObjectBelief& object : obstacles) {
     lowest = std::max(lowest, object.world_from_top.translation().z() + kObjectMargin_m + depth);
   }
@@ -154,6 +155,7 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
     if (over_start) ways.push_back({*over_start});
     if (over_end) ways.push_back({*over_end});
     if (over_start && over_end) ways.push_back({*over_start, *over_end});
+    if (over_start && over_middle) ways.push_back({*over_start, *over_middle});
     Expected<motion::Trajectory> best = std::unexpected(reason);
     for (const auto& vias : ways) {
       auto candidate = motion::move_through(start, at, vias, end, limits);
