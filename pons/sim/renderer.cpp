@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <stdexcept>
 
@@ -16,6 +19,39 @@ void set_look(mjvScene& scene, Look look) {
   for (const int flag : {mjRND_SHADOW, mjRND_SKYBOX, mjRND_HAZE, mjRND_REFLECTION}) scene.flags[flag] = on;
 }
 
+Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
+
+// The driver finds out only triangle by triangle, after it has lit them, that a geom lies outside of the picture.
+void leave_out_unseen(const mjModel* model, const mjvGLCamera& camera, float aspect, mjvScene& scene) {
+  const Eigen::Vector3f forward = vector(camera.forward), up = vector(camera.up), right = forward.cross(up);
+  const float near = camera.frustum_near;
+  const float half_width = 0.5F * aspect * (camera.frustum_top - camera.frustum_bottom);
+  // Normals, inward, of the four sides, which meet in the camera.
+  const std::array<Eigen::Vector3f, 4> inward = {near * up - camera.frustum_bottom * forward,
+                                                 camera.frustum_top * forward - near * up,
+                                                 near * right + (half_width - camera.frustum_center) * forward,
+                                                 (half_width + camera.frustum_center) * forward - near * right};
+  const auto outside = [&](const mjvGeom& geom) {
+    if (geom.objtype != mjOBJ_GEOM) return false;
+    const auto radius = static_cast<float>(model->geom_rbound[geom.objid]);  // of an infinite one 0
+    const Eigen::Vector3f from_camera = vector(geom.pos) - vector(camera.pos);
+    return radius > 0 && std::ranges::any_of(inward, [&](const Eigen::Vector3f& normal) {
+             return normal.dot(from_camera) < -radius * normal.norm();
+           });
+  };
+  scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom, outside) - scene.geoms);
+}
+
+// What is hidden is then refused by its depth before it is shaded. The floor, which has a texture and is nearly always
+// hidden, would cost as much as everything else together.
+void front_to_back(const mjvGLCamera& camera, mjvScene& scene) {
+  const Eigen::Vector3f from = vector(camera.pos), forward = vector(camera.forward);
+  std::stable_sort(scene.geoms, scene.geoms + scene.ngeom, [&](const mjvGeom& a, const mjvGeom& b) {
+    if ((a.type == mjGEOM_PLANE) != (b.type == mjGEOM_PLANE)) return b.type == mjGEOM_PLANE;
+    return forward.dot(vector(a.pos) - from) < forward.dot(vector(b.pos) - from);
+  });
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int width, int height, Look look) {
@@ -24,6 +60,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
   if (auto current = (*gl)->make_current(); !current) return std::unexpected(current.error());
   std::unique_ptr<Renderer> renderer(new Renderer);
   renderer->gl_ = std::move(*gl);
+  renderer->look_ = look;
   renderer->width_ = width;
   renderer->height_ = height;
   renderer->near_m_ = static_cast<double>(model->vis.map.znear) * model->stat.extent;
@@ -65,6 +102,11 @@ void Renderer::capture(const mjModel* model, mjData* data, int camera, const Lab
   view.type = mjCAMERA_FIXED;
   view.fixedcamid = camera;
   mjv_updateScene(model, data, &option_, nullptr, &view, mjCAT_ALL, &scene_);
+  if (look_ == Look::kSensor) {  // in a picture for people things cast shadows from outside
+    const mjvGLCamera eye = mjv_averageCamera(scene_.camera, scene_.camera + 1);
+    leave_out_unseen(model, eye, static_cast<float>(width_) / static_cast<float>(height_), scene_);
+    front_to_back(eye, scene_);
+  }
   versions_.resize(labels.entries.size(), 0);
   for (std::size_t i = 0; i < labels.entries.size(); ++i) {
     const LabelStore::Entry& entry = labels.entries[i];
