@@ -13,10 +13,28 @@ namespace pons::sim {
 namespace {
 
 constexpr int kMostGeoms = 2000;
+constexpr int kStacks = 8;           // along the axis of what is round, caps included
+constexpr double kPlaneGrid_m = 20;  // spacing
 
 void set_look(mjvScene& scene, Look look) {
   const mjtByte on = look == Look::kPicture ? 1 : 0;
   for (const int flag : {mjRND_SHADOW, mjRND_SKYBOX, mjRND_HAZE, mjRND_REFLECTION}) scene.flags[flag] = on;
+}
+
+// Lights are directional: what is flat has one shade, and finer pieces of it only cost time. The slices around a tube
+// stay, because its shape is measured.
+void make_context(const mjModel& view, Look look, mjrContext& context) {
+  mjModel drawn = view;
+  std::vector<mjtNum> sizes(view.geom_size, view.geom_size + 3 * view.ngeom);
+  if (look == Look::kSensor) {
+    drawn.vis.quality.numquads = 1;
+    drawn.vis.quality.numstacks = kStacks;
+    for (std::size_t geom = 0; geom < sizes.size() / 3; ++geom) {
+      if (view.geom_type[geom] == mjGEOM_PLANE) sizes[3 * geom + 2] = kPlaneGrid_m;
+    }
+    drawn.geom_size = sizes.data();
+  }
+  mjr_makeContext(&drawn, &context, mjFONTSCALE_50);
 }
 
 Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
@@ -78,7 +96,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
   mjr_defaultContext(&renderer->context_);
   try {
     mjv_makeScene(model, &renderer->scene_, kMostGeoms);
-    mjr_makeContext(&view, &renderer->context_, mjFONTSCALE_50);
+    make_context(view, look, renderer->context_);
     mjr_setBuffer(mjFB_OFFSCREEN, &renderer->context_);
   } catch (const std::runtime_error& error) {
     renderer->gl_->release();
