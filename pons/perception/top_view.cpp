@@ -86,13 +86,9 @@ void TopViewer::project(const RgbdFrame& frame) {
   const auto from_z = static_cast<float>(view_.camera_m.z() - view_.surface_z_m);
   const int columns = highest_.cols;
   const auto limit_x = static_cast<float>(columns), limit_y = static_cast<float>(highest_.rows);
-  depth_row_.resize(static_cast<std::size_t>(window_.width));
   for (int row = 0; row < window_.height; ++row) {
     const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window_.width);
-    for (int i = 0; i < window_.width; ++i) {
-      depth_row_[static_cast<std::size_t>(i)] = sampling_.depth(frame, window_.y + row, window_.x + i);
-    }
-    const float* const depth = depth_row_.data();
+    const float* const depth = sampling_.row(frame, window_.y + row, window_.x, window_.width, depth_row_);
     const float* const ray_x = ray_x_.data() + first;
     const float* const ray_y = ray_y_.data() + first;
     const float* const ray_z = ray_z_.data() + first;
@@ -113,39 +109,68 @@ void TopViewer::project(const RgbdFrame& frame) {
 }
 
 void TopViewer::drop_robot(const cv::Mat1b& robot) {
-  for (int row = 0; row < window_.height; ++row) {
-    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(window_.y + row) + window_.x;
-    int* const cell = cell_of_.data() + static_cast<std::ptrdiff_t>(row) * window_.width;
-    for (int i = 0; i < window_.width; ++i) cell[i] = seen[i] == SelfFilter::kRobot ? -1 : cell[i];
+  view_.flags.setTo(0);
+  auto* const flags = view_.flags.ptr<std::uint8_t>();
+  const cv::Rect near = cv::boundingRect(robot) & window_;
+  for (int row = near.y; row < near.br().y; ++row) {
+    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
+    int* const cell = cell_of_.data() + static_cast<std::ptrdiff_t>(row - window_.y) * window_.width - window_.x;
+    for (int column = near.x; column < near.br().x; ++column) {
+      if (seen[column] == 0 || cell[column] < 0) continue;
+      if (seen[column] == SelfFilter::kRobot) {
+        cell[column] = -1;
+      } else {
+        flags[cell[column]] |= TopView::kNearRobot;
+      }
+    }
   }
 }
 
-// The highest surface of each cell, averaged over its readings; and what was seen of it. Of bare belt only the height
-// matters, and most of the picture is bare belt.
-void TopViewer::accumulate(const RgbdFrame& frame, const cv::Mat1b& robot) {
-  highest_.setTo(0), sum_.setTo(0), count_.setTo(0);
-  view_.flags.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
+// The highest reading of each cell. Those above bare belt are noted: they are few, and of the others only the height
+// matters.
+void TopViewer::find_highest() {
+  highest_.setTo(0);
+  auto* const highest = highest_.ptr<std::uint16_t>();
+  const std::uint16_t bare = TopView::steps(kBare_m);
+  raised_.resize(cell_of_.size());
+  raised_end_.resize(static_cast<std::size_t>(window_.height));
+  std::size_t count = 0;
+  for (std::size_t row = 0; row < raised_end_.size(); ++row) {
+    const std::size_t first = row * static_cast<std::size_t>(window_.width);
+    const int* const cells = cell_of_.data() + first;
+    const std::uint16_t* const heights = height_of_.data() + first;
+    for (int i = 0; i < window_.width; ++i) {
+      const int cell = cells[i];
+      if (cell < 0) continue;
+      highest[cell] = std::max(highest[cell], heights[i]);
+      raised_[count] = i;
+      count += heights[i] >= bare ? 1U : 0U;
+    }
+    raised_end_[row] = count;
+  }
+}
+
+// The highest surface of each cell, averaged over its readings; and what was seen of it.
+void TopViewer::accumulate(const RgbdFrame& frame) {
+  sum_.setTo(0), count_.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
   auto* const highest = highest_.ptr<std::uint16_t>();
   auto* const sum = sum_.ptr<int>();
   auto* const count = count_.ptr<int>();
   auto* const colour = view_.colour.ptr<cv::Vec3b>();
   auto* const flags = view_.flags.ptr<std::uint8_t>();
-  for (std::size_t i = 0; i < cell_of_.size(); ++i) {
-    if (cell_of_[i] >= 0) highest[cell_of_[i]] = std::max(highest[cell_of_[i]], height_of_[i]);
-  }
-  const std::uint16_t bare = TopView::steps(kBare_m);
-  std::size_t i = 0;
   const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
+  std::size_t next = 0;
   for (int row = window_.y; row < window_.br().y; ++row) {
-    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
     const bool border_row = row < kBorder || row >= sampling_.height - kBorder;
-    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
+    const auto line = static_cast<std::size_t>(row - window_.y);
+    const std::size_t first = line * static_cast<std::size_t>(window_.width);
+    for (; next < raised_end_[line]; ++next) {
+      const auto i = first + static_cast<std::size_t>(raised_[next]);
       const int cell = cell_of_[i];
-      if (cell < 0) continue;
-      if (seen[column] != 0) flags[cell] |= TopView::kNearRobot;
-      if (height_of_[i] < bare || height_of_[i] + kSameSurface < highest[cell]) continue;
+      if (height_of_[i] + kSameSurface < highest[cell]) continue;
       sum[cell] += height_of_[i];
       ++count[cell];
+      const int column = window_.x + raised_[next];
       const std::size_t pixel = 3 * (static_cast<std::size_t>(row * sampling_.step) * stride +
                                      static_cast<std::size_t>(column * sampling_.step));
       colour[cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
@@ -188,7 +213,8 @@ void TopViewer::fill_pinholes() {
 const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) {
   project(frame);
   drop_robot(robot);
-  accumulate(frame, robot);
+  find_highest();
+  accumulate(frame);
   fill_pinholes();
   cv::medianBlur(filled_, view_.height, 5);
   return view_;

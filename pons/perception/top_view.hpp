@@ -58,7 +58,8 @@ class TopViewer {
  private:
   void project(const RgbdFrame& frame);
   void drop_robot(const cv::Mat1b& robot);
-  void accumulate(const RgbdFrame& frame, const cv::Mat1b& robot);
+  void find_highest();
+  void accumulate(const RgbdFrame& frame);
   void fill_pinholes();
 
   Sampling sampling_;
@@ -68,6 +69,8 @@ class TopViewer {
   std::vector<float> depth_row_;
   std::vector<int> cell_of_;  // −1: nothing there
   std::vector<std::uint16_t> height_of_;
+  std::vector<int> raised_;              // columns, in the window, of readings above bare belt; row by row
+  std::vector<std::size_t> raised_end_;  // of each row in `raised_`
   cv::Mat1w highest_, filled_;
   cv::Mat1i sum_, count_;
   TopView view_;
