@@ -21,8 +21,8 @@ inline std::uint64_t mix(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-// What chance does to one row. Plain loops without branches, in pieces that stay in the cache: the compiler turns all
-// but the first into vector code.
+// What chance does to one row: in pieces that stay in the cache, numbers first, then a loop without branches that the
+// compiler turns into vector code.
 struct Chance {
   std::uint64_t seed = 0;                 // of the frame
   float sigma = 0;                        // at 1 m
@@ -34,10 +34,12 @@ struct Chance {
     std::array<std::uint32_t, kPiece> chance;
     std::array<int, kPiece> sum;
     std::array<float, kPiece + 1> right;
+    const Chance own = *this;  // as a copy it cannot change with `line`
     for (std::size_t at = 0; at < columns; at += kPiece) {
       const std::size_t count = std::min(kPiece, columns - at);
       for (std::size_t i = 0; i < count; ++i) {
-        const std::uint64_t bits = mix(seed + (first + at + i) * 0x9e3779b97f4a7c15ULL);
+        asm volatile("");  // keeps this loop scalar: emulated vector products of 64 bits are slower
+        const std::uint64_t bits = mix(own.seed + (first + at + i) * 0x9e3779b97f4a7c15ULL);
         chance[i] = static_cast<std::uint32_t>((bits * 0xd1342543de82ef95ULL) >> 32);
         sum[i] = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
       }
@@ -46,8 +48,8 @@ struct Chance {
       for (std::size_t i = 0; i < count; ++i) {
         const float z = right[i];
         const bool edge = (std::abs(right[i + 1] - z) > kEdge_m) | (std::abs(below[at + i] - z) > kEdge_m);
-        const float measured = z + sigma * z * z * rough_normal(sum[i]);
-        line[at + i] = chance[i] < (edge ? edge_drop : drop) ? 0.0F : measured;
+        const float measured = z + own.sigma * z * z * rough_normal(sum[i]);
+        line[at + i] = chance[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
       }
     }
   }
