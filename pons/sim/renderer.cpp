@@ -1,5 +1,7 @@
 #include "pons/sim/renderer.hpp"
 
+#include <GL/gl.h>
+#include <GL/glext.h>
 #include <fmt/format.h>
 
 #include <Eigen/Core>
@@ -35,6 +37,26 @@ void make_context(const mjModel& view, Look look, mjrContext& context) {
     drawn.geom_size = sizes.data();
   }
   mjr_makeContext(&drawn, &context, mjFONTSCALE_50);
+}
+
+// MuJoCo's buffer keeps eight bytes of depth and stencil a pixel, of which the driver clears and reads four with a
+// mask. Without the stencil, which only reflections need, the same depths cost half. A driver that does not like it
+// keeps what it had.
+void drop_stencil(const GlContext& gl, const mjrContext& context, int width, int height) {
+  const auto bind_frame = gl.function<PFNGLBINDFRAMEBUFFERPROC>("glBindFramebuffer");
+  const auto bind = gl.function<PFNGLBINDRENDERBUFFERPROC>("glBindRenderbuffer");
+  const auto allocate = gl.function<PFNGLRENDERBUFFERSTORAGEPROC>("glRenderbufferStorage");
+  const auto attach = gl.function<PFNGLFRAMEBUFFERRENDERBUFFERPROC>("glFramebufferRenderbuffer");
+  const auto check = gl.function<PFNGLCHECKFRAMEBUFFERSTATUSPROC>("glCheckFramebufferStatus");
+  if (!bind_frame || !bind || !allocate || !attach || !check || context.offSamples > 0) return;
+  bind_frame(GL_FRAMEBUFFER, context.offFBO);
+  bind(GL_RENDERBUFFER, context.offDepthStencil);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, 0);
+  allocate(GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F, width, height);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, context.offDepthStencil);
+  if (check(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
+  allocate(GL_RENDERBUFFER, GL_DEPTH32F_STENCIL8, width, height);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, context.offDepthStencil);
 }
 
 Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
@@ -98,6 +120,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
     mjv_makeScene(model, &renderer->scene_, kMostGeoms);
     make_context(view, look, renderer->context_);
     mjr_setBuffer(mjFB_OFFSCREEN, &renderer->context_);
+    if (look == Look::kSensor) drop_stencil(*renderer->gl_, renderer->context_, width, height);
   } catch (const std::runtime_error& error) {
     renderer->gl_->release();
     return fail(fmt::format("OpenGL cannot draw {} x {} pixels: {}", width, height, error.what()), "camera",
