@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kNearestSurface_m = 0.05;  // capsules closer to the lens are cut here: no division by zero
 constexpr double kNearRing_m = 0.015;
+constexpr int kHole = 5;  // samples
 
 struct Segment {
   Eigen::Vector3f from, along;
@@ -56,13 +57,17 @@ const cv::Mat1b& SelfFilter::mask(const RgbdFrame& frame, const Sampling& sampli
   mask_.setTo(0);
   if (seen.empty()) return mask_;
 
-  // Readings that dropped out inside the silhouette belong to the robot, too.
-  cv::morphologyEx(robot_, robot_, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   const double distance_m = std::max(0.3, frame.world_from_optical.translation().z());
   const int ring = std::clamp(static_cast<int>(std::ceil(kNearRing_m * sampling.fx / distance_m)), 2, 25);
-  cv::dilate(robot_, mask_, cv::getStructuringElement(cv::MORPH_RECT, {2 * ring + 1, 2 * ring + 1}));
-  mask_.setTo(kNear, mask_);
-  mask_.setTo(kRobot, robot_);
+  const int reach = ring + kHole;
+  const cv::Rect around = cv::Rect(seen.tl() - cv::Point(reach, reach), seen.br() + cv::Point(reach, reach)) &
+                          cv::Rect(cv::Point(0, 0), robot_.size());
+  cv::Mat1b robot = robot_(around), mask = mask_(around);
+  // Readings that dropped out inside the silhouette belong to the robot, too.
+  cv::morphologyEx(robot, robot, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {kHole, kHole}));
+  cv::dilate(robot, mask, cv::getStructuringElement(cv::MORPH_RECT, {2 * ring + 1, 2 * ring + 1}));
+  mask.setTo(kNear, mask);
+  mask.setTo(kRobot, robot);
   return mask_;
 }
 
