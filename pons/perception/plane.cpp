@@ -16,29 +16,37 @@ Plane fit_plane(const TopView& view, const std::vector<cv::Point>& cells) {
   const std::size_t stride = std::max<std::size_t>(1, cells.size() / kCells);
   for (std::size_t i = 0; i < cells.size(); i += stride) plane.middle += Eigen::Vector2d(cells[i].x, cells[i].y);
   plane.middle /= static_cast<double>((cells.size() + stride - 1) / stride);
-  std::vector<double> residuals;
+  struct Sample {
+    double x = 0, y = 0, z = 0, residual = 0;
+  };
+  std::vector<Sample> samples;
+  for (std::size_t i = 0; i < cells.size(); i += stride) {
+    samples.push_back(
+        {cells[i].x - plane.middle.x(), cells[i].y - plane.middle.y(), TopView::metres(view.height(cells[i]))});
+  }
+  std::vector<double> residuals(samples.size());
   double limit = 1e9;
   for (int round = 0; round < 4; ++round) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < cells.size(); i += stride) {
-      const double z = TopView::metres(view.height(cells[i]));
-      if (std::abs(z - plane.at(cells[i].x, cells[i].y)) > limit) continue;
-      const Eigen::Vector3d row(1, cells[i].x - plane.middle.x(), cells[i].y - plane.middle.y());
+    for (const Sample& sample : samples) {
+      if (sample.residual > limit) continue;
+      const Eigen::Vector3d row(1, sample.x, sample.y);
       normal.noalias() += row * row.transpose();
-      right += row * z;
+      right += row * sample.z;
     }
     plane.abc = normal.ldlt().solve(right);
-    residuals.clear();
-    for (std::size_t i = 0; i < cells.size(); i += stride) {
-      residuals.push_back(std::abs(TopView::metres(view.height(cells[i])) - plane.at(cells[i].x, cells[i].y)));
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      Sample& sample = samples[i];
+      sample.residual = std::abs(sample.z - (plane.abc[0] + plane.abc[1] * sample.x + plane.abc[2] * sample.y));
+      residuals[i] = sample.residual;
     }
     const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
     std::ranges::nth_element(residuals, middle);
     limit = std::max(0.004, 2.5 * *middle);
   }
-  std::ranges::sort(residuals);
   const std::size_t kept = residuals.size() - residuals.size() / 33;
+  std::ranges::nth_element(residuals, residuals.begin() + static_cast<std::ptrdiff_t>(kept - 1));
   double squares = 0;
   for (std::size_t i = 0; i < kept; ++i) squares += residuals[i] * residuals[i];
   plane.rms_m = std::sqrt(squares / static_cast<double>(kept));

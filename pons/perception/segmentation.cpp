@@ -58,18 +58,18 @@ void Segmenter::find_cores(const TopView& view) {
   // Along a low step noise leaves bridges; what is cut off with them, grow() gives back.
   cv::erode(flat_, flat_, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   cv::Mat1i components;
-  cv::Mat1i stats;
-  cv::Mat1d centres;
-  const int count = cv::connectedComponentsWithStats(flat_, components, stats, centres, 4, CV_32S);
+  const int count = cv::connectedComponents(flat_, components, 4, CV_32S);
+  std::vector<int> area(static_cast<std::size_t>(count), 0);
+  const auto* const component = components.ptr<int>();
+  for (int i = 0; i < total; ++i) ++area[static_cast<std::size_t>(component[i])];
   const double smallest = 0.25 * kSmallest_m2 / (view.cell_m * view.cell_m);
   std::vector<int> renamed(static_cast<std::size_t>(count), 0);
   int next = 0;
   for (int i = 1; i < count; ++i) {
-    if (stats(i, cv::CC_STAT_AREA) >= smallest) renamed[static_cast<std::size_t>(i)] = ++next;
+    if (area[static_cast<std::size_t>(i)] >= smallest) renamed[static_cast<std::size_t>(i)] = ++next;
   }
   segments_.labels.create(view.height.size());
   auto* const labels = segments_.labels.ptr<int>();
-  const auto* const component = components.ptr<int>();
   for (int i = 0; i < total; ++i) labels[i] = renamed[static_cast<std::size_t>(component[i])];
   segments_.regions.assign(static_cast<std::size_t>(next), Region{});
 }

@@ -10,12 +10,26 @@ namespace {
 
 constexpr double kNearestSurface_m = 0.05;  // capsules closer to the lens are cut here: no division by zero
 constexpr double kNearRing_m = 0.015;
+constexpr int kHole = 5;  // samples
 
-double squared_distance_to_segment(const Eigen::Vector3f& point, const Eigen::Vector3f& from,
-                                   const Eigen::Vector3f& along, float inverse_squared_length) {
-  const Eigen::Vector3f offset = point - from;
-  const float share = std::clamp(offset.dot(along) * inverse_squared_length, 0.0F, 1.0F);
-  return (offset - share * along).squaredNorm();
+struct Segment {
+  Eigen::Vector3f from, along;
+  float inverse_squared_length = 0, squared_radius = 0;
+};
+
+// Marks the samples of a row that see the capsule round the segment. Without branches and in plain floats: the compiler
+// turns it into vector code.
+void paint_row(const Segment& s, const float* depth, int count, float first_x, float step_x, float y,
+               std::uint8_t* robot) {
+  for (int i = 0; i < count; ++i) {
+    const float x = first_x + static_cast<float>(i) * step_x;
+    const float dx = x * depth[i] - s.from.x(), dy = y * depth[i] - s.from.y(), dz = depth[i] - s.from.z();
+    const float share = (dx * s.along.x() + dy * s.along.y() + dz * s.along.z()) * s.inverse_squared_length;
+    const float at = std::min(std::max(share, 0.0F), 1.0F);
+    const float ox = dx - at * s.along.x(), oy = dy - at * s.along.y(), oz = dz - at * s.along.z();
+    const bool inside = (ox * ox + oy * oy + oz * oz <= s.squared_radius) & (depth[i] > 0);
+    robot[i] = static_cast<std::uint8_t>(robot[i] | (inside ? SelfFilter::kRobot : 0));
+  }
 }
 
 }  // namespace
@@ -43,13 +57,17 @@ const cv::Mat1b& SelfFilter::mask(const RgbdFrame& frame, const Sampling& sampli
   mask_.setTo(0);
   if (seen.empty()) return mask_;
 
-  // Readings that dropped out inside the silhouette belong to the robot, too.
-  cv::morphologyEx(robot_, robot_, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
   const double distance_m = std::max(0.3, frame.world_from_optical.translation().z());
   const int ring = std::clamp(static_cast<int>(std::ceil(kNearRing_m * sampling.fx / distance_m)), 2, 25);
-  cv::dilate(robot_, mask_, cv::getStructuringElement(cv::MORPH_RECT, {2 * ring + 1, 2 * ring + 1}));
-  mask_.setTo(kNear, mask_);
-  mask_.setTo(kRobot, robot_);
+  const int reach = ring + kHole;
+  const cv::Rect around = cv::Rect(seen.tl() - cv::Point(reach, reach), seen.br() + cv::Point(reach, reach)) &
+                          cv::Rect(cv::Point(0, 0), robot_.size());
+  cv::Mat1b robot = robot_(around), mask = mask_(around);
+  // Readings that dropped out inside the silhouette belong to the robot, too.
+  cv::morphologyEx(robot, robot, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_RECT, {kHole, kHole}));
+  cv::dilate(robot, mask, cv::getStructuringElement(cv::MORPH_RECT, {2 * ring + 1, 2 * ring + 1}));
+  mask.setTo(kNear, mask);
+  mask.setTo(kRobot, robot);
   return mask_;
 }
 
@@ -78,19 +96,16 @@ void SelfFilter::paint(const RgbdFrame& frame, const Sampling& sampling, const m
   const int v0 = std::max(0, cvFloor(std::clamp(top, -1e6, 1e6)));
   const int v1 = std::min(sampling.height - 1, cvCeil(std::clamp(bottom, -1e6, 1e6)));
 
-  const Eigen::Vector3f from = ends[0].cast<float>();
-  const Eigen::Vector3f along = (ends[1] - ends[0]).cast<float>();
-  const float inverse = 1.0F / std::max(1e-9F, along.squaredNorm());
-  const auto inverse_fx = static_cast<float>(1 / sampling.fx), inverse_fy = static_cast<float>(1 / sampling.fy);
+  if (u1 < u0) return;
+  Segment segment{ends[0].cast<float>(), (ends[1] - ends[0]).cast<float>()};
+  segment.inverse_squared_length = 1.0F / std::max(1e-9F, segment.along.squaredNorm());
+  segment.squared_radius = static_cast<float>(radius_m * radius_m);
+  const auto step_x = static_cast<float>(1 / sampling.fx);
+  const auto first_x = static_cast<float>((u0 - sampling.cx) / sampling.fx);
   for (int v = v0; v <= v1; ++v) {
-    const float y = (static_cast<float>(v) - static_cast<float>(sampling.cy)) * inverse_fy;
-    for (int u = u0; u <= u1; ++u) {
-      const float depth = sampling.depth(frame, v, u);
-      if (depth <= 0) continue;
-      const float x = (static_cast<float>(u) - static_cast<float>(sampling.cx)) * inverse_fx;
-      const Eigen::Vector3f point(x * depth, y * depth, depth);
-      if (squared_distance_to_segment(point, from, along, inverse) <= radius_m * radius_m) robot_(v, u) = kRobot;
-    }
+    const float* const depth = sampling.row(frame, v, u0, u1 - u0 + 1, depth_row_);
+    const auto y = static_cast<float>((v - sampling.cy) / sampling.fy);
+    paint_row(segment, depth, u1 - u0 + 1, first_x, step_x, y, robot_.ptr<std::uint8_t>(v) + u0);
   }
 }
 

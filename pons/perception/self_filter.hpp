@@ -20,6 +20,16 @@ struct Sampling {
     return frame.depth_m[static_cast<std::size_t>(row * step) * static_cast<std::size_t>(frame.intrinsics.width) +
                          static_cast<std::size_t>(column * step)];
   }
+  // `count` samples of a row from `column` on: in place where every pixel is one, else copied into `copy`.
+  [[nodiscard]] const float* row(const RgbdFrame& frame, int row, int column, int count,
+                                 std::vector<float>& copy) const {
+    const float* const from = frame.depth_m.data() + static_cast<std::ptrdiff_t>(row) * step * frame.intrinsics.width +
+                              static_cast<std::ptrdiff_t>(column) * step;
+    if (step == 1) return from;
+    copy.resize(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) copy[static_cast<std::size_t>(i)] = from[i * step];
+    return copy.data();
+  }
 };
 
 class SelfFilter {
@@ -39,6 +49,7 @@ class SelfFilter {
   model::RobotModel model_;
   double margin_m_;
   std::vector<model::PlacedCapsule> capsules_;
+  std::vector<float> depth_row_;
   cv::Mat1b robot_, mask_;
 };
 

@@ -43,15 +43,11 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt)
   window_.height = within(bottom + 1, sampling_.height) - window_.y;
 
   const Eigen::Matrix3d rotation = pose.linear();
-  for (auto* part : {&ray_x_, &ray_y_, &ray_z_}) part->reserve(static_cast<std::size_t>(window_.area()));
   double x_min = 1e9, x_max = -1e9;
   for (int row = window_.y; row < window_.br().y; ++row) {
     for (int column = window_.x; column < window_.br().x; ++column) {
       const Vector3 ray =
           rotation * Vector3((column - sampling_.cx) / sampling_.fx, (row - sampling_.cy) / sampling_.fy, 1.0);
-      ray_x_.push_back(static_cast<float>(ray.x()));
-      ray_y_.push_back(static_cast<float>(ray.y()));
-      ray_z_.push_back(static_cast<float>(ray.z()));
       if (ray.z() > -0.05) continue;  // at or above the horizon
       const double x = pose.translation().x() + ray.x() * (belt.surface_z_m - pose.translation().z()) / ray.z();
       x_min = std::min(x_min, x), x_max = std::max(x_max, x);
@@ -68,7 +64,9 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt)
   highest_.create(rows, columns);
   sum_.create(rows, columns), count_.create(rows, columns);
   view_.colour.create(rows, columns), view_.flags.create(rows, columns);
-  cell_of_.resize(ray_x_.size()), height_of_.resize(ray_x_.size());
+  const auto width = static_cast<std::size_t>(window_.width);
+  cell_row_.resize(width), height_row_.resize(width);
+  raised_.resize(width * static_cast<std::size_t>(window_.height));
 }
 
 bool TopViewer::fits(const RgbdFrame& frame) const {
@@ -78,79 +76,96 @@ bool TopViewer::fits(const RgbdFrame& frame) const {
          other.step == sampling_.step && frame.world_from_optical.isApprox(world_from_optical_, 1e-9);
 }
 
-// Plain loops over rows of floats without branches: the compiler turns them into vector code.
-void TopViewer::project(const RgbdFrame& frame) {
+// Of each sample in a row: its cell, −1 for none, and its height. A plain loop without branches: the compiler turns it
+// into vector code.
+void TopViewer::project(const RgbdFrame& frame, int row) {
+  const Eigen::Matrix3f rotation = world_from_optical_.linear().cast<float>();
   const auto inverse_cell = static_cast<float>(1 / view_.cell_m);
   const auto from_x = static_cast<float>(view_.camera_m.x() - view_.x0_m) * inverse_cell;
   const auto from_y = static_cast<float>(view_.camera_m.y() - view_.y0_m) * inverse_cell;
   const auto from_z = static_cast<float>(view_.camera_m.z() - view_.surface_z_m);
+  const auto first = static_cast<float>((window_.x - sampling_.cx) / sampling_.fx);
+  const auto step = static_cast<float>(1 / sampling_.fx);
+  // A ray through a sample is what all of the row share and a multiple of the optical x axis.
+  const Eigen::Vector3f along = rotation.col(0);
+  const Eigen::Vector3f shared =
+      rotation.col(1) * static_cast<float>((row - sampling_.cy) / sampling_.fy) + rotation.col(2);
   const int columns = highest_.cols;
   const auto limit_x = static_cast<float>(columns), limit_y = static_cast<float>(highest_.rows);
-  depth_row_.resize(static_cast<std::size_t>(window_.width));
-  for (int row = 0; row < window_.height; ++row) {
-    const std::size_t first = static_cast<std::size_t>(row) * static_cast<std::size_t>(window_.width);
-    for (int i = 0; i < window_.width; ++i) {
-      depth_row_[static_cast<std::size_t>(i)] = sampling_.depth(frame, window_.y + row, window_.x + i);
-    }
-    const float* const depth = depth_row_.data();
-    const float* const ray_x = ray_x_.data() + first;
-    const float* const ray_y = ray_y_.data() + first;
-    const float* const ray_z = ray_z_.data() + first;
-    int* const cell = cell_of_.data() + first;
-    std::uint16_t* const height = height_of_.data() + first;
-    for (int i = 0; i < window_.width; ++i) {
-      const float x = from_x + depth[i] * ray_x[i] * inverse_cell, y = from_y + depth[i] * ray_y[i] * inverse_cell;
-      const float z = from_z + depth[i] * ray_z[i];
-      const bool inside =
-          (depth[i] > 0) & (x >= 0) & (y >= 0) & (x < limit_x) & (y < limit_y) & (z > -0.4F) & (z < 3.0F);
-      const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
-      const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
-      const float steps = static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F;
-      cell[i] = inside ? row_of * columns + column_of : -1;
-      height[i] = static_cast<std::uint16_t>(static_cast<int>(steps));
+  const float* const depth = sampling_.row(frame, row, window_.x, window_.width, depth_row_);
+  int* const cell = cell_row_.data();
+  int* const height = height_row_.data();
+  const int count = window_.width;
+  for (int i = 0; i < count; ++i) {
+    const float u = first + static_cast<float>(i) * step;
+    const float x = from_x + depth[i] * (shared.x() + u * along.x()) * inverse_cell;
+    const float y = from_y + depth[i] * (shared.y() + u * along.y()) * inverse_cell;
+    const float z = from_z + depth[i] * (shared.z() + u * along.z());
+    const bool outside =
+        (depth[i] <= 0) | (x < 0) | (y < 0) | (x >= limit_x) | (y >= limit_y) | (z <= -0.4F) | (z >= 3.0F);
+    const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
+    const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
+    cell[i] = outside ? -1 : row_of * columns + column_of;
+    height[i] =
+        static_cast<int>(static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F);
+  }
+}
+
+// `seen` is the row of the robot's mask, `from` and `to` the columns that hold any of it.
+void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to) {
+  auto* const flags = view_.flags.ptr<std::uint8_t>();
+  for (int column = from; column < to; ++column) {
+    int& cell = cell_row_[static_cast<std::size_t>(column - window_.x)];
+    if (seen[column] == 0 || cell < 0) continue;
+    if (seen[column] == SelfFilter::kRobot) {
+      cell = -1;
+    } else {
+      flags[cell] |= TopView::kNearRobot;
     }
   }
 }
 
-void TopViewer::drop_robot(const cv::Mat1b& robot) {
-  for (int row = 0; row < window_.height; ++row) {
-    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(window_.y + row) + window_.x;
-    int* const cell = cell_of_.data() + static_cast<std::ptrdiff_t>(row) * window_.width;
-    for (int i = 0; i < window_.width; ++i) cell[i] = seen[i] == SelfFilter::kRobot ? -1 : cell[i];
+// The highest reading of each cell. Those above bare belt are kept: they are few, and of the others only the height
+// matters.
+void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot) {
+  highest_.setTo(0), view_.flags.setTo(0);
+  auto* const highest = highest_.ptr<std::uint16_t>();
+  const std::uint16_t bare = TopView::steps(kBare_m);
+  const cv::Rect near = cv::boundingRect(robot) & window_;
+  raised_count_ = 0;
+  for (int row = window_.y; row < window_.br().y; ++row) {
+    project(frame, row);
+    if (row >= near.y && row < near.br().y) drop_robot(robot.ptr<std::uint8_t>(row), near.x, near.br().x);
+    for (int i = 0; i < window_.width; ++i) {
+      const int cell = cell_row_[static_cast<std::size_t>(i)];
+      if (cell < 0) continue;
+      const auto height = static_cast<std::uint16_t>(height_row_[static_cast<std::size_t>(i)]);
+      highest[cell] = std::max(highest[cell], height);
+      raised_[raised_count_] = {cell, static_cast<std::int16_t>(window_.x + i), static_cast<std::int16_t>(row), height};
+      raised_count_ += height >= bare ? 1U : 0U;
+    }
   }
 }
 
-// The highest surface of each cell, averaged over its readings; and what was seen of it. Of bare belt only the height
-// matters, and most of the picture is bare belt.
-void TopViewer::accumulate(const RgbdFrame& frame, const cv::Mat1b& robot) {
-  highest_.setTo(0), sum_.setTo(0), count_.setTo(0);
-  view_.flags.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
+// The highest surface of each cell, averaged over its readings; and what was seen of it.
+void TopViewer::accumulate(const RgbdFrame& frame) {
+  sum_.setTo(0), count_.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
   auto* const highest = highest_.ptr<std::uint16_t>();
   auto* const sum = sum_.ptr<int>();
   auto* const count = count_.ptr<int>();
   auto* const colour = view_.colour.ptr<cv::Vec3b>();
   auto* const flags = view_.flags.ptr<std::uint8_t>();
-  for (std::size_t i = 0; i < cell_of_.size(); ++i) {
-    if (cell_of_[i] >= 0) highest[cell_of_[i]] = std::max(highest[cell_of_[i]], height_of_[i]);
-  }
-  const std::uint16_t bare = TopView::steps(kBare_m);
-  std::size_t i = 0;
   const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
-  for (int row = window_.y; row < window_.br().y; ++row) {
-    const std::uint8_t* const seen = robot.ptr<std::uint8_t>(row);
-    const bool border_row = row < kBorder || row >= sampling_.height - kBorder;
-    for (int column = window_.x; column < window_.br().x; ++column, ++i) {
-      const int cell = cell_of_[i];
-      if (cell < 0) continue;
-      if (seen[column] != 0) flags[cell] |= TopView::kNearRobot;
-      if (height_of_[i] < bare || height_of_[i] + kSameSurface < highest[cell]) continue;
-      sum[cell] += height_of_[i];
-      ++count[cell];
-      const std::size_t pixel = 3 * (static_cast<std::size_t>(row * sampling_.step) * stride +
-                                     static_cast<std::size_t>(column * sampling_.step));
-      colour[cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
-      if (border_row || column < kBorder || column >= sampling_.width - kBorder) flags[cell] |= TopView::kAtBorder;
-    }
+  const cv::Rect inner(kBorder, kBorder, sampling_.width - 2 * kBorder, sampling_.height - 2 * kBorder);
+  for (std::size_t i = 0; i < raised_count_; ++i) {
+    const Reading& reading = raised_[i];
+    if (reading.height + kSameSurface < highest[reading.cell]) continue;
+    sum[reading.cell] += reading.height;
+    ++count[reading.cell];
+    const std::size_t pixel = 3 * (static_cast<std::size_t>(reading.row * sampling_.step) * stride +
+                                   static_cast<std::size_t>(reading.column * sampling_.step));
+    colour[reading.cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
+    if (!inner.contains({reading.column, reading.row})) flags[reading.cell] |= TopView::kAtBorder;
   }
   const int total = highest_.rows * highest_.cols;
   for (int cell = 0; cell < total; ++cell) {
@@ -186,9 +201,8 @@ void TopViewer::fill_pinholes() {
 }
 
 const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) {
-  project(frame);
-  drop_robot(robot);
-  accumulate(frame, robot);
+  find_highest(frame, robot);
+  accumulate(frame);
   fill_pinholes();
   cv::medianBlur(filled_, view_.height, 5);
   return view_;

@@ -56,18 +56,26 @@ class TopViewer {
   const TopView& build(const RgbdFrame& frame, const cv::Mat1b& robot);
 
  private:
-  void project(const RgbdFrame& frame);
-  void drop_robot(const cv::Mat1b& robot);
-  void accumulate(const RgbdFrame& frame, const cv::Mat1b& robot);
+  struct Reading {
+    int cell = 0;
+    std::int16_t column = 0, row = 0;  // sample
+    std::uint16_t height = 0;
+  };
+
+  void project(const RgbdFrame& frame, int row);
+  void drop_robot(const std::uint8_t* seen, int from, int to);
+  void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot);
+  void accumulate(const RgbdFrame& frame);
   void fill_pinholes();
 
   Sampling sampling_;
   Pose world_from_optical_;
-  cv::Rect window_;                           // of the sampled picture: what can see the belt
-  std::vector<float> ray_x_, ray_y_, ray_z_;  // world direction of each sample in the window, optical z = 1
-  std::vector<float> depth_row_;
-  std::vector<int> cell_of_;  // −1: nothing there
-  std::vector<std::uint16_t> height_of_;
+  cv::Rect window_;               // of the sampled picture: what can see the belt
+  std::vector<float> depth_row_;  // of one row of samples in the window:
+  std::vector<int> cell_row_;     // −1: nothing there
+  std::vector<int> height_row_;
+  std::vector<Reading> raised_;  // above bare belt; the first raised_count_
+  std::size_t raised_count_ = 0;
   cv::Mat1w highest_, filled_;
   cv::Mat1i sum_, count_;
   TopView view_;

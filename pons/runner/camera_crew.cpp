@@ -7,13 +7,20 @@ namespace pons::runner {
 
 CameraCrew::CameraCrew(const world::World& world, std::vector<body::Camera*> cameras,
                        perception::Perception& perception, Pace pace)
-    : world_(world), cameras_(std::move(cameras)), perception_(perception), pace_(pace), busy_(cameras_.size(), false) {
+    : world_(world),
+      cameras_(std::move(cameras)),
+      perception_(perception),
+      pace_(pace),
+      frames_(cameras_.size()),
+      busy_(cameras_.size(), false) {
   for (const world::CameraSpec& spec : world_.cameras) next_shutter_.push_back(Time(from_s(spec.phase_s)));
-  worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  developer_ = std::jthread([this](const std::stop_token& stop) { develop(stop); });
+  perceiver_ = std::jthread([this](const std::stop_token& stop) { perceive(stop); });
 }
 
 CameraCrew::~CameraCrew() {
-  worker_.request_stop();
+  developer_.request_stop();
+  perceiver_.request_stop();
   changed_.notify_all();
 }
 
@@ -38,34 +45,52 @@ void CameraCrew::open_shutters(Time now, const body::Sensors& sensors) {
   }
 }
 
-void CameraCrew::work(const std::stop_token& stop) {
-  RgbdFrame frame;
+void CameraCrew::develop(const std::stop_token& stop) {
+  for (;;) {
+    std::size_t camera = 0;
+    Time stamp;
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [&] { return shots_.size() > developed_; })) return;
+      camera = shots_[developed_].camera;
+      stamp = shots_[developed_].stamp;
+    }
+    RgbdFrame& frame = frames_[camera];
+    auto finished = cameras_[camera]->finish(frame);
+    frame.camera = world_.cameras[camera].name;
+    frame.stamp = stamp;
+    const std::lock_guard lock(mutex_);
+    if (finished) {
+      ++developed_;  // it may have shrunk in the meantime, by as much as shots_
+    } else {
+      error_ = finished.error();
+    }
+    changed_.notify_all();
+    if (!finished) return;
+  }
+}
+
+void CameraCrew::perceive(const std::stop_token& stop) {
   for (;;) {
     Shot shot;
     {
       std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [&] { return !shots_.empty(); })) return;
+      if (!changed_.wait(lock, stop, [&] { return developed_ > 0; })) return;
       shot = shots_.front();
     }
-    auto snapshot = develop(shot, frame);
+    Snapshot snapshot = take_in(shot);
     const std::lock_guard lock(mutex_);
     shots_.pop_front();
+    --developed_;
     busy_[shot.camera] = false;
-    if (snapshot) {
-      snapshots_.push_back(std::move(*snapshot));
-    } else {
-      error_ = snapshot.error();
-    }
+    snapshots_.push_back(std::move(snapshot));
     changed_.notify_all();
   }
 }
 
-Expected<Snapshot> CameraCrew::develop(const Shot& shot, RgbdFrame& frame) {
+Snapshot CameraCrew::take_in(const Shot& shot) {
   for (const std::uint32_t track : shot.forgotten) perception_.forget(track);
-  if (auto finished = cameras_[shot.camera]->finish(frame); !finished) return std::unexpected(finished.error());
-  frame.camera = world_.cameras[shot.camera].name;
-  frame.stamp = shot.stamp;
-  perception_.process(frame, shot.moment);
+  perception_.process(frames_[shot.camera], shot.moment);
   Snapshot snapshot{
       shot.stamp, shot.due, shot.moment.belt_travel_m, perception_.beliefs(shot.stamp, shot.moment.belt_travel_m), {}};
   for (const world::CameraSpec& camera : world_.cameras) {
@@ -78,7 +103,7 @@ Expected<std::optional<Snapshot>> CameraCrew::collect(Time now, const std::vecto
   std::unique_lock lock(mutex_);
   to_forget_.insert(to_forget_.end(), forgotten.begin(), forgotten.end());
   if (pace_ == Pace::kLockstep) {
-    // Whatever is due must be developed first, however long the thread takes.
+    // Whatever is due must be taken in first, however long the threads take.
     changed_.wait(lock, [&] {
       return error_ || std::none_of(shots_.begin(), shots_.end(), [&](const Shot& shot) { return shot.due <= now; });
     });

@@ -1,6 +1,6 @@
-// Opens the shutters on time and turns frames into beliefs on a thread of its own, so that rendering and vision overlap
-// with physics. Frames are taken in strictly by shutter time and beliefs come out with the camera's modelled latency,
-// so the result does not depend on how fast the thread is.
+// Opens the shutters on time and turns frames into beliefs on threads of its own, so that rendering, vision and physics
+// overlap: one develops frames, the other takes in what is developed. Frames are taken in strictly by shutter time and
+// beliefs come out with the camera's modelled latency, so the result does not depend on how fast the threads are.
 #pragma once
 
 #include <condition_variable>
@@ -56,8 +56,9 @@ class CameraCrew {
     std::vector<std::uint32_t> forgotten;
   };
 
-  void work(const std::stop_token& stop);
-  [[nodiscard]] Expected<Snapshot> develop(const Shot& shot, RgbdFrame& frame);
+  void develop(const std::stop_token& stop);
+  void perceive(const std::stop_token& stop);
+  [[nodiscard]] Snapshot take_in(const Shot& shot);
   [[nodiscard]] Duration latency(std::size_t camera) const;
 
   const world::World& world_;
@@ -65,15 +66,17 @@ class CameraCrew {
   perception::Perception& perception_;
   Pace pace_;
   std::vector<Time> next_shutter_;  // a camera; the body's thread only
+  std::vector<RgbdFrame> frames_;   // a camera; whose shot is developed or taken in
 
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::vector<bool> busy_;                // a camera; from shutter to development
-  std::deque<Shot> shots_;                // waiting for the worker; the front one is in work
-  std::deque<Snapshot> snapshots_;        // developed, by stamp
+  std::vector<bool> busy_;                // a camera; from shutter until its frame is taken in
+  std::deque<Shot> shots_;                // not yet taken in, by stamp
+  std::size_t developed_ = 0;             // so many at the front of shots_
+  std::deque<Snapshot> snapshots_;        // taken in, by stamp
   std::vector<std::uint32_t> to_forget_;  // not yet with a shot
   std::optional<Error> error_;
-  std::jthread worker_;
+  std::jthread developer_, perceiver_;
 };
 
 }  // namespace pons::runner

@@ -1,5 +1,7 @@
 #include "pons/sim/camera.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -19,12 +21,44 @@ inline std::uint64_t mix(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-// Near enough to a normal number (the sum of four uniform ones, scaled to unit variance), and cheap enough for a
-// million pixels.
-inline float rough_normal(std::uint64_t bits) {
-  const auto sum = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
-  return static_cast<float>(sum - 131070) * (1.7320508f / 65536.0f);
-}
+// What chance does to one row: in pieces that stay in the cache, numbers first, then a loop without branches that the
+// compiler turns into vector code.
+struct Chance {
+  std::uint64_t seed = 0;                 // of the frame
+  float sigma = 0;                        // at 1 m
+  std::uint32_t drop = 0, edge_drop = 0;  // of 2^32
+
+  // `line` holds true depths and gets measured ones; `below` is the next row; `first` is the index of line[0].
+  void disturb(float* line, const float* below, std::size_t columns, std::uint64_t first) const {
+    constexpr std::size_t kPiece = 256;
+    std::array<std::uint32_t, kPiece> chance;
+    std::array<int, kPiece> sum;
+    std::array<float, kPiece + 1> right;
+    const Chance own = *this;  // as a copy it cannot change with `line`
+    for (std::size_t at = 0; at < columns; at += kPiece) {
+      const std::size_t count = std::min(kPiece, columns - at);
+      for (std::size_t i = 0; i < count; ++i) {
+        asm volatile("");  // keeps this loop scalar: emulated vector products of 64 bits are slower
+        const std::uint64_t bits = mix(own.seed + (first + at + i) * 0x9e3779b97f4a7c15ULL);
+        chance[i] = static_cast<std::uint32_t>((bits * 0xd1342543de82ef95ULL) >> 32);
+        sum[i] = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
+      }
+      std::copy_n(line + at, count, right.begin());
+      right[count] = line[std::min(at + count, columns - 1)];
+      for (std::size_t i = 0; i < count; ++i) {
+        const float z = right[i];
+        const bool edge = (std::abs(right[i + 1] - z) > kEdge_m) | (std::abs(below[at + i] - z) > kEdge_m);
+        const float measured = z + own.sigma * z * z * rough_normal(sum[i]);
+        line[at + i] = chance[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
+      }
+    }
+  }
+
+ private:
+  // The sum of four uniform numbers, scaled to unit variance: near enough to a normal one, and cheap enough for a
+  // million pixels.
+  static float rough_normal(int sum) { return static_cast<float>(sum - 131070) * (1.7320508f / 65536.0f); }
+};
 
 }  // namespace
 
@@ -79,23 +113,14 @@ void SimCamera::measure_depth(std::vector<float>& depth_m) const {
     float* to = depth_m.data() + row * columns;
     for (std::size_t column = 0; column < columns; ++column) to[column] = near / (1 - from[column] * slope);
   }
-  const std::uint64_t frame_seed = mix(seed_ ^ (static_cast<std::uint64_t>(stamp_.ns()) * 0x9e3779b97f4a7c15ULL));
-  const auto sigma = static_cast<float>(spec_.depth_noise_m);
-  const auto limit = [](double share) { return static_cast<std::uint32_t>(share * 4294967295.0); };
-  const std::uint32_t drop = limit(spec_.depth_dropout);
-  const std::uint32_t edge_drop = limit(std::min(kMostEdgeDropout, kEdgeDropout * spec_.depth_dropout));
+  const auto of_all = [](double share) { return static_cast<std::uint32_t>(share * 4294967295.0); };
+  const Chance chance{.seed = mix(seed_ ^ (static_cast<std::uint64_t>(stamp_.ns()) * 0x9e3779b97f4a7c15ULL)),
+                      .sigma = static_cast<float>(spec_.depth_noise_m),
+                      .drop = of_all(spec_.depth_dropout),
+                      .edge_drop = of_all(std::min(kMostEdgeDropout, kEdgeDropout * spec_.depth_dropout))};
   for (std::size_t row = 0; row < rows; ++row) {
     float* line = depth_m.data() + row * columns;
-    const float* below = row + 1 < rows ? line + columns : line;
-    for (std::size_t column = 0; column < columns; ++column) {
-      const float z = line[column];
-      const float right = line[column + 1 < columns ? column + 1 : column];
-      const bool edge = std::abs(right - z) > kEdge_m || std::abs(below[column] - z) > kEdge_m;
-      const std::uint64_t bits = mix(frame_seed + (row * columns + column) * 0x9e3779b97f4a7c15ULL);
-      const auto chance = static_cast<std::uint32_t>((bits * 0xd1342543de82ef95ULL) >> 32);
-      const float measured = z + sigma * z * z * rough_normal(bits);
-      line[column] = chance < (edge ? edge_drop : drop) ? 0.0f : measured;
-    }
+    chance.disturb(line, row + 1 < rows ? line + columns : line, columns, row * columns);
   }
 }
 

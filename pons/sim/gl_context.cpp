@@ -25,6 +25,7 @@ struct GlContext::Egl {
   decltype(&eglMakeCurrent) make_current = nullptr;
   decltype(&eglGetError) get_error = nullptr;
   decltype(&eglBindAPI) bind = nullptr;
+  decltype(&eglGetProcAddress) get_proc = nullptr;
 
   template <typename Function>
   Function find(const char* symbol) const {
@@ -39,7 +40,7 @@ Expected<void> GlContext::Egl::open() {
   // Never unloaded: drivers do not survive that. RTLD_GLOBAL, so that MuJoCo finds eglGetProcAddress.
   library = dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL);
   if (library == nullptr) return fail(fmt::format("no OpenGL for the cameras: {}", dlerror()), file, kMend);
-  const auto get_proc = find<decltype(&eglGetProcAddress)>("eglGetProcAddress");
+  get_proc = find<decltype(get_proc)>("eglGetProcAddress");
   const auto initialize = find<decltype(&eglInitialize)>("eglInitialize");
   const auto choose = find<decltype(&eglChooseConfig)>("eglChooseConfig");
   bind = find<decltype(bind)>("eglBindAPI");
@@ -92,5 +93,7 @@ Expected<void> GlContext::make_current() {
 }
 
 void GlContext::release() { egl_->make_current(egl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
+
+GlContext::Address GlContext::address(const char* name) const { return egl_->get_proc(name); }
 
 }  // namespace pons::sim

@@ -19,8 +19,15 @@ class GlContext {
   // On the calling thread; a context is current on one thread at a time.
   [[nodiscard]] Expected<void> make_current();
   void release();
+  // An OpenGL function by its name; null where the driver has none. Call it while the context is current.
+  template <typename Function>
+  [[nodiscard]] Function function(const char* name) const {
+    return reinterpret_cast<Function>(address(name));
+  }
 
  private:
+  using Address = void (*)();
+  [[nodiscard]] Address address(const char* name) const;
   GlContext() = default;
   struct Egl;
   std::shared_ptr<Egl> egl_;

@@ -1,8 +1,13 @@
 #include "pons/sim/renderer.hpp"
 
+#include <GL/gl.h>
+#include <GL/glext.h>
 #include <fmt/format.h>
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <stdexcept>
 
@@ -10,10 +15,81 @@ namespace pons::sim {
 namespace {
 
 constexpr int kMostGeoms = 2000;
+constexpr int kStacks = 8;           // along the axis of what is round, caps included
+constexpr double kPlaneGrid_m = 20;  // spacing
 
 void set_look(mjvScene& scene, Look look) {
   const mjtByte on = look == Look::kPicture ? 1 : 0;
   for (const int flag : {mjRND_SHADOW, mjRND_SKYBOX, mjRND_HAZE, mjRND_REFLECTION}) scene.flags[flag] = on;
+}
+
+// Lights are directional: what is flat has one shade, and finer pieces of it only cost time. The slices around a tube
+// stay, because its shape is measured.
+void make_context(const mjModel& view, Look look, mjrContext& context) {
+  mjModel drawn = view;
+  std::vector<mjtNum> sizes(view.geom_size, view.geom_size + 3 * view.ngeom);
+  if (look == Look::kSensor) {
+    drawn.vis.quality.numquads = 1;
+    drawn.vis.quality.numstacks = kStacks;
+    for (std::size_t geom = 0; geom < sizes.size() / 3; ++geom) {
+      if (view.geom_type[geom] == mjGEOM_PLANE) sizes[3 * geom + 2] = kPlaneGrid_m;
+    }
+    drawn.geom_size = sizes.data();
+  }
+  mjr_makeContext(&drawn, &context, mjFONTSCALE_50);
+}
+
+// MuJoCo's buffer keeps eight bytes of depth and stencil a pixel, of which the driver clears and reads four with a
+// mask. Without the stencil, which only reflections need, the same depths cost half. A driver that does not like it
+// keeps what it had.
+void drop_stencil(const GlContext& gl, const mjrContext& context, int width, int height) {
+  const auto bind_frame = gl.function<PFNGLBINDFRAMEBUFFERPROC>("glBindFramebuffer");
+  const auto bind = gl.function<PFNGLBINDRENDERBUFFERPROC>("glBindRenderbuffer");
+  const auto allocate = gl.function<PFNGLRENDERBUFFERSTORAGEPROC>("glRenderbufferStorage");
+  const auto attach = gl.function<PFNGLFRAMEBUFFERRENDERBUFFERPROC>("glFramebufferRenderbuffer");
+  const auto check = gl.function<PFNGLCHECKFRAMEBUFFERSTATUSPROC>("glCheckFramebufferStatus");
+  if (!bind_frame || !bind || !allocate || !attach || !check || context.offSamples > 0) return;
+  bind_frame(GL_FRAMEBUFFER, context.offFBO);
+  bind(GL_RENDERBUFFER, context.offDepthStencil);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, 0);
+  allocate(GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F, width, height);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, context.offDepthStencil);
+  if (check(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
+  allocate(GL_RENDERBUFFER, GL_DEPTH32F_STENCIL8, width, height);
+  attach(GL_FRAMEBUFFER, GL_DEPTH_STENCIL_ATTACHMENT, GL_RENDERBUFFER, context.offDepthStencil);
+}
+
+Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
+
+// The driver finds out only triangle by triangle, after it has lit them, that a geom lies outside of the picture.
+void leave_out_unseen(const mjModel* model, const mjvGLCamera& camera, float aspect, mjvScene& scene) {
+  const Eigen::Vector3f forward = vector(camera.forward), up = vector(camera.up), right = forward.cross(up);
+  const float near = camera.frustum_near;
+  const float half_width = 0.5F * aspect * (camera.frustum_top - camera.frustum_bottom);
+  // Normals, inward, of the four sides, which meet in the camera.
+  const std::array<Eigen::Vector3f, 4> inward = {near * up - camera.frustum_bottom * forward,
+                                                 camera.frustum_top * forward - near * up,
+                                                 near * right + (half_width - camera.frustum_center) * forward,
+                                                 (half_width + camera.frustum_center) * forward - near * right};
+  const auto outside = [&](const mjvGeom& geom) {
+    if (geom.objtype != mjOBJ_GEOM) return false;
+    const auto radius = static_cast<float>(model->geom_rbound[geom.objid]);  // of an infinite one 0
+    const Eigen::Vector3f from_camera = vector(geom.pos) - vector(camera.pos);
+    return radius > 0 && std::ranges::any_of(inward, [&](const Eigen::Vector3f& normal) {
+             return normal.dot(from_camera) < -radius * normal.norm();
+           });
+  };
+  scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom, outside) - scene.geoms);
+}
+
+// What is hidden is then refused by its depth before it is shaded. The floor, which has a texture and is nearly always
+// hidden, would cost as much as everything else together.
+void front_to_back(const mjvGLCamera& camera, mjvScene& scene) {
+  const Eigen::Vector3f from = vector(camera.pos), forward = vector(camera.forward);
+  std::stable_sort(scene.geoms, scene.geoms + scene.ngeom, [&](const mjvGeom& a, const mjvGeom& b) {
+    if ((a.type == mjGEOM_PLANE) != (b.type == mjGEOM_PLANE)) return b.type == mjGEOM_PLANE;
+    return forward.dot(vector(a.pos) - from) < forward.dot(vector(b.pos) - from);
+  });
 }
 
 }  // namespace
@@ -24,6 +100,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
   if (auto current = (*gl)->make_current(); !current) return std::unexpected(current.error());
   std::unique_ptr<Renderer> renderer(new Renderer);
   renderer->gl_ = std::move(*gl);
+  renderer->look_ = look;
   renderer->width_ = width;
   renderer->height_ = height;
   renderer->near_m_ = static_cast<double>(model->vis.map.znear) * model->stat.extent;
@@ -41,8 +118,9 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
   mjr_defaultContext(&renderer->context_);
   try {
     mjv_makeScene(model, &renderer->scene_, kMostGeoms);
-    mjr_makeContext(&view, &renderer->context_, mjFONTSCALE_50);
+    make_context(view, look, renderer->context_);
     mjr_setBuffer(mjFB_OFFSCREEN, &renderer->context_);
+    if (look == Look::kSensor) drop_stencil(*renderer->gl_, renderer->context_, width, height);
   } catch (const std::runtime_error& error) {
     renderer->gl_->release();
     return fail(fmt::format("OpenGL cannot draw {} x {} pixels: {}", width, height, error.what()), "camera",
@@ -65,6 +143,11 @@ void Renderer::capture(const mjModel* model, mjData* data, int camera, const Lab
   view.type = mjCAMERA_FIXED;
   view.fixedcamid = camera;
   mjv_updateScene(model, data, &option_, nullptr, &view, mjCAT_ALL, &scene_);
+  if (look_ == Look::kSensor) {  // in a picture for people things cast shadows from outside
+    const mjvGLCamera eye = mjv_averageCamera(scene_.camera, scene_.camera + 1);
+    leave_out_unseen(model, eye, static_cast<float>(width_) / static_cast<float>(height_), scene_);
+    front_to_back(eye, scene_);
+  }
   versions_.resize(labels.entries.size(), 0);
   for (std::size_t i = 0; i < labels.entries.size(); ++i) {
     const LabelStore::Entry& entry = labels.entries[i];

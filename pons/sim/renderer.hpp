@@ -52,6 +52,7 @@ class Renderer {
   mjrContext context_{};
   mjvScene scene_{};
   mjvOption option_{};
+  Look look_ = Look::kSensor;
   int width_ = 0, height_ = 0;
   double near_m_ = 0, far_m_ = 0;
 };
