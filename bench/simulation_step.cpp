@@ -3,9 +3,9 @@
 // them, and in each stretch of it a bare copy takes the same steps from the same state with the same set-points.
 
 #include <fmt/format.h>
-#include <time.h>
 #include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <span>
 #include <vector>
 
