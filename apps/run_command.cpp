@@ -199,6 +199,8 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
 }
 
 int run(const RunOptions& options) {
+  // Before anything is opened: what is built is also taken down.
+  watch_interrupts();
   for (const auto& [file, name] : {std::pair{options.report, "--report"}, {options.picture, "--picture"}}) {
     if (auto possible = writable(file, name); !possible) return bad_input(possible.error());
   }
@@ -218,7 +220,6 @@ int run(const RunOptions& options) {
   }
   auto cell = Assembly::build(std::move(*world), *manifest, assembly);
   if (!cell) return bad_input(cell.error());
-  watch_interrupts();
   return run_cell(options, **cell, static_cast<std::int64_t>(manifest->size()));
 }
 

@@ -69,8 +69,6 @@ find_package(nlohmann_json REQUIRED)
 add_library(ext::json ALIAS nlohmann_json::nlohmann_json)
 find_package(fmt REQUIRED)
 add_library(ext::fmt ALIAS fmt::fmt)
-find_package(spdlog REQUIRED)
-add_library(ext::spdlog ALIAS spdlog::spdlog)
 find_package(CLI11 REQUIRED)
 add_library(ext::cli11 ALIAS CLI11::CLI11)
 

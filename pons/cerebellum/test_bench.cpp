@@ -28,6 +28,7 @@ world::Robot make_robot() {
   robot.limits.jerk_rad_s3 = AxisVector::Constant(6, 400);
   robot.limits.torque_nm = AxisVector(6);
   robot.limits.torque_nm << 150, 150, 150, 28, 28, 28;
+  robot.rotor_inertia_kg_m2 = AxisVector::Constant(6, 0.01);
   robot.tool.mass_kg = 0.9;
   robot.tool.com_m = Vector3(0, 0, 0.06);
   return robot;

@@ -166,6 +166,7 @@ world::Robot seven_axis_arm() {
                      &robot.limits.torque_nm}) {
     *list = AxisVector::Constant(7, 10);
   }
+  robot.rotor_inertia_kg_m2 = AxisVector::Constant(7, 0.01);
   return robot;
 }
 

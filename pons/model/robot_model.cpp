@@ -72,7 +72,7 @@ struct RobotModel::Impl final : Chain {
   Impl(world::Robot robot_in, pinocchio::Model model_in)
       : robot(std::move(robot_in)), model(std::move(model_in)), data(model) {
     model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravityMS2);
-    model.armature.setConstant(kRotorInertiaKgM2);
+    model.armature = robot.rotor_inertia_kg_m2;
     const auto flange = model.getFrameId(robot.flange_link);
     last_joint = model.frames[flange].parentJoint;
     last_joint_from_flange = model.frames[flange].placement;
@@ -171,7 +171,8 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
                                                              {"speed", &limits.speed_rad_s},
                                                              {"acceleration", &limits.acceleration_rad_s2},
                                                              {"jerk", &limits.jerk_rad_s3},
-                                                             {"torque", &limits.torque_nm}};
+                                                             {"torque", &limits.torque_nm},
+                                                             {"rotor_inertia_kg_m2", &robot.rotor_inertia_kg_m2}};
   for (const auto& [name, list] : lists) {
     if (list->size() == model.nv) continue;
     return fail(fmt::format("'{}' has {} values, the URDF {} moving joints", name, list->size(), model.nv), robot.name,

@@ -16,9 +16,6 @@ namespace pons::model {
 
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, static_cast<int>(kMaxAxes)>;
 
-// Of every joint's drive, about the joint: what its rotor adds behind the gears. A URDF has no place for it.
-inline constexpr double kRotorInertiaKgM2 = 0.01;
-
 // What the tool carries, rigid to the flange. Its own rotational inertia is taken for that of a cube of 600 kg/m³:
 // denser than parcels are, because too much inertia in the model makes the loop nervous, too little only softer.
 struct Payload {

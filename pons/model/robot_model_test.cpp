@@ -119,6 +119,22 @@ TEST(RobotModel, ForwardDynamicsInvertInverseDynamics) {
   }
 }
 
+TEST(RobotModel, ARotorAddsItsInertiaToItsOwnAxisOnly) {
+  auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  robot.rotor_inertia_kg_m2 = axis_vector({0.5, 0.4, 0.3, 0.2, 0.1, 0.05});
+  auto heavier = RobotModel::load(robot).value();
+  Random random(6);
+  for (int i = 0; i < 100; ++i) {
+    const AxisVector q = random_axes(random, 3), speed = random_axes(random, 3), wanted = random_axes(random, 20);
+    AxisVector torque, more;
+    model.inverse_dynamics(q, speed, wanted, {}, torque);
+    heavier.inverse_dynamics(q, speed, wanted, {}, more);
+    const AxisVector added = ((robot.rotor_inertia_kg_m2.array() - 0.01) * wanted.array()).matrix();
+    EXPECT_TRUE((more - torque).isApprox(added, 1e-9)) << (more - torque).transpose() << " | " << added.transpose();
+  }
+}
+
 TEST(RobotModel, CapsulesMoveWithTheirLinks) {
   auto model = RobotModel::load(hanging_arm()).value();
   std::vector<PlacedCapsule> capsules;
@@ -151,6 +167,10 @@ TEST(RobotModel, LoadingSaysWhatIsWrong) {
   robot = hanging_arm();
   robot.limits.jerk_rad_s3 = AxisVector::Constant(5, 400);
   EXPECT_NE(RobotModel::load(robot).error().line().find("'jerk' has 5 values, the URDF 6"), std::string::npos);
+  robot = hanging_arm();
+  robot.rotor_inertia_kg_m2 = AxisVector::Constant(7, 0.01);
+  EXPECT_NE(RobotModel::load(robot).error().line().find("'rotor_inertia_kg_m2' has 7 values, the URDF 6"),
+            std::string::npos);
   robot = hanging_arm();
   robot.flange_link = "forearm_link";
   EXPECT_NE(RobotModel::load(robot).error().line().find("does not hang on the last moving joint"), std::string::npos);

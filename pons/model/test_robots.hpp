@@ -28,6 +28,7 @@ inline world::Robot hanging_arm() {
   robot.limits.acceleration_rad_s2 = AxisVector::Constant(6, 20);
   robot.limits.jerk_rad_s3 = AxisVector::Constant(6, 400);
   robot.limits.torque_nm = axis_vector({150, 150, 150, 28, 28, 28});
+  robot.rotor_inertia_kg_m2 = AxisVector::Constant(6, 0.01);
   robot.payload_kg = 5;
   robot.tool.mass_kg = 0.9;
   robot.tool.com_m = Vector3(0, 0, 0.06);

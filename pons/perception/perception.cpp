@@ -31,7 +31,7 @@ struct Perception::Impl {
       : world(the_world), self_filter(std::move(model)), tracker(the_world.belt) {
     for (const auto& camera : world.cameras) {
       const world::Place* const place = world.place(camera.watches);
-      if (place != nullptr) watches.try_emplace(place->name, *place);
+      if (place != nullptr) watches.try_emplace(place->name, world, *place);
     }
   }
 

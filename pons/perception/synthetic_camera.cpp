@@ -117,7 +117,7 @@ RgbdFrame SyntheticBelt::render(const world::CameraSpec& camera) {
                           Vector3((column - frame.intrinsics.cx) / focal, (row - frame.intrinsics.cy) / focal, 1);
       double depth = (world.belt.surface_z_m - from.z()) / ray.z();
       std::array<std::uint8_t, 3> colour = {60, 62, 64};
-      if (std::abs(from.y() + depth * ray.y()) > 0.25) depth = -from.z() / ray.z(), colour = {90, 90, 90};
+      if (depth <= 0 || std::abs(from.y() + depth * ray.y()) > 0.25) depth = -from.z() / ray.z(), colour = {90, 90, 90};
       for (const Placed& candidate : placed) {
         const Vector3 local_from = candidate.thing_from_world * from;
         const Vector3 local_ray = candidate.thing_from_world.linear() * ray;

@@ -6,11 +6,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-#include <regex>
 #include <string>
-#include <vector>
+
+#include "pons/record/test_schema.hpp"
 
 namespace pons::record {
 namespace {
@@ -36,48 +35,6 @@ using Json = nlohmann::ordered_json;
           .sim_seconds = 600,
           .wall_seconds = 41.25,
           .state_hash = 0x00f0e0d0c0b0a090};
-}
-
-[[nodiscard]] Json read(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  return Json::parse(file);
-}
-
-[[nodiscard]] std::string type_of(const Json& value) {
-  if (value.is_number_integer()) return "integer";
-  return value.type_name();
-}
-
-[[nodiscard]] bool has_type(const Json& value, const Json& types) {
-  const auto fits = [&](const Json& type) { return type == type_of(value) || (type == "number" && value.is_number()); };
-  return types.is_array() ? std::any_of(types.begin(), types.end(), fits) : fits(types);
-}
-
-// Where `value` departs from `schema`, in the keywords that docs/schema/report.json uses.
-void departures(const Json& value, const Json& schema, const std::string& at, std::vector<std::string>& found) {
-  if (!has_type(value, schema.at("type"))) found.push_back(at + ": is " + type_of(value));
-  if (value.is_number() && schema.contains("minimum") && value < schema["minimum"]) found.push_back(at + ": too small");
-  if (value.is_string() && schema.contains("pattern") &&
-      !std::regex_match(value.get<std::string>(), std::regex(schema["pattern"].get<std::string>()))) {
-    found.push_back(at + ": does not match");
-  }
-  if (!value.is_object()) return;
-  for (const auto& key : schema.at("required")) {
-    if (!value.contains(key.get<std::string>())) found.push_back(at + "/" + key.get<std::string>() + ": missing");
-  }
-  for (const auto& [key, part] : value.items()) {
-    if (!schema.at("properties").contains(key)) {
-      found.push_back(at + "/" + key + ": unknown");
-    } else {
-      departures(part, schema["properties"][key], at + "/" + key, found);
-    }
-  }
-}
-
-[[nodiscard]] std::vector<std::string> departures(const Json& value) {
-  std::vector<std::string> found;
-  departures(value, read("docs/schema/report.json"), "", found);
-  return found;
 }
 
 TEST(Report, SatisfiesItsSchema) {
@@ -119,7 +76,7 @@ TEST(Report, WritesWhatItSays) {
   Report report = example();
   report.world = "not \xff UTF-8";
   ASSERT_TRUE(write(report, path));
-  const Json written = read(path);
+  const Json written = read_test_json(path);
   std::filesystem::remove(path);
   EXPECT_EQ(written["parcels"], to_json(report)["parcels"]);
   EXPECT_THAT(written["world"].get<std::string>(), HasSubstr("UTF-8"));

@@ -3,10 +3,9 @@
 namespace pons::runner {
 namespace {
 
-// After the last parcel, so that cameras and carry-off see the end of it.
+// After the last outcome, of a whole run or one that was broken off: what was let go falls and comes to rest, the arm
+// does, and cameras and carry-off see the end of it.
 constexpr Duration kAfterwards = std::chrono::seconds(2);
-// After a break, so that the arm comes to rest.
-constexpr Duration kAfterBreak = std::chrono::milliseconds(500);
 
 }  // namespace
 
@@ -19,7 +18,7 @@ bool Ending::check(Time now, bool finished) {
     return false;
   }
   if (!quiet_since_) quiet_since_ = now;
-  return now - *quiet_since_ >= (broken_off_ ? kAfterBreak : kAfterwards);
+  return now - *quiet_since_ >= kAfterwards;
 }
 
 void Ending::break_off(Time now, const char* why) {

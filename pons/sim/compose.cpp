@@ -12,7 +12,6 @@
 namespace pons::sim {
 namespace {
 
-constexpr double kRotorInertia = 0.01;  // kg·m² at the joint; keeps light wrist links stable at 2 ms
 constexpr mjtSize kArenaBytes = 48 << 20;
 constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; far from anything a camera sees
 
@@ -115,7 +114,7 @@ Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::
     if (!joint_name.starts_with("arm/")) continue;
     mjsJoint* joint = mjs_asJoint(e);
     if (axis >= robot.limits.torque_nm.size()) break;
-    joint->armature = kRotorInertia;
+    joint->armature = robot.rotor_inertia_kg_m2[axis];
     joint->range[0] = robot.limits.position_min[axis];
     joint->range[1] = robot.limits.position_max[axis];
     joint->limited = mjLIMITED_TRUE;

@@ -1,7 +1,10 @@
 #include "pons/sim/mujoco_kit.hpp"
 
+#include <span>
 #include <stdexcept>
 #include <utility>
+
+#include "pons/core/digest.hpp"
 
 namespace pons::sim {
 namespace {
@@ -35,6 +38,13 @@ Pose from_mujoco(const double position[3], const double quaternion[4]) {
   pose.linear() = Eigen::Quaterniond(quaternion[0], quaternion[1], quaternion[2], quaternion[3]).toRotationMatrix();
   pose.translation() = Vector3(position[0], position[1], position[2]);
   return pose;
+}
+
+std::uint64_t digest_of(const mjModel* model, const mjData* data) {
+  Digest digest;
+  digest.add(std::span<const double>(data->qpos, static_cast<std::size_t>(model->nq)));
+  digest.add(std::span<const double>(data->qvel, static_cast<std::size_t>(model->nv)));
+  return digest.value();
 }
 
 }  // namespace pons::sim

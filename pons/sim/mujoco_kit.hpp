@@ -3,6 +3,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -29,5 +30,8 @@ void install_message_handler();
 // Pose to MuJoCo's position and quaternion (w first), and back.
 void to_mujoco(const Pose& pose, double position[3], double quaternion[4]);
 [[nodiscard]] Pose from_mujoco(const double position[3], const double quaternion[4]);
+
+// Digest of every position and speed.
+[[nodiscard]] std::uint64_t digest_of(const mjModel* model, const mjData* data);
 
 }  // namespace pons::sim

@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "pons/core/digest.hpp"
 #include "pons/sim/cell.hpp"
 #include "pons/sim/parcels.hpp"
 
@@ -182,13 +181,7 @@ bool Simulation::finished() const {
   return static_cast<std::size_t>(offered()) == cell_->ledger.size() && cell_->ledger.in_transit() == 0;
 }
 
-std::uint64_t Simulation::state_digest() const {
-  const mjModel* model = cell_->composed.model.get();
-  Digest digest;
-  digest.add(std::span<const double>(cell_->data->qpos, static_cast<std::size_t>(model->nq)));
-  digest.add(std::span<const double>(cell_->data->qvel, static_cast<std::size_t>(model->nv)));
-  return digest.value();
-}
+std::uint64_t Simulation::state_digest() const { return digest_of(cell_->composed.model.get(), cell_->data.get()); }
 
 Expected<void> Simulation::health() const {
   const Cell& cell = *cell_;

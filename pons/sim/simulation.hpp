@@ -56,6 +56,7 @@ class Simulation {
 
  private:
   explicit Simulation(std::unique_ptr<Cell> cell);
+  friend class BareStep;
   friend class Truth;
   std::unique_ptr<Cell> cell_;
 };

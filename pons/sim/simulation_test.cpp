@@ -266,6 +266,17 @@ TEST(Truth, PushingHardWithTheToolIsRecorded) {
   EXPECT_EQ(bench.truth().picks, 0);
 }
 
+TEST(Simulation, DrivesHaveTheRotorsOfTheWorldsFile) {
+  world::World world = without_cameras("small_cell");
+  world.robot.rotor_inertia_kg_m2 << 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1;
+  const auto composed = compose(world);
+  ASSERT_TRUE(composed);
+  for (Eigen::Index axis = 0; axis < 7; ++axis) {
+    const int dof = composed->arm_dof[static_cast<std::size_t>(axis)];
+    EXPECT_EQ(composed->model->dof_armature[dof], world.robot.rotor_inertia_kg_m2[axis]) << axis;
+  }
+}
+
 TEST(Simulation, TheSmallWorldRunsToo) {
   const world::World world = without_cameras("small_cell");
   auto simulation = create(world, draw(world, 6, 2), 2);

@@ -14,6 +14,9 @@ constexpr double kTurns = 4 * std::numbers::pi;  // rad; no joint turns further
 constexpr double kMaxLength = 10;                // m
 constexpr double kMaxMass = 1000;                // kg
 constexpr double kMaxRate = 1e5;                 // rad/s, rad/s², rad/s³
+constexpr double kMaxRotorInertia_kg_m2 = 100;
+// Drives of arms of this size add about so much. Without any, light wrist links make the simulation unstable at 2 ms.
+constexpr double kRotorInertia_kg_m2 = 0.01;
 constexpr std::size_t kMaxCapsules = 64;
 
 double rad(double degrees) { return degrees * std::numbers::pi / 180; }
@@ -51,6 +54,16 @@ AxisLimits read_limits(const YamlValue& value) {
   limits.jerk_rad_s3 = positive("jerk_rad_s3");
   limits.torque_nm = positive("torque_nm");
   return limits;
+}
+
+AxisVector read_rotor_inertia(const YamlMap& robot, std::size_t axes) {
+  if (!robot.has("rotor_inertia_kg_m2")) {
+    return AxisVector::Constant(static_cast<Eigen::Index>(axes), kRotorInertia_kg_m2);
+  }
+  const YamlValue value = robot["rotor_inertia_kg_m2"];
+  AxisVector inertia = value.axes(axes, 0, kMaxRotorInertia_kg_m2);
+  if (inertia.minCoeff() <= 0) value.refuse("holds a 0", "every rotor has some; without the key it is 0.01");
+  return inertia;
 }
 
 Tool read_tool(const YamlValue& value, const std::filesystem::path& folder) {
@@ -104,7 +117,8 @@ Pose read_pose(const YamlValue& value) {
 
 Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   const YamlMap map(
-      value, {"name", "urdf", "flange_link", "world_from_base", "home", "limits", "payload_kg", "tool", "capsules"});
+      value, {"name", "urdf", "flange_link", "world_from_base", "home", "limits", "payload_kg", "tool", "capsules"},
+      {"rotor_inertia_kg_m2"});
   Robot robot;
   robot.name = map["name"].name();
   robot.urdf = map["urdf"].existing_file(folder);
@@ -117,6 +131,7 @@ Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
       ((robot.limits.position_max - robot.home).array() < 0).any()) {
     map["home"].refuse("lies outside limits.position_min … position_max", "move it inside, or widen the limits");
   }
+  robot.rotor_inertia_kg_m2 = read_rotor_inertia(map, count);
   robot.tool = read_tool(map["tool"], folder);
   robot.payload_kg = map["payload_kg"].positive(kMaxMass);
   if (robot.payload_kg <= robot.tool.mass_kg) {

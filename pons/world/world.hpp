@@ -43,7 +43,8 @@ struct Robot {
   Pose world_from_base = Pose::Identity();
   AxisVector home;  // rad; also the seed branch of inverse kinematics
   AxisLimits limits;
-  double payload_kg = 0;  // at the flange, tool included
+  AxisVector rotor_inertia_kg_m2;  // one an axis: what the drive's rotor adds about the joint, behind the gears
+  double payload_kg = 0;           // at the flange, tool included
   Tool tool;
   std::vector<Capsule> capsules;
 };

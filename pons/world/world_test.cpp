@@ -137,6 +137,18 @@ TEST_F(BrokenWorld, TheUnbrokenOneLoads) {
   EXPECT_EQ(world->robot.urdf, folder_.path() / "robots/ur5e/ur5e.urdf");
 }
 
+TEST_F(BrokenWorld, RotorInertiaIsTheFilesOrElseTheUsualOne) {
+  const auto usual = load_text(text_);
+  ASSERT_TRUE(usual) << usual.error().line();
+  EXPECT_EQ(usual->robot.rotor_inertia_kg_m2, AxisVector(AxisVector::Constant(6, 0.01)));
+  std::string text = text_;
+  text.replace(text.find("  payload_kg:"), 0, "  rotor_inertia_kg_m2: [0.6, 0.5, 0.4, 0.3, 0.2, 0.1]\n");
+  const auto named = load_text(text);
+  ASSERT_TRUE(named) << named.error().line();
+  EXPECT_EQ(named->robot.rotor_inertia_kg_m2[0], 0.6);
+  EXPECT_EQ(named->robot.rotor_inertia_kg_m2[5], 0.1);
+}
+
 TEST_F(BrokenWorld, UnknownWorldNamesThoseThatExist) {
   ASSERT_TRUE(load_text(text_));
   for (const std::string_view name : {"moon", "", "../cell", "cell/", "robots"}) {
@@ -177,6 +189,14 @@ TEST_F(BrokenWorld, RefusesWrongShapesAndNumbers) {
               HasSubstr("robot.limits.position_max: is not above position_min"));
   EXPECT_THAT(changed("home: [1.2124, 0.4767, -2.3624", "home: [1.2124, 0.4767, -2.9"),
               HasSubstr("robot.home: lies outside limits"));
+  const auto rotors = [&](std::string_view value) {
+    return changed("  payload_kg: 5.0", fmt::format("  rotor_inertia_kg_m2: {}\n  payload_kg: 5.0", value));
+  };
+  EXPECT_THAT(rotors("[0.01, 0.01]"), HasSubstr("robot.rotor_inertia_kg_m2: has 2 entries; write 6"));
+  EXPECT_THAT(rotors("0.01"), HasSubstr("robot.rotor_inertia_kg_m2: is not a list"));
+  EXPECT_THAT(rotors("[0.01, 0.01, 0.01, 0.01, 0.01, -0.01]"), HasSubstr("-0.01 is out of range"));
+  EXPECT_THAT(rotors("[0.01, 0.01, 0.01, 0.01, 0.01, 0]"), HasSubstr("robot.rotor_inertia_kg_m2: holds a 0"));
+  EXPECT_THAT(rotors("[0.01, 0.01, 0.01, 0.01, 0.01, .nan]"), HasSubstr("is not a finite number"));
   EXPECT_THAT(changed("cups_to_lift: 3", "cups_to_lift: 5"),
               HasSubstr("robot.tool.cups_to_lift: '5' is not possible; write a whole number from 1 to 4"));
   EXPECT_THAT(changed("reads_labels: no", "reads_labels: maybe"),

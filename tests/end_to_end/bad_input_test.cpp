@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -103,6 +104,17 @@ TEST_F(BadInput, BrokenWorlds) {
   expect_refused({"run", "broken"}, {"world.yaml"}, here);
   write_text(folder_ / "worlds/broken/world.yaml", "name: broken\n");
   expect_refused({"run", "broken"}, {"world.yaml"}, here);
+}
+
+TEST_F(BadInput, ARotorWithoutInertia) {
+  const auto worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  std::ifstream in(worlds / "small_cell/world.yaml");
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  text.replace(text.find("  payload_kg:"), 0, "  rotor_inertia_kg_m2: [0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0]\n");
+  write_text(worlds / "small_cell/world.yaml", text);
+  expect_refused({"run", "small_cell", "--parcels", "1"}, {"world.yaml", "robot.rotor_inertia_kg_m2"},
+                 {"PONS_WORLDS=" + worlds.string()});
 }
 
 TEST_F(BadInput, ABrokenScene) {

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <algorithm>
+#include <array>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -16,6 +19,30 @@ std::string read_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+// In the child: becomes the program, with its streams where `out` and `err` lead.
+[[noreturn]] void become_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
+                              int out, int err) {
+  for (const std::string& entry : environment) {
+    const auto equals = entry.find('=');
+    setenv(entry.substr(0, equals).c_str(), entry.substr(equals + 1).c_str(), 1);
+  }
+  dup2(out, STDOUT_FILENO);
+  dup2(err, STDERR_FILENO);
+  std::vector<std::string> words{"pons"};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(PONS_BINARY, argv.data());
+  _exit(127);
+}
+
+int exit_code(pid_t child) {
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
 }  // namespace
 
 Finished run_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
@@ -23,21 +50,32 @@ Finished run_pons(const std::vector<std::string>& arguments, const std::vector<s
   const std::string out = folder / "out", err = folder / "err";
   const pid_t child = fork();
   if (child == 0) {
-    for (const std::string& entry : environment) {
-      const auto equals = entry.find('=');
-      setenv(entry.substr(0, equals).c_str(), entry.substr(equals + 1).c_str(), 1);
-    }
-    dup2(open(out.c_str(), O_CREAT | O_WRONLY, 0600), STDOUT_FILENO);
-    dup2(open(err.c_str(), O_CREAT | O_WRONLY, 0600), STDERR_FILENO);
-    std::vector<char*> argv{const_cast<char*>("pons")};
-    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-    argv.push_back(nullptr);
-    execv(PONS_BINARY, argv.data());
-    _exit(127);
+    become_pons(arguments, environment, open(out.c_str(), O_CREAT | O_WRONLY, 0600),
+                open(err.c_str(), O_CREAT | O_WRONLY, 0600));
   }
-  int status = 0;
-  waitpid(child, &status, 0);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_text(out), read_text(err)};
+  const int code = exit_code(child);
+  return {code, read_text(out), read_text(err)};
+}
+
+Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal) {
+  std::array<int, 2> err{};
+  if (pipe2(err.data(), O_CLOEXEC) != 0) return {};
+  const pid_t child = fork();
+  if (child == 0) become_pons(arguments, {}, open("/dev/null", O_WRONLY | O_CLOEXEC), err[1]);
+  close(err[1]);
+  Finished finished;
+  std::array<char, 256> chunk{};
+  int wanted = lines;
+  for (ssize_t got = 0; (got = read(err[0], chunk.data(), chunk.size())) > 0;) {
+    const auto begin = chunk.begin(), end = begin + got;
+    const int before = wanted;
+    wanted -= static_cast<int>(std::count(begin, end, '\n'));
+    if (before > 0 && wanted <= 0) kill(child, signal);
+    finished.err.append(begin, end);
+  }
+  close(err[0]);
+  finished.code = exit_code(child);
+  return finished;
 }
 
 Folder::Folder() {

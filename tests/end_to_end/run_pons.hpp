@@ -17,6 +17,10 @@ struct Finished {
 [[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments,
                                 const std::vector<std::string>& environment = {});
 
+// Sends it `signal` as soon as it has written `lines` lines to the error stream, and waits for its end. `out` is left
+// empty.
+[[nodiscard]] Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal);
+
 // A folder of its own for one test, gone with it.
 class Folder {
  public:

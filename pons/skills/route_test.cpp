@@ -1,0 +1,188 @@
+#include "pons/skills/route.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+namespace pons::skills {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kToolSide_m = 0.08;  // cups and their holder, about the tip
+const Time kBegin = Time(from_s(3));
+
+class RouteTest : public ::testing::Test {
+ protected:
+  static world::World load() {
+    auto world = world::load("worlds", "parcel_cell");
+    EXPECT_TRUE(world) << world.error().line();
+    return std::move(*world);
+  }
+
+  // Joint angles with the tool pointing down, its tip at (x, y, z).
+  AxisVector over(double x, double y, double z) {
+    Pose pose = pose_xyz_yaw(x, y, z, 0);
+    pose.rotate(Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()));
+    const auto q = model_.inverse(pose, world_.robot.home);
+    EXPECT_TRUE(q) << q.error().line();
+    return q.value_or(world_.robot.home);
+  }
+  static AxisState rest(const AxisVector& q) { return {q, AxisVector::Zero(q.size()), AxisVector::Zero(q.size())}; }
+  static motion::Waypoint halt(const AxisVector& q) { return {q, AxisVector::Zero(q.size())}; }
+
+  // A parcel on the belt, its top's middle at (x, 0) when the motion begins.
+  ObjectBelief parcel(double x, const Vector3& size_m, double speed_m_s = 0) const {
+    ObjectBelief object;
+    object.stamp = kBegin;
+    object.world_from_top.translation() = Vector3(x, 0, world_.belt.surface_z_m + size_m.z());
+    object.velocity_m_s.x() = speed_m_s;
+    object.size_m = size_m;
+    return object;
+  }
+
+  // How far the lowest part of tool (or of what hangs `depth_m` below it) stays above the top of `object` while it is
+  // within the footprint; nothing if it never is.
+  std::optional<double> clearance(const motion::Trajectory& way, const ObjectBelief& object, double side_m,
+                                  double depth_m) {
+    std::optional<double> least;
+    for (Time time = way.front().start; time <= way.back().end(); time += std::chrono::milliseconds(4)) {
+      const Pose world_from_tip = model_.world_from_tip(motion::sample(way, time, model_.axes()).position);
+      const Vector3 top = object.world_from_top.translation() + to_s(time - object.stamp) * object.velocity_m_s;
+      for (const double x : {-0.5, 0.5})
+        for (const double y : {-0.5, 0.5}) {
+          const Vector3 low = world_from_tip * Vector3(x * side_m, y * side_m, depth_m);
+          const Vector3 off = (low - top).cwiseAbs();
+          if (off.x() > 0.5 * object.size_m.x() || off.y() > 0.5 * object.size_m.y()) continue;
+          least = std::min(least.value_or(std::numeric_limits<double>::infinity()), low.z() - top.z());
+        }
+    }
+    return least;
+  }
+
+  void expect_leads(const Expected<motion::Trajectory>& way, const AxisVector& from, const AxisVector& to) {
+    ASSERT_TRUE(way) << way.error().line();
+    EXPECT_EQ(way->front().start, kBegin);
+    EXPECT_TRUE(motion::sample(*way, kBegin, model_.axes()).position.isApprox(from, 1e-9));
+    const AxisState end = motion::sample(*way, way->back().end(), model_.axes());
+    EXPECT_TRUE(end.position.isApprox(to, 1e-7));
+    EXPECT_TRUE(end.speed.isZero(1e-7));
+    const motion::LimitUse use = motion::limit_use(*way, world_.robot.limits);
+    EXPECT_TRUE(use.inside_position);
+    EXPECT_LE(use.worst(), 1.0 + 1e-6);
+  }
+
+  const world::World world_ = load();
+  model::RobotModel model_ = model::RobotModel::load(world_.robot).value();
+  Router router_{world_, model_.copy()};
+  const AxisLimits& limits_ = world_.robot.limits;
+};
+
+TEST_F(RouteTest, ABareBeltIsCrossedDirectly) {
+  const AxisVector from = over(-0.3, 0, 1.1), to = over(0.35, 0, 1.1);
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  expect_leads(way, from, to);
+  const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+  ASSERT_TRUE(direct);
+  EXPECT_EQ(way->back().end(), direct->back().end());
+}
+
+TEST_F(RouteTest, AWayOverAnObstacleStaysClearOfIt) {
+  const AxisVector from = over(-0.3, 0, 1.0), to = over(0.35, 0, 1.0);
+  const std::array obstacles{parcel(0.02, {0.2, 0.2, 0.25})};
+  const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+  ASSERT_TRUE(direct);
+  ASSERT_LT(clearance(*direct, obstacles[0], kToolSide_m, 0).value(), 0) << "the direct way must be blocked";
+
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  expect_leads(way, from, to);
+  EXPECT_GT(clearance(*way, obstacles[0], kToolSide_m, 0).value(), 0.01);
+  EXPECT_LT(to_s(way->back().end() - kBegin), 2.5) << "over it, not far around";
+}
+
+TEST_F(RouteTest, AMovingObstacleIsWhereItWillBe) {
+  const AxisVector from = over(-0.3, 0, 1.0), to = over(0.35, 0, 1.0);
+  const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+  ASSERT_TRUE(direct);
+  // Seen upstream a second ago, in the middle of the way when the arm comes by.
+  ObjectBelief arrives = parcel(-0.25, {0.16, 0.16, 0.25}, 0.22);
+  arrives.stamp = kBegin - from_s(1);
+  ASSERT_LT(clearance(*direct, arrives, kToolSide_m, 0).value(), 0);
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{arrives}, limits_);
+  expect_leads(way, from, to);
+  EXPECT_GT(clearance(*way, arrives, kToolSide_m, 0).value(), 0.01);
+  // Seen in the middle of the way five seconds ago: gone.
+  ObjectBelief gone = parcel(0.02, {0.16, 0.16, 0.25}, 0.22);
+  gone.stamp = kBegin - from_s(5);
+  const auto free = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{gone}, limits_);
+  expect_leads(free, from, to);
+  EXPECT_EQ(free->back().end(), direct->back().end());
+}
+
+TEST_F(RouteTest, WhatHangsOnTheCupsPassesHigher) {
+  const AxisVector from = over(-0.3, 0, 1.2), to = over(0.35, 0, 1.2);
+  const std::array obstacles{parcel(0.02, {0.16, 0.16, 0.18})};
+  const Load load{.size_m = {0.16, 0.16, 0.2}};
+  const auto empty = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  ASSERT_TRUE(empty) << empty.error().line();
+  ASSERT_LT(clearance(*empty, obstacles[0], 0.16, load.size_m.z()).value(), 0) << "the load would hit it on that way";
+  const auto way = router_.route(rest(from), kBegin, halt(to), &load, obstacles, limits_);
+  expect_leads(way, from, to);
+  EXPECT_GT(clearance(*way, obstacles[0], 0.16, load.size_m.z()).value(), 0.01);
+}
+
+TEST_F(RouteTest, OverRimsAndBeltOnTheWayToAChute) {
+  const world::Place* chute = world_.place("chute_3");
+  ASSERT_NE(chute, nullptr);
+  const AxisVector from = over(0.1, 0.05, 0.95);
+  const AxisVector to = over(chute->center_m.x(), chute->center_m.y(), 1.0);
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  expect_leads(way, from, to);
+  for (Time time = kBegin; time <= way->back().end(); time += std::chrono::milliseconds(4)) {
+    const Vector3 tip = model_.world_from_tip(motion::sample(*way, time, model_.axes()).position).translation();
+    EXPECT_GT(tip.z(), world_.belt.surface_z_m) << "at " << tip.transpose();
+  }
+}
+
+TEST_F(RouteTest, AnEndBeyondALimitIsNamed) {
+  const AxisVector from = over(-0.3, 0, 1.1);
+  AxisVector to = from;
+  to[2] = world_.robot.limits.position_max[2] + 0.1;
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  ASSERT_FALSE(way);
+  EXPECT_THAT(way.error().line(), HasSubstr("limit"));
+}
+
+TEST_F(RouteTest, NoWayThroughAWallIsNamed) {
+  const AxisVector from = over(-0.3, 0, 1.0), to = over(0.35, 0, 1.0);
+  const std::array obstacles{parcel(0.02, {0.3, 0.3, 1.2})};
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  ASSERT_FALSE(way);
+  EXPECT_FALSE(way.error().what.empty());
+  EXPECT_FALSE(way.error().where.empty());
+  EXPECT_FALSE(way.error().mend.empty());
+}
+
+TEST_F(RouteTest, LimitsCoverWhatTheArmAlreadyDoes) {
+  AxisState start = rest(world_.robot.home);
+  start.acceleration[1] = -8;
+  start.speed[2] = 2;
+  AxisLimits gentle = limits_;
+  gentle.acceleration_rad_s2 *= 0.1;
+  gentle.speed_rad_s *= 0.5;
+  const AxisLimits wider = covering(gentle, start);
+  EXPECT_GE(wider.acceleration_rad_s2[1], 8);
+  EXPECT_GE(wider.speed_rad_s[2], 2);
+  EXPECT_EQ(wider.acceleration_rad_s2[0], gentle.acceleration_rad_s2[0]);
+  EXPECT_EQ(wider.speed_rad_s[0], gentle.speed_rad_s[0]);
+  EXPECT_EQ(wider.jerk_rad_s3, gentle.jerk_rad_s3);
+}
+
+}  // namespace
+}  // namespace pons::skills

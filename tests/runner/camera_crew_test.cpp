@@ -1,0 +1,158 @@
+// The camera crew with the real cameras of a simulated cell and the real perception behind it.
+
+#include "pons/runner/camera_crew.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <latch>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "pons/core/digest.hpp"
+#include "pons/sim/simulation.hpp"
+#include "pons/world/manifest.hpp"
+
+namespace pons::runner {
+namespace {
+
+constexpr Duration kTick = std::chrono::milliseconds(1);
+constexpr int kTicksABridgePeriod = 10;
+
+world::World load() {
+  auto world = world::load("worlds", "small_cell");
+  EXPECT_TRUE(world) << world.error().line();
+  return std::move(*world);
+}
+
+// A cell whose parcels ride by; the arm stands.
+struct Scene {
+  explicit Scene(Pace pace = Pace::kLockstep) {
+    const auto manifest = world::draw_manifest(world, 4, 1);
+    EXPECT_TRUE(manifest) << manifest.error().line();
+    auto created = sim::Simulation::create(world, *manifest, 1);
+    EXPECT_TRUE(created) << created.error().line();
+    simulation = std::move(*created);
+    perception.emplace(world, model::RobotModel::load(world.robot).value());
+    crew.emplace(world, simulation->cameras(), *perception, pace);
+  }
+
+  // A bridge period of physics and shutters, then what the crew has to say.
+  std::optional<Snapshot> period(const std::vector<std::uint32_t>& forgotten = {}) {
+    for (int i = 0; i < kTicksABridgePeriod; ++i) {
+      now += kTick;
+      simulation->advance_to(now);
+      simulation->body().read(sensors);
+      travel_m[now] = sensors.belt_travel_m;
+      crew->open_shutters(now, sensors);
+    }
+    auto collected = crew->collect(now, forgotten);
+    EXPECT_TRUE(collected) << collected.error().line();
+    return collected ? std::move(*collected) : std::nullopt;
+  }
+
+  world::World world = load();
+  std::unique_ptr<sim::Simulation> simulation;
+  std::optional<perception::Perception> perception;
+  std::optional<CameraCrew> crew;
+  body::Sensors sensors;
+  std::map<Time, double> travel_m;
+  Time now;
+};
+
+Duration latency(const world::World& world, std::string_view watches) {
+  const auto camera = std::ranges::find(world.cameras, watches, &world::CameraSpec::watches);
+  return from_s(camera->latency_s);
+}
+
+TEST(CameraCrew, NothingIsKnownBeforeItsLatencyHasPassed) {
+  Scene scene;
+  std::vector<Snapshot> snapshots;
+  for (int i = 0; i < 300; ++i) {
+    const auto snapshot = scene.period();
+    if (!snapshot) continue;
+    EXPECT_LE(snapshot->due, scene.now);
+    EXPECT_GT(snapshot->due, scene.now - kTicksABridgePeriod * kTick) << "and not later than it must be";
+    EXPECT_GE(snapshot->due, snapshot->stamp + latency(scene.world, "belt"));
+    EXPECT_EQ(snapshot->belt_travel_m, scene.travel_m.at(snapshot->stamp)) << "as it was when the shutter was open";
+    EXPECT_TRUE(snapshots.empty() || snapshot->stamp > snapshots.back().stamp);
+    snapshots.push_back(*snapshot);
+  }
+  // Five frames a second from the quick stream alone.
+  EXPECT_GE(snapshots.size(), 14U);
+  EXPECT_TRUE(std::ranges::any_of(snapshots, [](const Snapshot& s) { return !s.objects.empty(); }));
+  EXPECT_EQ(snapshots.back().occupancy.at("tray"), 0);
+}
+
+TEST(CameraCrew, TheSameSceneGivesTheSameBeliefsWheneverTheThreadRuns) {
+  const auto digest = [] {
+    Scene scene;
+    Digest all;
+    for (int i = 0; i < 200; ++i) {
+      const auto snapshot = scene.period();
+      if (!snapshot) continue;
+      all.add(scene.now.ns());
+      for (const ObjectBelief& object : snapshot->objects) {
+        all.add(object.track);
+        all.add(std::span<const double>(object.world_from_top.matrix().data(), 16));
+        all.add(object.code);
+      }
+    }
+    return all.value();
+  };
+  EXPECT_EQ(digest(), digest());
+}
+
+TEST(CameraCrew, PassesOnWhatWasTakenOffTheBelt) {
+  Scene scene;
+  std::optional<std::uint32_t> track;
+  for (int i = 0; i < 400 && !track; ++i) {
+    const auto snapshot = scene.period();
+    if (snapshot && !snapshot->objects.empty()) track = snapshot->objects.front().track;
+  }
+  ASSERT_TRUE(track);
+  const Time told = scene.now;
+  std::optional<Snapshot> later = scene.period({*track});
+  while (!later || later->stamp <= told) later = scene.period();
+  EXPECT_TRUE(std::ranges::none_of(later->objects, [&](const ObjectBelief& o) { return o.track == *track; }));
+}
+
+// A camera that takes its time, and may break.
+class SlowCamera final : public body::Camera {
+ public:
+  [[nodiscard]] const Intrinsics& intrinsics() const override { return intrinsics_; }
+  void begin(Time) override { ++begun; }
+  [[nodiscard]] Expected<void> finish(RgbdFrame&) override {
+    develop.wait();
+    return fail("the lens is off", "overhead", "put it on");
+  }
+  std::latch develop{1};
+  int begun = 0;
+
+ private:
+  Intrinsics intrinsics_;
+};
+
+TEST(CameraCrew, InRealTimeABusyCameraSkipsAFrameAndAFailedOneEndsTheRun) {
+  world::World world = load();
+  world.cameras.resize(1);
+  SlowCamera camera;
+  perception::Perception perception(world, model::RobotModel::load(world.robot).value());
+  CameraCrew crew(world, {&camera}, perception, Pace::kRealTime);
+  const Time first(from_s(world.cameras[0].phase_s)), second = first + from_s(world.cameras[0].period_s);
+  crew.open_shutters(first, {});
+  crew.open_shutters(second, {});
+  EXPECT_EQ(camera.begun, 1) << "the second frame was skipped, and nobody waited";
+  const auto nothing = crew.collect(second, {});
+  EXPECT_TRUE(nothing && !*nothing);
+
+  camera.develop.count_down();
+  Expected<std::optional<Snapshot>> collected = std::nullopt;
+  while (collected) collected = crew.collect(second, {});
+  EXPECT_EQ(collected.error().what, "the lens is off");
+}
+
+}  // namespace
+}  // namespace pons::runner
