@@ -92,13 +92,13 @@ TEST(Simulation, UnpickedParcelRidesIntoTheExceptionChuteAndIsCarriedOff) {
   EXPECT_FALSE(truth.top(0).has_value());
 }
 
-TEST(Simulation, TwentySecondsOfFeedingRaiseNoWarningAndRepeatToTheByte) {
+TEST(Simulation, ThirtySecondsOfFeedingRaiseNoWarningAndRepeatToTheByte) {
   const world::World world = without_cameras("parcel_cell");
   const world::Manifest manifest = draw(world, 30, 7);
   std::array<std::uint64_t, 2> digests{};
   for (std::uint64_t& digest : digests) {
     auto simulation = create(world, manifest, 7);
-    simulation->advance_to(Time(from_s(20)));
+    simulation->advance_to(Time(from_s(30)));
     const auto health = simulation->health();
     EXPECT_TRUE(health) << health.error().line();
     EXPECT_GT(simulation->offered(), 5);
