@@ -11,9 +11,6 @@ namespace {
 
 constexpr int kFramesToTrust = 3;
 constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
-constexpr double kSure = 0.5;            // of the confidence: below it something hides a part of the object
-constexpr double kOverlap_m = 0.01;      // footprints that share less only touch
-constexpr double kUpright = 0.9986;      // cosine of 3 degrees
 constexpr int kMostTries = 3;
 
 // Where a camera's downstream edge meets the belt, over its whole width; nothing when it does not look at the belt.
@@ -57,41 +54,8 @@ double speed_m_s(const ObjectBelief& belief, const world::Belt& belt) {
   return std::max(seen > 0 ? seen : belt.speed_m_s, belt.speed_m_s * (1 - belt.speed_variation));
 }
 
-// Whether the footprint of `a`, shrunk a little, and that of `b` share ground: two rectangles are apart when they are
-// along a side of one of them.
-bool overlaps(const ObjectBelief& a, const ObjectBelief& b) {
-  const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
-  for (const ObjectBelief* one : {&a, &b}) {
-    for (const Eigen::Index side : {0, 1}) {
-      const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
-      double reach_m = -kOverlap_m;
-      for (const ObjectBelief* each : {&a, &b}) {
-        for (const Eigen::Index s : {0, 1}) {
-          reach_m += 0.5 * each->size_m[s] * std::abs(along.dot(each->world_from_top.linear().col(s).head<2>()));
-        }
-      }
-      if (std::abs(along.dot(between.head<2>())) > reach_m) return false;
-    }
-  }
-  return true;
-}
-
-bool leans(const ObjectBelief& belief) { return belief.world_from_top.linear()(2, 2) < kUpright; }
-
-// What leans lies on what stands, however high; else the higher one is above.
-bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
-  if (leans(upper) != leans(lower)) return leans(upper);
-  return upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
-}
-
-// Seen whole, nothing lies on it; and what is only hidden from the camera has nobody above.
 bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
-  return belief.confidence < kSure && std::any_of(
-                                          all.begin(), all.end(),
-                                          [&](const ObjectBelief& other) {
-                                            return other.track != belief.track && lies_on(other, belief) &&
-                                                   overlaps(belief, other);
-                                          });
+  return std::any_of(all.begin(), all.end(), [&](const ObjectBelief& other) { return lies_on(other, belief); });
 }
 
 }  // namespace

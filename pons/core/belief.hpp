@@ -27,4 +27,7 @@ struct ObjectBelief {
   int label_attempts = 0;  // frames good enough to read a label on it, readable or not
 };
 
+// Whether `upper` lies or leans on `lower`, as far as can be told: lifted first, the lower one would carry it along.
+[[nodiscard]] bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower);
+
 }  // namespace pons

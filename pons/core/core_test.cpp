@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "pons/core/belief.hpp"
 #include "pons/core/digest.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/random.hpp"
@@ -45,6 +46,42 @@ TEST(Digest, DependsOnEveryByteAndTheirOrder) {
   b.add("ba");
   EXPECT_NE(a.value(), b.value());
   EXPECT_EQ(Digest{}.value(), 0xcbf29ce484222325ULL);
+}
+
+ObjectBelief box(std::uint32_t track, double x_m, double y_m, double z_m, double yaw_rad = 0) {
+  ObjectBelief belief;
+  belief.track = track;
+  belief.world_from_top = pose_xyz_yaw(x_m, y_m, z_m, yaw_rad);
+  belief.size_m = Vector3(0.3, 0.2, 0.1);
+  belief.confidence = 0.97;
+  return belief;
+}
+
+TEST(Belief, TheHigherOfTwoLiesOnTheOneThatIsPartlyHidden) {
+  ObjectBelief lower = box(1, 0, 0, 0.1);
+  const ObjectBelief upper = box(2, 0.1, 0.05, 0.2, 0.4);
+  EXPECT_FALSE(lies_on(upper, lower)) << "seen whole";
+  lower.confidence = 0.3;
+  EXPECT_TRUE(lies_on(upper, lower));
+  EXPECT_FALSE(lies_on(lower, upper));
+  EXPECT_FALSE(lies_on(lower, lower));
+}
+
+TEST(Belief, NeighboursThatTouchDoNotLieOnEachOther) {
+  ObjectBelief lower = box(1, 0, 0, 0.1);
+  lower.confidence = 0.3;
+  EXPECT_FALSE(lies_on(box(2, 0.295, 0, 0.2), lower));
+  EXPECT_TRUE(lies_on(box(2, 0.285, 0, 0.2), lower));
+  // Apart along a diagonal, though not along x or y.
+  EXPECT_FALSE(lies_on(box(2, 0.25, 0.22, 0.2, 0.7), lower));
+}
+
+TEST(Belief, WhatLeansLiesOnWhatStandsHoweverHigh) {
+  const ObjectBelief lower = box(1, 0, 0, 0.2);
+  ObjectBelief upper = box(2, 0.2, 0, 0.1);
+  upper.world_from_top.rotate(Eigen::AngleAxisd(-0.2, Vector3::UnitY()));
+  EXPECT_TRUE(lies_on(upper, lower));
+  EXPECT_FALSE(lies_on(lower, upper));
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ constexpr double kBelow = 0.06;
 constexpr double kWhole = 0.90;
 constexpr double kNearlyWhole = 0.95;
 constexpr double kLostCorner = 0.10;  // of the outline
+constexpr double kAcross = 0.5;       // of the width
 
 struct Rectangle {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // cells
@@ -287,7 +288,10 @@ std::vector<Sighting> measure(const TopView& view, const Segments& segments) {
     sighting.crowded = region.crowded || region.below_share > 0 || sighting.tilt_rad > kLeaning_rad;
     sighting.near_robot = region.near_robot;
     // A box that only lost a corner to the border is measured as well as a whole one.
-    sighting.at_border = region.border_share > kLostCorner || (region.border_share > 0 && sighting.fill < kNearlyWhole);
+    // A narrow one is cut across by a short border.
+    const double border_m = region.border_share * 2 * (sighting.size_m.x() + sighting.size_m.y());
+    sighting.at_border = region.border_share > kLostCorner || border_m > kAcross * sighting.size_m.y() ||
+                         (region.border_share > 0 && sighting.fill < kNearlyWhole);
     sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
     sighting.sliver = sighting.size_m.y() < kNarrowest_m;
     sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;

@@ -15,6 +15,7 @@ constexpr double kRide_s = 0.40;        // along with the belt, while vacuum bui
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
 constexpr int kRounds = 8;
+constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
 constexpr double kRideLifted_s = 0.5;  // until the next motion takes over
@@ -22,6 +23,20 @@ constexpr double kRideLifted_s = 0.5;  // until the next motion takes over
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
 Vector3 belt_velocity(const Cell& cell) { return {cell.belt_speed_m_s(), 0, 0}; }
+
+Pose posed(const Vector3& position, const Eigen::Matrix3d& orientation) {
+  Pose pose = Pose::Identity();
+  pose.translation() = position;
+  pose.linear() = orientation;
+  return pose;
+}
+
+// The cups seal on a leaning top only when they lean with it.
+Eigen::Quaterniond lean_of(const ObjectBelief& object) {
+  const Vector3 up = object.world_from_top.linear().col(2);
+  if (up.z() > kUpright || up.z() < kSteepest) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), up);
+}
 
 // The tip's largest vertical acceleration, by second differences.
 double most_upward_m_s2(Cell& cell, const motion::Trajectory& trajectory) {
@@ -51,48 +66,51 @@ AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed
   return jacobian.transpose() * gram.ldlt().solve(twist);
 }
 
-Expected<double> nearest_yaw(Cell& cell, const AxisVector& q, const Vector3& position, double object_yaw_rad) {
-  Expected<double> best = fail("out of reach", "grasp");
+Expected<Eigen::Matrix3d> nearest_orientation(Cell& cell, const AxisVector& q, const Vector3& position,
+                                              double object_yaw_rad, const Eigen::Quaterniond& lean) {
+  Expected<Eigen::Matrix3d> best = fail("out of reach", "grasp");
   double least = 0;
   for (int quarter = 0; quarter < 4; ++quarter) {
     const double yaw = object_yaw_rad + quarter * std::numbers::pi / 2;
-    const auto there = cell.model.inverse(Cell::tip_down(position, yaw), q);
+    const Eigen::Matrix3d orientation = lean * Cell::tip_down(position, yaw).linear();
+    const auto there = cell.model.inverse(posed(position, orientation), q);
     if (!there) continue;
     const double turn = (*there - q).cwiseAbs().maxCoeff();
     if (best && turn >= least) continue;
-    best = yaw;
+    best = orientation;
     least = turn;
   }
   return best;
 }
 
-Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at, double yaw_rad, double duration_s) {
+Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
+                                  double duration_s) {
   const Vector3 from = cell.model.world_from_tip(start.position).translation();
   const Vector3 speed = belt_velocity(cell);
   AxisVector seed = start.position;
   const auto path = [&, seed](double t) mutable -> Expected<AxisVector> {
-    auto q = cell.model.inverse(Cell::tip_down(from + t * speed, yaw_rad), seed);
+    auto q = cell.model.inverse(posed(from + t * speed, orientation), seed);
     if (q) seed = *q;
     return q;
   };
   return motion::follow(start, at, path, duration_s, kKnot_s, cell.limits_empty());
 }
 
-Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad, const Vector3& offset,
-                                   const Vector3& tip_speed, const AxisLimits& limits) {
+Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
+                                   const Vector3& offset, const Vector3& tip_speed, const AxisLimits& limits) {
   const Vector3 from = cell.model.world_from_tip(start.position).translation();
-  const auto q = cell.model.inverse(Cell::tip_down(from + offset, yaw_rad), start.position);
+  const auto q = cell.model.inverse(posed(from + offset, orientation), start.position);
   if (!q) return std::unexpected(q.error());
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
 }
 
-Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad, double height_m) {
+Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation, double height_m) {
   const Vector3 belt = belt_velocity(cell);
   AxisLimits limits = cell.limits_empty();
   Expected<motion::Trajectory> up = fail("out of reach", "lift");
   double takes_s = 0.4;
   for (int round = 0; round < kRounds; ++round) {
-    up = nudge(cell, start, at, yaw_rad, takes_s * belt + Vector3(0, 0, height_m), belt, limits);
+    up = nudge(cell, start, at, orientation, takes_s * belt + Vector3(0, 0, height_m), belt, limits);
     if (!up) return std::unexpected(up.error());
     takes_s = to_s(up->back().end() - at);
     const double too_hard = most_upward_m_s2(cell, *up) / kLift_m_s2;
@@ -102,7 +120,7 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad,
   }
   const Time top = up->back().end();
   const AxisState lifted = motion::sample(*up, top, cell.model.axes());
-  auto on = ride(cell, lifted, top, yaw_rad, kRideLifted_s);
+  auto on = ride(cell, lifted, top, orientation, kRideLifted_s);
   if (!on) on = motion::stop(lifted, top, cell.limits_empty());
   if (!on) return std::unexpected(on.error());
   append(*up, *on);
@@ -110,7 +128,7 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad,
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                           std::optional<double> yaw_rad) {
+                           std::optional<Eigen::Matrix3d> orientation) {
   Grasp grasp;
   const double object_yaw = std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
   const AxisLimits limits = cell.limits_empty();
@@ -123,12 +141,12 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   AxisVector seed = start.position;
   for (int round = 0; round < kRounds; ++round) {
     const Vector3 hover = cell.predict(object, at + from_s(ahead_s)) + up;
-    if (!yaw_rad) {
-      const auto yaw = nearest_yaw(cell, start.position, hover, object_yaw);
-      if (!yaw) return std::unexpected(yaw.error());
-      yaw_rad = *yaw;
+    if (!orientation) {
+      const auto nearest = nearest_orientation(cell, start.position, hover, object_yaw, lean_of(object));
+      if (!nearest) return std::unexpected(nearest.error());
+      orientation = *nearest;
     }
-    const auto q = cell.model.inverse(Cell::tip_down(hover, *yaw_rad), seed);
+    const auto q = cell.model.inverse(posed(hover, *orientation), seed);
     if (!q) return std::unexpected(q.error());
     seed = *q;
     way = cell.router.route(start, at, {*q, joint_speed(cell, *q, come_down)}, nullptr, cell.objects(), limits);
@@ -138,7 +156,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     ahead_s = needed_s;
     if (converged) break;
   }
-  grasp.yaw_rad = *yaw_rad;
+  grasp.orientation = *orientation;
   grasp.trajectory = std::move(*way);
   grasp.hover = grasp.trajectory.back().end();
 
@@ -148,7 +166,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   Expected<motion::Trajectory> down = fail("out of reach", "grasp");
   for (int round = 0; round < kRounds; ++round) {
     grasp.contact_point = cell.predict(object, grasp.hover + from_s(down_s)) - Vector3(0, 0, kPress_m);
-    const auto q = cell.model.inverse(Cell::tip_down(grasp.contact_point, grasp.yaw_rad), seed);
+    const auto q = cell.model.inverse(posed(grasp.contact_point, grasp.orientation), seed);
     if (!q) return std::unexpected(q.error());
     down = motion::move(hovering, grasp.hover, {*q, joint_speed(cell, *q, belt_velocity(cell))}, limits);
     if (!down) return std::unexpected(down.error());
@@ -161,7 +179,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   grasp.contact = grasp.trajectory.back().end();
 
   const AxisState touching = motion::sample(grasp.trajectory, grasp.contact, cell.model.axes());
-  const auto along = ride(cell, touching, grasp.contact, grasp.yaw_rad, kRide_s);
+  const auto along = ride(cell, touching, grasp.contact, grasp.orientation, kRide_s);
   if (!along) return std::unexpected(along.error());
   append(grasp.trajectory, *along);
   return grasp;

@@ -9,35 +9,41 @@ struct Grasp {
   motion::Trajectory trajectory;  // to the contact, then along with the belt
   Time hover;                     // over the parcel, coming down
   Time contact;
-  double yaw_rad = 0;                       // of the tip, world frame
-  Vector3 contact_point = Vector3::Zero();  // tip at `contact`, world frame
+  Eigen::Matrix3d orientation = Eigen::Matrix3d::Identity();  // of the tip, world frame
+  Vector3 contact_point = Vector3::Zero();                    // tip at `contact`, world frame
 };
 
+// Orientations are the tip's in the world frame.
+
 // Along with the belt from `start`, with the tip over a point that moves on with it.
-[[nodiscard]] Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at, double yaw_rad,
-                                                double duration_s);
+[[nodiscard]] Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at,
+                                                const Eigen::Matrix3d& orientation, double duration_s);
 
 // The tip's joint speed for a Cartesian one.
 [[nodiscard]] AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed_m_s);
 
-// The tip yaw, one of the object's four, that turns the arm least from q.
-[[nodiscard]] Expected<double> nearest_yaw(Cell& cell, const AxisVector& q, const Vector3& position,
-                                           double object_yaw_rad);
+// Of the four orientations along the object's sides the one that turns the arm least from q: straight down, or along
+// `lean` turned out of that.
+[[nodiscard]] Expected<Eigen::Matrix3d> nearest_orientation(
+    Cell& cell, const AxisVector& q, const Vector3& position, double object_yaw_rad,
+    const Eigen::Quaterniond& lean = Eigen::Quaterniond::Identity());
 
-// The earliest grasp from `start` at `at`. With `yaw_rad` given that grip is kept. Errors: out of reach, no clear way.
+// The earliest grasp from `start` at `at`. With `orientation` given that grip is kept. Errors: out of reach, no clear
+// way.
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                                         std::optional<double> yaw_rad);
+                                         std::optional<Eigen::Matrix3d> orientation);
 
 // Straight up with a load on the cups, riding along with the belt, so that neighbours stay where they are.
 struct Lift {
   motion::Trajectory trajectory;  // goes on with the belt above the top, as far as the arm reaches, and ends at rest
   Time top;                       // when the height is reached
 };
-[[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, double yaw_rad, double height_m);
+[[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
+                                  double height_m);
 
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
-[[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, double yaw_rad,
-                                                 const Vector3& offset, const Vector3& tip_speed,
-                                                 const AxisLimits& limits);
+[[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at,
+                                                 const Eigen::Matrix3d& orientation, const Vector3& offset,
+                                                 const Vector3& tip_speed, const AxisLimits& limits);
 
 }  // namespace pons::skills

@@ -24,8 +24,9 @@ constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load s
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
-constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
-constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
+constexpr double kMoved_m = 0.0015;      // a prediction off by more is worth a new plan
+constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
+constexpr double kDensity_kg_m3 = 150;   // of parcels, roughly: what the drives expect until then
 constexpr double kLift_m = 0.10;
 constexpr double kHighestLift_m = 0.25;
 constexpr double kClose_m = 0.05;    // neighbours within this of the footprint are lifted over
@@ -97,8 +98,14 @@ class Pick final : public task::Skill {
     }
     seen_ = now;
     const world::Belt& belt = cell_.world.belt;
+    if (object->size_m.maxCoeff() > cell_.world.rules.max_size_m + kSizeMargin_m) {
+      return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
+    }
     if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
       return {Status::kException, "rode past the pick zone", {}};
+    }
+    for (const ObjectBelief& other : cell_.objects()) {
+      if (lies_on(other, *object)) return {Status::kFailed, "covered by " + name_of(other), {}};
     }
     const Time from = Arm::splice_time(now);
     auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
@@ -125,9 +132,12 @@ class Pick final : public task::Skill {
     for (int round = 0; round < kSetDownRounds; ++round) {
       way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
         const Vector3 spot = free_spot(arrives);
-        const auto yaw = nearest_yaw(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
-        if (!yaw) return fail("no room on the belt", cell_.held->code);
-        return cell_.model.inverse(Cell::tip_down(spot, *yaw), from);
+        const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
+        if (!down) return fail("no room on the belt", cell_.held->code);
+        Pose pose = Pose::Identity();
+        pose.translation() = spot;
+        pose.linear() = *down;
+        return cell_.model.inverse(pose, from);
       });
       if (!way) return {Status::kRetry, way.error().line(), {}};
       arrives = way->back().end();
@@ -190,7 +200,7 @@ class Pick final : public task::Skill {
     for (const ObjectBelief& other : cell_.objects()) {
       point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
     }
-    const auto q = cell_.model.inverse(Cell::tip_down(point, grasp.yaw_rad), state.position);
+    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of_tip(grasp.orientation)), state.position);
     if (!q) return {};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
                                         cell_.limits_empty());
@@ -214,7 +224,8 @@ class Pick final : public task::Skill {
       if ((contact - grasp_.contact_point).head<2>().norm() > kMoved_m) {
         const Time from = Arm::splice_time(now);
         const double turn = yaw_of(*object) - yaw_of(target_);
-        auto better = plan_grasp(cell_, cell_.arm.planned(from), from, *object, grasp_.yaw_rad + wrapped(turn));
+        auto better = plan_grasp(cell_, cell_.arm.planned(from), from, *object,
+                                 Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
         if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) return start(*better, *object, now);
         planned_ = now;
       }
@@ -244,11 +255,11 @@ class Pick final : public task::Skill {
     if (weigh_now(cell_) < -kPressedHard_kg) return false;
     const Time from = Arm::splice_time(now);
     const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.yaw_rad,
+    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.orientation,
                       kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt, cell_.limits_empty());
     if (!down) return false;
     const Time end = down->back().end();
-    const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.yaw_rad, 0.4);
+    const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.orientation, 0.4);
     if (!along) return false;
     down->insert(down->end(), along->begin(), along->end());
     if (!cell_.arm.stream(*down)) return false;
@@ -261,14 +272,14 @@ class Pick final : public task::Skill {
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    const auto up = skills::lift(cell_, state, from, grasp_.yaw_rad, lift_height());
+    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_height());
     if (!up) return {Status::kRetry, up.error().line(), {}};
     if (auto sent = cell_.arm.stream(up->trajectory); !sent) return {Status::kRetry, sent.error().line(), {}};
     lift_end_ = up->top;
     const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
-    held.load.yaw_in_tip_rad = grasp_.yaw_rad - yaw_of(target_);
+    held.load.yaw_in_tip_rad = yaw_of_tip(grasp_.orientation) - yaw_of(target_);
     cell_.held = held;
     cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     cell_.forget(target_.track);
@@ -322,11 +333,10 @@ class Pick final : public task::Skill {
     verdict_ = std::move(verdict);
     const Time from = Arm::splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-    const double yaw = phase_ == Phase::kFind ? 0 : grasp_.yaw_rad;
     auto up = phase_ == Phase::kFind || phase_ == Phase::kApproach
                   ? motion::stop(state, from, cell_.limits_empty())
-                  : nudge(cell_, state, from, yaw, {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(),
-                          cell_.limits_empty());
+                  : nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
+                          {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
     if (!up) up = motion::stop(state, from, cell_.limits_empty());
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();
@@ -343,6 +353,13 @@ class Pick final : public task::Skill {
 
   static double yaw_of(const ObjectBelief& object) {
     return std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
+  }
+  static std::string name_of(const ObjectBelief& object) {
+    return object.code.empty() ? fmt::format("track {}", object.track) : object.code;
+  }
+  // Of the tip's x axis; leaning with what it grips changes that little.
+  static double yaw_of_tip(const Eigen::Matrix3d& orientation) {
+    return std::atan2(orientation(1, 0), orientation(0, 0));
   }
   // A belief's yaw is known up to half a turn.
   static double wrapped(double angle) { return std::remainder(angle, M_PI); }

@@ -19,11 +19,13 @@ constexpr double kOverRim_m = 0.03;     // between rim and the parcel's undersid
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
 constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
-constexpr double kLoose_m = 0.035;  // a shorter one falls through with its swing
+constexpr double kLoose_m = 0.012;  // a shorter one falls through flat
 constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kWide_m = 0.28;  // a wider one must hang still to fall through the mouth
-constexpr Duration kSwing = std::chrono::milliseconds(140);
+constexpr double kWide_m = 0.28;                             // a wider one must hang still to fall through the mouth
+constexpr Duration kSwing = std::chrono::milliseconds(500);  // at most
+constexpr double kStill_nm = 0.15;                           // the wrist's moment changes by less within
+constexpr int kStillTicks = 6;
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                           // of the load's mass
@@ -125,10 +127,23 @@ class Place final : public task::Skill {
       return {Status::kFailed, "dropped", {{"at_m", {tip.x(), tip.y(), tip.z()}}}};
     }
     const bool wide = cell_.held->load.size_m.head<2>().maxCoeff() > kWide_m;
-    if (now < (wide ? arrives_ + kSwing : arrives_ - kLetGoEarly)) return {};
+    if (now < (wide ? arrives_ : arrives_ - kLetGoEarly)) return {};
+    if (wide && !hangs_still() && now < arrives_ + kSwing) return {};
     cell_.arm.vacuum(false);
+    arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
+  }
+
+  // By the wrist's moment, which swings with the load.
+  bool hangs_still() {
+    const auto& torque = cell_.arm.state().wrist_torque_nm;
+    const Eigen::Vector2d moment(torque[0], torque[1]);
+    if (still_ticks_ == 0 || (moment - still_nm_).norm() > kStill_nm) {
+      still_nm_ = moment;
+      still_ticks_ = 0;
+    }
+    return ++still_ticks_ > kStillTicks;
   }
 
   Progress release(Time now) {
@@ -150,7 +165,8 @@ class Place final : public task::Skill {
   std::string name_, object_;
   Time started_, arrives_;
   Phase phase_ = Phase::kPlan;
-  int lost_ticks_ = 0;
+  Eigen::Vector2d still_nm_ = Eigen::Vector2d::Zero();
+  int lost_ticks_ = 0, still_ticks_ = 0;
   bool cancelled_ = false;
 };
 

@@ -10,18 +10,24 @@ constexpr double kGravity_m_s2 = 9.81;
 constexpr double kSpan_s = 0.15;  // the slowest swing of a load on the bellows
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 
+// What pulls the wrist down.
+double pull_n(Cell& cell) {
+  const link::State& state = cell.arm.state();
+  const Pose world_from_flange =
+      cell.model.world_from_tip(state.position) * cell.world.robot.tool.flange_from_tip.inverse();
+  const auto& force = state.wrist_force_n;
+  return -(world_from_flange.linear() * Vector3(force[0], force[1], force[2])).z();
+}
+
 }  // namespace
 
-double weigh_now(Cell& cell) {
-  // The flange's z points down, so a hanging mass pulls along it.
-  return cell.arm.state().wrist_force_n[2] / kGravity_m_s2 - cell.world.robot.tool.mass_kg;
-}
+double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }
 
 void Scale::add(Cell& cell) {
   const link::State& state = cell.arm.state();
   if (!readings_.empty() && state.stamp.s() <= readings_.back().time_s) return;
   const double speed_m_s = (cell.model.tip_jacobian(state.position) * state.speed)(2);
-  readings_.push_back({state.stamp.s(), state.wrist_force_n[2], speed_m_s});
+  readings_.push_back({state.stamp.s(), pull_n(cell), speed_m_s});
 }
 
 // Of tool and load together, by the trapezoidal rule.

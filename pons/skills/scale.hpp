@@ -12,7 +12,7 @@ namespace pons::skills {
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed.
 class Scale {
  public:
-  // With the tool pointing down. Call once a bridge tick while nothing supports the load.
+  // Call once a bridge tick while nothing supports the load.
   void add(Cell& cell);
   // Mass of the load over the latest readings, kg, tool taken off; nothing until they span a swing and their halves
   // agree: until then something may still bear a part of it.
