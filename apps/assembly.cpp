@@ -12,6 +12,10 @@ brain::Orders orders_of(const world::Manifest& manifest) {
   return orders;
 }
 
+// On a computer shared with others a bridge tick comes late by tens of milliseconds, and so does a simulated body.
+constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
+constexpr Duration kSimulatedSilence = std::chrono::milliseconds(60);
+
 }  // namespace
 
 Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
@@ -32,9 +36,13 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   }
   self->journal = std::move(*journal);
 
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
+  const bool realtime = options.pace == runner::Pace::kRealTime;
+  cerebellum::Settings settings;
+  if (realtime) settings.silence_timeout = kSimulatedSilence;
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), settings, Time{});
   self->perception = std::make_unique<perception::Perception>(self->world, model->copy());
-  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model));
+  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
+                                              realtime ? kRealTimeLead : skills::kSpliceLead);
   skills::add_skills(self->registry, *self->cell);
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);

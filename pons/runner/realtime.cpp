@@ -13,6 +13,9 @@
 namespace pons::runner {
 namespace {
 
+// Below the loop's: it must not wait for either.
+constexpr int kBodyPriority = 60, kBridgePriority = 10;
+
 // The body as the loop's thread sees it: measurements and set-points change hands without either side waiting.
 class ExchangeBody final : public body::Body {
  public:
@@ -43,6 +46,8 @@ struct Shared {
 };
 
 void run_body(Parts& parts, const rt::MonotonicClock& clock, ExchangeBody& exchange, Shared& shared) {
+  // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
+  (void)rt::make_realtime({.period = kControlPeriod, .priority = kBodyPriority});
   body::Sensors sensors;
   rt::PeriodicLoop loop(clock, kControlPeriod);
   loop.run([&](Time now) {
@@ -88,6 +93,7 @@ Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
   {
     std::jthread body_thread([&] { run_body(parts, clock, exchange, shared); });
     std::jthread loop_thread([&] { result.loop = run_loop(parts, clock, exchange, shared); });
+    (void)rt::make_realtime({.period = kBridgePeriod, .priority = kBridgePriority});
     rt::PeriodicLoop loop(clock, kBridgePeriod);
     loop.run([&](Time now) {
       if (auto ticked = parts.bridge_side->tick(now, *parts.crew); !ticked) {

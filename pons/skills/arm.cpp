@@ -5,8 +5,6 @@
 namespace pons::skills {
 namespace {
 
-// Two bridge periods: one for the command to arrive under load, one in reserve.
-constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
 constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
 // A cup below this share of the sealed vacuum lets go.
 constexpr double kOpenShare = 0.4;
@@ -17,8 +15,8 @@ AxisState at_rest(const AxisVector& position) {
 
 }  // namespace
 
-Arm::Arm(link::BridgeEnd& link, const world::World& world)
-    : link_(link), world_(world), rest_(at_rest(world.robot.home)) {}
+Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
+    : link_(link), world_(world), splice_lead_(splice_lead), rest_(at_rest(world.robot.home)) {}
 
 void Arm::refresh(Time now) {
   link_.latest(state_);
@@ -45,8 +43,6 @@ AxisState Arm::planned(Time time) const {
 }
 
 Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().end(); }
-
-Time Arm::splice_time(Time now) { return now + kSpliceLead; }
 
 Time Arm::splice_time(Time now, const AxisLimits& limits) const {
   Time from = splice_time(now);

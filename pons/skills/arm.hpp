@@ -11,10 +11,14 @@
 
 namespace pons::skills {
 
+// From the moment a motion is planned to its begin: two bridge periods, one for the command to arrive, one in reserve.
+inline constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
+
 class Arm {
  public:
-  // Both must outlive it.
-  Arm(link::BridgeEnd& link, const world::World& world);
+  // Both must outlive it. A motion that arrives after its begin is refused and stops the arm, so where ticks may come
+  // late `splice_lead` must be longer than they do.
+  Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead = kSpliceLead);
 
   // Once a bridge tick, before any skill: takes in the newest state and shows the cerebellum that the bridge lives.
   void refresh(Time now);
@@ -26,7 +30,7 @@ class Arm {
   [[nodiscard]] AxisState planned(Time time) const;
   [[nodiscard]] Time motion_end() const;
   // The earliest moment from which a motion may be replaced: the link and the loop need some ticks.
-  [[nodiscard]] static Time splice_time(Time now);
+  [[nodiscard]] Time splice_time(Time now) const { return now + splice_lead_; }
   // The earliest one at which the motion under way already keeps `limits`: a heavy load must not inherit the haste of
   // what came before.
   [[nodiscard]] Time splice_time(Time now, const AxisLimits& limits) const;
@@ -49,6 +53,7 @@ class Arm {
 
   link::BridgeEnd& link_;
   const world::World& world_;
+  Duration splice_lead_;
   link::State state_;
   motion::Trajectory asked_;
   AxisState rest_;  // in force when nothing was asked for since arming

@@ -64,7 +64,7 @@ TEST_F(ArmTest, RestsAtHomeUntilItIsAskedToMove) {
 
 TEST_F(ArmTest, SplicingKeepsThePlanContinuous) {
   hear(Time(kTick), SafetyState::kOperational);
-  const Time begin = Arm::splice_time(Time(kTick));
+  const Time begin = arm_.splice_time(Time(kTick));
   const motion::Trajectory first = way(begin, 0.4);
   ASSERT_TRUE(arm_.stream(first));
   // In full swing it is sent elsewhere, twice.
@@ -72,7 +72,7 @@ TEST_F(ArmTest, SplicingKeepsThePlanContinuous) {
   for (const double by : {-0.3, 0.2}) {
     now += std::chrono::milliseconds(150);
     hear(now, SafetyState::kOperational);
-    const Time splice = Arm::splice_time(now);
+    const Time splice = arm_.splice_time(now);
     EXPECT_GT(arm_.planned(splice).speed.norm(), 0.1);
     ASSERT_TRUE(arm_.stream(way(splice, by)));
   }
@@ -97,7 +97,7 @@ TEST_F(ArmTest, SplicingKeepsThePlanContinuous) {
 TEST_F(ArmTest, OnlyTheFirstPieceOfAMotionSplices) {
   hear(Time(kTick), SafetyState::kOperational);
   (void)received();
-  const motion::Trajectory trajectory = way(Arm::splice_time(Time(kTick)), 0.4);
+  const motion::Trajectory trajectory = way(arm_.splice_time(Time(kTick)), 0.4);
   ASSERT_GT(trajectory.size(), 1U);
   ASSERT_TRUE(arm_.stream(trajectory));
   const auto commands = received();
@@ -113,7 +113,7 @@ TEST_F(ArmTest, OnlyTheFirstPieceOfAMotionSplices) {
 
 TEST_F(ArmTest, RefusesAMotionThatTheLinkCannotTakeWhole) {
   hear(Time(kTick), SafetyState::kOperational);
-  const motion::Trajectory trajectory = way(Arm::splice_time(Time(kTick)), 0.4);
+  const motion::Trajectory trajectory = way(arm_.splice_time(Time(kTick)), 0.4);
   // Nobody takes the heartbeats out.
   while (bridge_.room() >= trajectory.size()) arm_.refresh(Time(kTick));
   const std::size_t room = bridge_.room();
@@ -129,7 +129,7 @@ TEST_F(ArmTest, RefusesAMotionThatTheLinkCannotTakeWhole) {
 
 TEST_F(ArmTest, AfterAStopItPlansFromWhereTheArmCameToRest) {
   hear(Time(kTick), SafetyState::kOperational);
-  ASSERT_TRUE(arm_.stream(way(Arm::splice_time(Time(kTick)), 0.4)));
+  ASSERT_TRUE(arm_.stream(way(arm_.splice_time(Time(kTick)), 0.4)));
   const AxisVector rested = world_.robot.home.array() + 0.1;
   hear(Time(from_s(0.2)), SafetyState::kProtectiveStop, rested);
   EXPECT_FALSE(arm_.operational());
@@ -141,7 +141,7 @@ TEST_F(ArmTest, AfterAStopItPlansFromWhereTheArmCameToRest) {
 
 TEST_F(ArmTest, StopComesToRestWithinTheLimits) {
   hear(Time(kTick), SafetyState::kOperational);
-  const Time begin = Arm::splice_time(Time(kTick));
+  const Time begin = arm_.splice_time(Time(kTick));
   ASSERT_TRUE(arm_.stream(way(begin, 1.5)));
   const Time whole = arm_.motion_end();
   const Time now = begin + std::chrono::milliseconds(250);
@@ -159,12 +159,12 @@ TEST_F(ArmTest, GentlerLimitsWaitUntilTheMotionKeepsThem) {
   hear(Time(kTick), SafetyState::kOperational);
   AxisLimits gentle = world_.robot.limits;
   gentle.acceleration_rad_s2 *= 0.2;
-  EXPECT_EQ(arm_.splice_time(Time(kTick), gentle), Arm::splice_time(Time(kTick))) << "it stands still";
-  const Time begin = Arm::splice_time(Time(kTick));
+  EXPECT_EQ(arm_.splice_time(Time(kTick), gentle), arm_.splice_time(Time(kTick))) << "it stands still";
+  const Time begin = arm_.splice_time(Time(kTick));
   ASSERT_TRUE(arm_.stream(way(begin, 1.5)));
   const Time now = begin + std::chrono::milliseconds(30);
   const Time splice = arm_.splice_time(now, gentle);
-  EXPECT_GT(splice, Arm::splice_time(now));
+  EXPECT_GT(splice, arm_.splice_time(now));
   EXPECT_LT(splice, arm_.motion_end());
   EXPECT_TRUE((arm_.planned(splice).acceleration.cwiseAbs().array() <= gentle.acceleration_rad_s2.array()).all());
 }

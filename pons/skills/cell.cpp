@@ -25,8 +25,11 @@ constexpr double kBeltSmoothing_s = 0.15;
 
 }  // namespace
 
-Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotModel robot)
-    : world(cell_world), arm(link, cell_world), model(robot.copy()), router(cell_world, std::move(robot)) {}
+Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotModel robot, Duration splice_lead)
+    : world(cell_world),
+      arm(link, cell_world, splice_lead),
+      model(robot.copy()),
+      router(cell_world, std::move(robot)) {}
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   arm.refresh(now);

@@ -26,8 +26,8 @@ struct Held {
 
 class Cell {
  public:
-  // `link` and `world` must outlive it.
-  Cell(link::BridgeEnd& link, const world::World& world, model::RobotModel model);
+  // `link` and `world` must outlive it. `splice_lead`: see Arm.
+  Cell(link::BridgeEnd& link, const world::World& world, model::RobotModel model, Duration splice_lead = kSpliceLead);
 
   // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`.
   void refresh(Time now, std::vector<ObjectBelief> objects);

@@ -45,7 +45,7 @@ class MoveTo final : public task::Skill {
   }
 
   Expected<motion::Trajectory> empty(Time now) {
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     const auto q = target(state.position);
     if (!q) return std::unexpected(q.error());

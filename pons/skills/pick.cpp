@@ -107,7 +107,7 @@ class Pick final : public task::Skill {
     for (const ObjectBelief& other : cell_.objects()) {
       if (lies_on(other, *object)) return {Status::kFailed, "covered by " + name_of(other), {}};
     }
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
     if (!grasp) {
       // Out of reach upstream is a matter of waiting; the same beyond is not.
@@ -192,7 +192,7 @@ class Pick final : public task::Skill {
   // The parcel is still too far upstream: hang over the place where it will come within reach.
   Progress wait_for(const ObjectBelief& object, const Grasp& grasp, Time now) {
     if (waiting_) return {};
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     Vector3 point = grasp.contact_point;
     point.x() = cell_.world.belt.pick_x_min_m + 0.02;
@@ -222,7 +222,7 @@ class Pick final : public task::Skill {
     if (object != nullptr && now - planned_ >= kReplanEvery && now + kNoReplanBefore < grasp_.hover) {
       const Vector3 contact = cell_.predict(*object, grasp_.contact);
       if ((contact - grasp_.contact_point).head<2>().norm() > kMoved_m) {
-        const Time from = Arm::splice_time(now);
+        const Time from = cell_.arm.splice_time(now);
         const double turn = yaw_of(*object) - yaw_of(target_);
         auto better = plan_grasp(cell_, cell_.arm.planned(from), from, *object,
                                  Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
@@ -253,7 +253,7 @@ class Pick final : public task::Skill {
   // A parcel that lies askew meets some cups first; pressing on, the bellows give way and the others seal, too.
   bool press_further(Time now) {
     if (weigh_now(cell_) < -kPressedHard_kg) return false;
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
     auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.orientation,
                       kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt, cell_.limits_empty());
@@ -269,7 +269,7 @@ class Pick final : public task::Skill {
   }
 
   Progress begin_lift(Time now) {
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_height());
@@ -331,7 +331,7 @@ class Pick final : public task::Skill {
 
   void begin_retreat(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
-    const Time from = Arm::splice_time(now);
+    const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     auto up = phase_ == Phase::kFind || phase_ == Phase::kApproach
                   ? motion::stop(state, from, cell_.limits_empty())
