@@ -1,10 +1,11 @@
 #include "pons/brain/dispatcher.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
+
+#include "pons/world/view.hpp"
 
 namespace pons::brain {
 namespace {
@@ -13,29 +14,11 @@ constexpr int kFramesToTrust = 3;
 constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
 constexpr int kMostTries = 3;
 
-// Where a camera's downstream edge meets the belt, over its whole width; nothing when it does not look at the belt.
-std::optional<double> view_end_m(const world::CameraSpec& camera, const world::Belt& belt) {
-  const double up = std::tan(camera.fovy_rad / 2);
-  const double side = up * camera.width / camera.height;
-  std::array<double, 4> x_m{};
-  std::size_t corner = 0;
-  for (const double x : {-side, side}) {
-    for (const double y : {-up, up}) {
-      const Vector3 ray = camera.world_from_optical.linear() * Vector3(x, y, 1);
-      const Vector3 eye = camera.world_from_optical.translation();
-      if (ray.z() >= 0 || eye.z() <= belt.surface_z_m) return std::nullopt;
-      x_m[corner++] = eye.x() + ray.x() * (belt.surface_z_m - eye.z()) / ray.z();
-    }
-  }
-  std::sort(x_m.begin(), x_m.end());
-  return x_m[2];  // the nearer of the two downstream corners
-}
-
 double label_view_end_m(const world::World& world) {
   std::optional<double> end;
   for (const world::CameraSpec& camera : world.cameras) {
-    if (camera.watches != "belt" || !camera.reads_labels) continue;
-    if (const auto edge = view_end_m(camera, world.belt)) end = std::max(end.value_or(*edge), *edge);
+    if (!camera.reads_labels) continue;
+    if (const auto seen = world::seen_of_belt(camera, world.belt)) end = std::max(end.value_or(seen->to_m), seen->to_m);
   }
   return end.value_or(world.belt.pick_x_max_m);
 }

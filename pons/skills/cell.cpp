@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pons/skills/grip.hpp"
+#include "pons/world/view.hpp"
 
 namespace pons::skills {
 namespace {
@@ -23,13 +24,22 @@ constexpr double kUnsure_kg = 0.1;              // the scale's
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
 
+double view_end_m(const world::World& world) {
+  double end_m = world.belt.x_start_m;
+  for (const world::CameraSpec& camera : world.cameras) {
+    if (const auto seen = world::seen_of_belt(camera, world.belt)) end_m = std::max(end_m, seen->to_m);
+  }
+  return end_m;
+}
+
 }  // namespace
 
 Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotModel robot, Duration splice_lead)
     : world(cell_world),
       arm(link, cell_world, splice_lead),
       model(robot.copy()),
-      router(cell_world, std::move(robot)) {}
+      router(cell_world, std::move(robot)),
+      view_end_m_(view_end_m(cell_world)) {}
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   arm.refresh(now);

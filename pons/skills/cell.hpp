@@ -24,6 +24,12 @@ struct Held {
   double mass_kg = 0;
 };
 
+// A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.
+struct Miss {
+  std::string code;
+  Time time;
+};
+
 class Cell {
  public:
   // `link` and `world` must outlive it. `splice_lead`: see Arm.
@@ -38,6 +44,9 @@ class Cell {
   // Where that belief will be at `time`, carried on by the belt as it runs and changes speed now.
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
   [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
+
+  // Whether a camera could see it on the belt there.
+  [[nodiscard]] bool in_view(double x_m) const { return x_m < view_end_m_; }
 
   // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
   // has ridden off the end.
@@ -61,10 +70,12 @@ class Cell {
   model::RobotModel model;
   Router router;
   std::optional<Held> held;
+  std::optional<Miss> missed;
 
  private:
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
 
+  double view_end_m_;
   Time now_;
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;

@@ -41,8 +41,10 @@ constexpr double kRoom_m = 0.02;                                     // to the n
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kSetDownRounds = 3;
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
-constexpr double kWaitOver_m = 0.06;                               // the others, which pass below
-constexpr double kWait_m = 0.15;  // over the parcels, where the arm waits for one to come
+constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
+constexpr double kAside_m = 0.30;     // over the belt
+constexpr double kWaitOver_m = 0.06;  // the others, which pass below
+constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
  public:
@@ -53,7 +55,10 @@ class Pick final : public task::Skill {
       stopped_ = true;
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
-    if (stopped_) return {Status::kRetry, "the arm was stopped", {}};
+    if (stopped_) {
+      cell_.missed = Miss{code_, now};
+      return {Status::kRetry, "the arm was stopped", {}};
+    }
     switch (phase_) {
       case Phase::kFind:
         return find(now);
@@ -93,6 +98,7 @@ class Pick final : public task::Skill {
     }
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
+      step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
       return {Status::kFailed, "lost from sight", {}};
     }
@@ -103,6 +109,10 @@ class Pick final : public task::Skill {
     }
     if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
       return {Status::kException, "rode past the pick zone", {}};
+    }
+    if (must_look_again(*object, now)) {
+      step_aside(now);
+      return {};
     }
     for (const ObjectBelief& other : cell_.objects()) {
       if (lies_on(other, *object)) return {Status::kFailed, "covered by " + name_of(other), {}};
@@ -120,6 +130,33 @@ class Pick final : public task::Skill {
       return {Status::kException, "would ride past the pick zone", {}};
     }
     return start(*grasp, *object, now);
+  }
+
+  // After a miss the parcel may have been pushed, and the arm hides it: until a camera has seen it again, its place is
+  // a memory.
+  bool must_look_again(const ObjectBelief& object, Time now) {
+    if (!cell_.missed || cell_.missed->code != code_) return false;
+    const bool seen = object.last_seen > cell_.missed->time + kLookAgain / 3;
+    const bool pointless = !cell_.in_view(object.world_from_top.translation().x());
+    if (!seen && !pointless && now - cell_.missed->time < kLookAgain) return true;
+    cell_.missed.reset();
+    return false;
+  }
+
+  // Out of the cameras' view, downstream.
+  void step_aside(Time now) {
+    if (aside_) return;
+    const world::Belt& belt = cell_.world.belt;
+    const Time from = cell_.arm.splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+    const Pose tip = cell_.model.world_from_tip(state.position);
+    const Vector3 point(belt.pick_x_max_m, belt.y_center_m,
+                        std::max(tip.translation().z(), belt.surface_z_m + kAside_m));
+    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of_tip(tip.linear())), state.position);
+    if (!q) return;
+    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
+                                        cell_.limits_empty());
+    if (way && cell_.arm.stream(*way)) aside_ = true;
   }
 
   // What cannot be sorted, or what an earlier task left on the cups, goes back on the belt where there is room, and
@@ -245,6 +282,7 @@ class Pick final : public task::Skill {
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       cell_.arm.vacuum(false);
+      cell_.missed = Miss{code_, now};
       begin_retreat(now, {Status::kRetry, fmt::format("{} of {} cups sealed", cell_.arm.sealed_cups(), all), {}});
     }
     return {};
@@ -375,7 +413,7 @@ class Pick final : public task::Skill {
   Progress verdict_;
   std::string last_error_;
   int sealed_ticks_ = 0, presses_ = 0;
-  bool waiting_ = false, stopped_ = false, cancelled_ = false;
+  bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
 };
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "pons/world/view.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -19,7 +21,7 @@ constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
 constexpr double kSwing_rad = 0.06;       // how far a load may swing out of level
 constexpr double kUnseenHeight_m = 0.20;  // of what may come along the belt
-constexpr double kUnseenLength_m = 0.30;  // of which so much is in view before it is believed
+constexpr double kUnseenFor_s = 0.3;      // from when the cameras could see it whole until it is believed
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
 // Points of tool or load that come lowest.
@@ -40,20 +42,20 @@ std::vector<Vector3> probes(const Load* load) {
   return points;
 }
 
-// How far along the belt the cameras that watch it have not seen everything.
+// Upstream of it something may lie on the belt that no camera has shown whole yet.
 double unseen_end_m(const world::World& world) {
   double end_m = world.belt.x_start_m;
   for (const world::CameraSpec& camera : world.cameras) {
-    if (camera.watches != "belt") continue;
-    // The left edge of a picture whose x axis lies along the belt; of others the belt's start remains.
-    const double side = std::tan(camera.fovy_rad / 2) * camera.width / camera.height;
-    const Vector3 ray = camera.world_from_optical.linear() * Vector3(-side, 0, 1);
-    const Vector3 eye = camera.world_from_optical.translation();
-    if (ray.z() >= 0) continue;
-    const double edge_m = eye.x() + ray.x() * (world.belt.surface_z_m - eye.z()) / ray.z();
-    end_m = std::max(end_m, std::min(edge_m, eye.x()) + kUnseenLength_m);
+    const auto seen = world::seen_of_belt(camera, world.belt);
+    if (seen) end_m = std::max(end_m, seen->from_m + world.rules.max_size_m + kUnseenFor_s * world.belt.speed_m_s);
   }
   return end_m;
+}
+
+double highest_m(const ObjectBelief& object) {
+  const Eigen::Matrix3d& axes = object.world_from_top.linear();
+  return object.world_from_top.translation().z() + 0.5 * std::abs(axes(2, 0)) * object.size_m.x() +
+         0.5 * std::abs(axes(2, 1)) * object.size_m.y();
 }
 
 double rims_z_m(const world::World& world) {
@@ -88,7 +90,11 @@ double Router::floor_z(double x, double y, Time time, Time begin, double grow_m,
     const Vector3 off = object.world_from_top.linear().transpose() * Vector3(x - middle.x(), y - middle.y(), 0);
     const bool over =
         std::abs(off.x()) < 0.5 * object.size_m.x() + grow_m && std::abs(off.y()) < 0.5 * object.size_m.y() + grow_m;
-    if (over) floor = std::max(floor, middle.z() + kObjectMargin_m);
+    if (!over) continue;
+    // The top's own height there: one that leans is higher on one side.
+    const Vector3 up = object.world_from_top.linear().col(2);
+    const double rise = -(up.x() * (x - middle.x()) + up.y() * (y - middle.y())) / up.z();
+    floor = std::max(floor, middle.z() + rise + kObjectMargin_m);
   }
   return floor;
 }
@@ -141,7 +147,7 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   const double end_z = model_.world_from_tip(end.position).translation().z();
   double lowest = world_.belt.surface_z_m + kBeltMargin_m + kUnseenHeight_m + depth;
   for (const ObjectBelief& object : obstacles) {
-    lowest = std::max(lowest, object.world_from_top.translation().z() + kObjectMargin_m + depth);
+    lowest = std::max(lowest, highest_m(object) + kObjectMargin_m + depth);
   }
   Error reason{"no clear way", "route", "the cell is too crowded or the end is out of reach"};
   for (const double extra : {0.02, 0.07, 0.14}) {
