@@ -243,5 +243,39 @@ TEST(Sample, HoldsBeforeAndAfter) {
   EXPECT_EQ(after.acceleration[0], 0);
 }
 
+// Vias that leave an axis where it is while it moves: the hardest to wait for.
+TEST(MoveThrough, SeamsMeetFromAnyMovingStart) {
+  const Eigen::Index axes = 6;
+  AxisLimits limits;
+  limits.position_max = AxisVector::Constant(axes, 6.28);
+  limits.position_min = -limits.position_max;
+  limits.speed_rad_s = AxisVector::Constant(axes, 3.0);
+  limits.acceleration_rad_s2 = AxisVector::Constant(axes, 19);
+  limits.jerk_rad_s3 = AxisVector::Constant(axes, 390);
+  Random random(1);
+  for (int run = 0; run < 2000; ++run) {
+    AxisState start{AxisVector(axes), AxisVector(axes), AxisVector(axes)};
+    AxisVector via(axes), end(axes), end_speed(axes);
+    for (Eigen::Index i = 0; i < axes; ++i) {
+      start.position[i] = random.uniform(-2, 2);
+      start.speed[i] = random.uniform(-1, 1);
+      start.acceleration[i] = random.uniform(-18, 18);
+      via[i] = start.position[i] + (random.uniform() < 0.5 ? 0.0 : random.uniform(-0.3, 0.3));
+      end[i] = start.position[i] + random.uniform(-1.5, 1.5);
+      end_speed[i] = random.uniform(-0.5, 0.5);
+    }
+    const auto way = move_through(start, Time(from_s(300)), std::vector{via}, {end, end_speed}, limits);
+    ASSERT_TRUE(way) << "run " << run << ": " << way.error().line();
+    AxisState before = start, after = start;
+    for (std::size_t k = 0; k + 1 < way->size(); ++k) {
+      pons::sample((*way)[k], (*way)[k].end(), before);
+      pons::sample((*way)[k + 1], (*way)[k + 1].start, after);
+      ASSERT_LT((before.position - after.position).cwiseAbs().maxCoeff(), 1e-6) << "run " << run << ", seam " << k;
+      ASSERT_LT((before.speed - after.speed).cwiseAbs().maxCoeff(), 1e-5) << "run " << run << ", seam " << k;
+    }
+    ASSERT_LE(limit_use(*way, limits).worst(), 1 + 1e-6) << "run " << run;
+  }
+}
+
 }  // namespace
 }  // namespace pons::motion

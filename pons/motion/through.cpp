@@ -12,6 +12,9 @@
 namespace pons::motion {
 namespace {
 
+constexpr double kEndPosition = 1e-7;  // rad
+constexpr double kEndSpeed = 1e-6;     // rad/s
+
 constexpr int kSweeps = 7;
 constexpr double kFirstStep = 0.3;  // of the limit
 constexpr double kScales[] = {0, 0.5, 1, 1.5, 2, 3};
@@ -184,19 +187,42 @@ class Search {
   std::vector<Times> times_;    // each piece's and axis' fastest duration
 };
 
+// Among the durations in which a piece with acceleration at both ends seems possible there are a few in which it is
+// not: what counts is that each axis ends where it should.
+bool arrives(const Piece& piece, std::span<const AxisProfile> profiles) {
+  for (std::size_t i = 0; i < piece.count; ++i) {
+    const AxisPoint& end = profiles[i].end();
+    const AxisPoint& to = piece.axes[i].to;
+    if (std::abs(end.position - to.position) > kEndPosition || std::abs(end.speed - to.speed) > kEndSpeed) return false;
+  }
+  return true;
+}
+
+// The piece's duration, the shortest of a few in which every axis arrives.
+Expected<double> plan_longer(const Piece& piece, const AxisLimits& limits, std::span<AxisProfile> profiles) {
+  const double shortest_s = common_duration_s(piece);
+  Expected<void> planned =
+      fail("no motion of acceptable length found", "motion", "choose another start, via point or end");
+  for (const double stretch : {1.0, 1.02, 1.06, 1.15, 1.4}) {
+    const double duration_s = to_s(ceil_ns(stretch * shortest_s));
+    if (!std::isfinite(shortest_s)) break;
+    auto ok = plan(piece, duration_s, limits, profiles);
+    if (ok && arrives(piece, profiles)) return duration_s;
+    if (!ok) planned = std::move(ok);
+  }
+  return std::unexpected(planned.error());
+}
+
 Expected<Trajectory> assemble(const Search& search, Time at, const AxisLimits& limits) {
   Trajectory trajectory;
   std::array<AxisProfile, kMaxAxes> profiles;
   for (std::size_t k = 0; k < search.pieces(); ++k) {
     const Piece piece = search.piece(k);
-    const double duration_s = common_duration_s(piece);
-    if (!std::isfinite(duration_s)) {
-      return fail("no motion of acceptable length found", "motion", "choose another start, via point or end");
-    }
     const std::span<AxisProfile> used(profiles.data(), piece.count);
-    if (auto ok = plan(piece, duration_s, limits, used); !ok) return std::unexpected(ok.error());
-    append(used, at, ceil_ns(duration_s), trajectory);
-    at += ceil_ns(duration_s);
+    const auto duration_s = plan_longer(piece, limits, used);
+    if (!duration_s) return std::unexpected(duration_s.error());
+    append(used, at, ceil_ns(*duration_s), trajectory);
+    at += ceil_ns(*duration_s);
   }
   if (trajectory.empty()) append(std::span(profiles.data(), search.piece(0).count), at, Duration{1}, trajectory);
   return trajectory;

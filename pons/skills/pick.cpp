@@ -40,6 +40,8 @@ constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kSetDownRounds = 3;
+constexpr double kUnweighable = 2.0;  // times the mass limit
+constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kAside_m = 0.30;     // over the belt
@@ -351,13 +353,14 @@ class Pick final : public task::Skill {
     if (height < kLifted_m) return {};
     scale_.add(cell_);
     const std::optional<double> weighed = scale_.mass_kg(cell_);
-    const bool at_rest = now >= lift_end_ + kWeighAtRest;
+    const bool at_rest = now >= lift_end_ + (weighed ? kWeighAtRest : kWeighAtMost);
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && *weighed > (1 - kNearLimit) * limit;
     if ((!weighed || heavy) && !at_rest) return {};
     if (target_.crowded && now < lift_end_) return {};
-    const double mass = weighed.value_or(limit);
+    // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
+    const double mass = weighed.value_or(kUnweighable * limit);
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
