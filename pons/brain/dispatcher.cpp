@@ -13,6 +13,7 @@ namespace {
 constexpr int kFramesToTrust = 3;
 constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
 constexpr int kMostTries = 3;
+constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
 
 double label_view_end_m(const world::World& world) {
   std::optional<double> end;
@@ -86,6 +87,11 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   }
   if (too_large(belief)) return ride(belief, kRideTooLarge, decisions);
   if (!in_reach) return ride(belief, kRideLate, decisions);
+  if (known.failed) {
+    // What was in its way may have gone by then; meanwhile the arm takes another.
+    if (!known.seen_again) known.seen_again = now;
+    if (now - *known.seen_again < kAskAgainAfter) return;
+  }
   if (is_covered(belief, all)) {
     // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare.
     if (x_m < label_view_end_m_) return;
@@ -94,6 +100,7 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   decided_.insert(belief.track);
   known.track = belief.track;
   known.failed = false;
+  known.seen_again.reset();
   ++known.tries;
   decisions.tasks.push_back(task_for(belief, order->second, known.tries, now));
   asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -71,6 +72,7 @@ class Dispatcher {
     bool sorted = false;      // one of them succeeded: whoever else shows the code is a copy
     bool rode = false;        // it was let go by
     bool failed = false;      // the last one failed, and the parcel may turn up again
+    std::optional<Time> seen_again;
   };
 
   void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);

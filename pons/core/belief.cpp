@@ -7,17 +7,18 @@ namespace {
 
 constexpr double kSure = 0.5;        // of the confidence: below it something hides a part of the object
 constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
+constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
 constexpr double kUpright = 0.9986;  // cosine of 3 degrees
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
 
 // Two rectangles are apart when they are along a side of one of them.
-bool overlap(const ObjectBelief& a, const ObjectBelief& b) {
+bool overlap(const ObjectBelief& a, const ObjectBelief& b, double least_m) {
   const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
   for (const ObjectBelief* one : {&a, &b}) {
     for (const Eigen::Index side : {0, 1}) {
       const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
-      double reach_m = -kOverlap_m;
+      double reach_m = -least_m;
       for (const ObjectBelief* each : {&a, &b}) {
         for (const Eigen::Index s : {0, 1}) {
           reach_m += 0.5 * each->size_m[s] * std::abs(along.dot(each->world_from_top.linear().col(s).head<2>()));
@@ -32,11 +33,13 @@ bool overlap(const ObjectBelief& a, const ObjectBelief& b) {
 }  // namespace
 
 bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
-  if (upper.track == lower.track || !overlap(upper, lower)) return false;
+  if (upper.track == lower.track) return false;
+  const bool is_hidden = lower.confidence < kSure;
+  if (!overlap(upper, lower, leans(upper) && is_hidden ? -kHidden_m : kOverlap_m)) return false;
   // What leans lies on what stands, however high. Else the lower one must look hidden, too: neighbours that only touch
   // seem to overlap when one was measured too large.
   if (leans(upper) != leans(lower)) return leans(upper);
-  return lower.confidence < kSure && upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
+  return is_hidden && upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
 }
 
 }  // namespace pons

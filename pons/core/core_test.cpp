@@ -84,5 +84,14 @@ TEST(Belief, WhatLeansLiesOnWhatStandsHoweverHigh) {
   EXPECT_FALSE(lies_on(lower, upper));
 }
 
+TEST(Belief, AHiddenOneMayGoOnUnderWhatLeansOnIt) {
+  ObjectBelief lower = box(1, 0, 0, 0.2);
+  ObjectBelief upper = box(2, 0.31, 0, 0.1);
+  upper.world_from_top.rotate(Eigen::AngleAxisd(-0.2, Vector3::UnitY()));
+  EXPECT_FALSE(lies_on(upper, lower));
+  lower.confidence = 0.3;
+  EXPECT_TRUE(lies_on(upper, lower));
+}
+
 }  // namespace
 }  // namespace pons

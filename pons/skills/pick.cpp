@@ -23,6 +23,7 @@ constexpr int kPresses = 2;
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
+constexpr Duration kBlockedFor = std::chrono::milliseconds(600);
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;      // a prediction off by more is worth a new plan
 constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
@@ -122,10 +123,11 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
     if (!grasp) {
-      // Out of reach upstream is a matter of waiting; the same beyond is not.
-      if (object->world_from_top.translation().x() < 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m)) return {};
+      // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
+      if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       last_error_ = grasp.error().line();
-      return now - started_ < std::chrono::seconds(2) ? Progress{} : Progress{Status::kRetry, last_error_, {}};
+      if (!blocked_since_) blocked_since_ = now;
+      return now - *blocked_since_ < kBlockedFor ? Progress{} : Progress{Status::kFailed, last_error_, {}};
     }
     if (grasp->contact_point.x() < belt.pick_x_min_m) return wait_for(*object, *grasp, now);
     if (grasp->contact_point.x() > belt.pick_x_max_m) {
@@ -414,6 +416,7 @@ class Pick final : public task::Skill {
   Vector3 lift_from_ = Vector3::Zero();
   Scale scale_;
   Progress verdict_;
+  std::optional<Time> blocked_since_;
   std::string last_error_;
   int sealed_ticks_ = 0, presses_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
