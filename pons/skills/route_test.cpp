@@ -172,6 +172,7 @@ TEST_F(RouteTest, WhatLeansIsAsHighAsItsUpperEdge) {
     ASSERT_LT(rise_over(*direct, leaning), 0) << "the direct way must be blocked";
     const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{leaning}, limits_);
     expect_leads(way, from, to);
+    ASSERT_TRUE(way);
     EXPECT_GT(rise_over(*way, leaning), 0.01);
   }
 }
@@ -182,6 +183,7 @@ TEST_F(RouteTest, AWayIsFoundOverTheHighEdgeOfWhatLeansSteeply) {
   steep.world_from_top.rotate(Eigen::AngleAxisd(0.7, Vector3::UnitY()));
   const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{steep}, limits_);
   expect_leads(way, from, to);
+  ASSERT_TRUE(way);
   EXPECT_GT(rise_over(*way, steep), 0.01);
 }
 
@@ -219,6 +221,7 @@ TEST_F(RouteTest, UpstreamOfWhatTheCamerasHaveSeenALoadStaysHighOverTheBelt) {
     if (lowest(*direct) < 0.2) ++low;
     const auto way = router_.route(rest(from), kBegin, halt(to), &load, {}, limits_);
     expect_leads(way, from, to);
+    ASSERT_TRUE(way);
     EXPECT_GE(lowest(*way), 0.2) << "from " << from_z_m;
     EXPECT_LT(lowest(*way), 1) << "it must pass there";
   }
