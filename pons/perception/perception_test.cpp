@@ -116,6 +116,63 @@ TEST(PerceptionTest, SeesTheUpperOfTwoOverlappingThingsWhole) {
   EXPECT_TRUE(lower.crowded);
 }
 
+// Colour and outline take them for one box; only the labels say that they are two.
+TEST(PerceptionTest, TellsFlushBoxesOfOneColourApartByTheirLabels) {
+  for (const double split_m : {-0.1, 0.0, 0.06}) {
+    Eyes eyes;
+    const Vector3 left(0.2 + split_m, 0.16, 0.1), right(0.2 - split_m, 0.16, 0.104);
+    eyes.belt.things = {{.x_m = -1.0 + 0.5 * left.x(), .size_m = left, .code = "P000001"},
+                        {.x_m = -1.0 + left.x() + 0.5 * right.x(), .size_m = right, .code = "P000002"}};
+    eyes.belt.watch(eyes.perception, 2);
+    ASSERT_EQ(eyes.beliefs().size(), 1u) << "told apart without labels, this shows nothing";
+    for (int i = 0; i < 2; ++i) {
+      eyes.belt.wait(0.2);
+      eyes.belt.show(eyes.perception, "label");
+      eyes.belt.watch(eyes.perception, 2);
+    }
+    const auto beliefs = eyes.beliefs();
+    EXPECT_EQ(beliefs.size(), 2u);
+    for (const Thing& thing : eyes.belt.things) {
+      const ObjectBelief* const belief = eyes.at(thing, beliefs);
+      ASSERT_NE(belief, nullptr) << thing.code << " of " << thing.size_m.x() << " m";
+      EXPECT_EQ(belief->code, thing.code);
+      const bool along = thing.size_m.x() > thing.size_m.y();
+      EXPECT_NEAR(along ? belief->size_m.x() : belief->size_m.y(), thing.size_m.x(), 0.01);
+      EXPECT_NEAR(along ? belief->size_m.y() : belief->size_m.x(), thing.size_m.y(), 0.01);
+      EXPECT_NEAR(belief->size_m.z(), thing.size_m.z(), 0.004);
+      EXPECT_TRUE(belief->crowded);
+    }
+  }
+}
+
+// Cut across, a narrow one meets the border with a small share of its outline only.
+TEST(PerceptionTest, BelievesInANarrowTubeOnlyOnceItIsWhole) {
+  Eyes eyes;
+  const double length_m = 0.36;
+  eyes.belt.things = {{.solid = Solid::kTube, .x_m = -1.35, .y_m = 0.05, .size_m = {length_m, 0.04, 0.04}}};
+  const world::CameraSpec& camera = eyes.belt.world.cameras[0];
+  int cut_nearly_whole = 0, whole = 0;
+  for (int i = 0; i < 40; ++i) {
+    eyes.belt.wait(0.06);
+    eyes.belt.show(eyes.perception, "overhead");
+    const Vector3 top = eyes.belt.things[0].top(eyes.belt.travel_m);
+    const double half_seen_m = std::tan(0.5 * camera.fovy_rad) * camera.width / camera.height *
+                               (camera.world_from_optical.translation().z() - top.z());
+    const double inside_m = top.x() - 0.5 * length_m - (camera.world_from_optical.translation().x() - half_seen_m);
+    const auto beliefs = eyes.beliefs();
+    if (inside_m < -0.005) {
+      ASSERT_TRUE(beliefs.empty()) << 1e3 * inside_m << " mm inside, taken for " << beliefs[0].size_m.x() << " m long";
+      if (inside_m > -0.1) ++cut_nearly_whole;
+    } else if (inside_m > 0.02) {
+      ASSERT_EQ(beliefs.size(), 1u) << 1e3 * inside_m << " mm inside";
+      EXPECT_NEAR(beliefs[0].size_m.x(), length_m, 0.01);
+      ++whole;
+    }
+  }
+  EXPECT_GE(cut_nearly_whole, 5);
+  EXPECT_GE(whole, 5);
+}
+
 TEST(PerceptionTest, MeasuresATubeOnItsRidge) {
   Eyes eyes;
   eyes.belt.things = {{.solid = Solid::kTube, .x_m = -0.8, .y_m = 0.05, .yaw_rad = 0.6, .size_m = {0.3, 0.08, 0.08}}};

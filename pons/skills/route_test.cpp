@@ -10,6 +10,8 @@
 #include <numbers>
 #include <optional>
 
+#include "pons/world/view.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -61,6 +63,24 @@ class RouteTest : public ::testing::Test {
           const Vector3 off = (low - top).cwiseAbs();
           if (off.x() > 0.5 * object.size_m.x() || off.y() > 0.5 * object.size_m.y()) continue;
           least = std::min(least.value_or(std::numeric_limits<double>::infinity()), low.z() - top.z());
+        }
+    }
+    return least;
+  }
+
+  // Likewise of the tool over the plane of a top that leans, wherever straight below the tool there is top.
+  double rise_over(const motion::Trajectory& way, const ObjectBelief& object) {
+    double least = std::numeric_limits<double>::infinity();
+    const Vector3 up = object.world_from_top.linear().col(2);
+    for (Time time = way.front().start; time <= way.back().end(); time += std::chrono::milliseconds(4)) {
+      const Pose world_from_tip = model_.world_from_tip(motion::sample(way, time, model_.axes()).position);
+      for (const double x : {-0.5, 0.5})
+        for (const double y : {-0.5, 0.5}) {
+          const Vector3 low = world_from_tip * Vector3(x * kToolSide_m, y * kToolSide_m, 0);
+          const double height_m = up.dot(low - object.world_from_top.translation()) / up.z();
+          const Vector3 off = object.world_from_top.inverse() * Vector3(low - height_m * Vector3::UnitZ());
+          if (std::abs(off.x()) > 0.5 * object.size_m.x() || std::abs(off.y()) > 0.5 * object.size_m.y()) continue;
+          least = std::min(least, height_m);
         }
     }
     return least;
@@ -135,6 +155,77 @@ TEST_F(RouteTest, WhatHangsOnTheCupsPassesHigher) {
   const auto way = router_.route(rest(from), kBegin, halt(to), &load, obstacles, limits_);
   expect_leads(way, from, to);
   EXPECT_GT(clearance(*way, obstacles[0], 0.16, load.size_m.z()).value(), 0.01);
+}
+
+// Its middle is low enough to pass over directly, its upper edge is not.
+TEST_F(RouteTest, WhatLeansIsAsHighAsItsUpperEdge) {
+  const AxisVector from = over(-0.35, 0, 1.09), to = over(0.4, 0, 1.09);
+  const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+  ASSERT_TRUE(direct);
+  const ObjectBelief level = parcel(0.02, {0.3, 0.2, 0.15});
+  const auto over_level = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{level}, limits_);
+  expect_leads(over_level, from, to);
+  ASSERT_EQ(over_level->back().end(), direct->back().end()) << "level it is no obstacle";
+  for (const double lean_rad : {-0.35, 0.35}) {
+    ObjectBelief leaning = level;
+    leaning.world_from_top.rotate(Eigen::AngleAxisd(lean_rad, Vector3::UnitY()));
+    ASSERT_LT(rise_over(*direct, leaning), 0) << "the direct way must be blocked";
+    const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{leaning}, limits_);
+    expect_leads(way, from, to);
+    ASSERT_TRUE(way);
+    EXPECT_GT(rise_over(*way, leaning), 0.01);
+  }
+}
+
+TEST_F(RouteTest, AWayIsFoundOverTheHighEdgeOfWhatLeansSteeply) {
+  const AxisVector from = over(-0.35, 0, 1.1), to = over(0.4, 0, 1.1);
+  ObjectBelief steep = parcel(0.02, {0.4, 0.2, 0.16});
+  steep.world_from_top.rotate(Eigen::AngleAxisd(0.7, Vector3::UnitY()));
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{steep}, limits_);
+  expect_leads(way, from, to);
+  ASSERT_TRUE(way);
+  EXPECT_GT(rise_over(*way, steep), 0.01);
+}
+
+// What comes along the belt where no camera has shown it whole yet may be 0.2 m high.
+TEST_F(RouteTest, UpstreamOfWhatTheCamerasHaveSeenALoadStaysHighOverTheBelt) {
+  double unseen_end_m = world_.belt.x_start_m;
+  for (const world::CameraSpec& camera : world_.cameras) {
+    const auto seen = world::seen_of_belt(camera, world_.belt);
+    if (seen) unseen_end_m = std::max(unseen_end_m, seen->from_m + world_.rules.max_size_m);
+  }
+  ASSERT_GT(unseen_end_m, world_.belt.x_start_m + 0.2);
+  const world::Place* chute = world_.place("chute_6");
+  ASSERT_NE(chute, nullptr);
+  const Load load{.size_m = {0.2, 0.15, 0.1}};
+  // The lowest that any of the load's bottom corners comes over the belt up there.
+  const auto lowest = [&](const motion::Trajectory& way) {
+    double height_m = std::numeric_limits<double>::infinity();
+    for (Time time = way.front().start; time <= way.back().end(); time += std::chrono::milliseconds(4)) {
+      const Pose world_from_tip = model_.world_from_tip(motion::sample(way, time, model_.axes()).position);
+      for (const double x : {-0.5, 0.5})
+        for (const double y : {-0.5, 0.5}) {
+          const Vector3 low = world_from_tip * Vector3(x * load.size_m.x(), y * load.size_m.y(), load.size_m.z());
+          const bool over_belt = std::abs(low.y() - world_.belt.y_center_m) < 0.5 * world_.belt.width_m;
+          if (over_belt && low.x() < unseen_end_m) height_m = std::min(height_m, low.z() - world_.belt.surface_z_m);
+        }
+    }
+    return height_m;
+  };
+  const AxisVector to = over(chute->center_m.x(), chute->center_m.y(), 1.0);
+  int low = 0;
+  for (double from_z_m = 1.05; from_z_m < 1.3; from_z_m += 0.01) {
+    const AxisVector from = over(-0.55, 0.1, from_z_m);
+    const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+    ASSERT_TRUE(direct);
+    if (lowest(*direct) < 0.2) ++low;
+    const auto way = router_.route(rest(from), kBegin, halt(to), &load, {}, limits_);
+    expect_leads(way, from, to);
+    ASSERT_TRUE(way);
+    EXPECT_GE(lowest(*way), 0.2) << "from " << from_z_m;
+    EXPECT_LT(lowest(*way), 1) << "it must pass there";
+  }
+  EXPECT_GE(low, 5) << "direct ways must pass low there";
 }
 
 TEST_F(RouteTest, OverRimsAndBeltOnTheWayToAChute) {

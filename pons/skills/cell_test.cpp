@@ -1,0 +1,97 @@
+#include "pons/skills/cell.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "pons/skills/grip.hpp"
+
+namespace pons::skills {
+namespace {
+
+constexpr double kReserve = 0.35;  // of the cups' hold, the most that a planned carry may use up
+
+class CarryTest : public ::testing::Test {
+ protected:
+  static world::World load() {
+    auto world = world::load("worlds", "parcel_cell");
+    EXPECT_TRUE(world) << world.error().line();
+    return std::move(*world);
+  }
+
+  void SetUp() override {
+    // At rest so high over the belt that every way is clear: only the load tells them apart.
+    const auto from = cell_.model.inverse(Cell::tip_down({0.1, 0, 1.35}, 0), world_.robot.home);
+    ASSERT_TRUE(from) << from.error().line();
+    const AxisVector still = AxisVector::Zero(from->size());
+    link::State state;
+    state.safety = link::SafetyState::kOperational;
+    state.epoch = 1;
+    state.commanded = {*from, still, still};
+    state.position = *from, state.speed = still;
+    cerebellum_.publish(state);
+    cell_.refresh(now_, {});
+  }
+
+  Expected<AxisVector> goal(const AxisVector& from) {
+    return cell_.model.inverse(Cell::tip_down({-0.2, 0.46, 1.3}, 0), from);
+  }
+  motion::Trajectory carry(const Vector3& size_m, double mass_kg) {
+    cell_.held = Held{"P000001", {.size_m = size_m}, mass_kg};
+    auto way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); });
+    EXPECT_TRUE(way) << way.error().line();
+    return way.value_or(motion::Trajectory{});
+  }
+  double use(const motion::Trajectory& way) {
+    return grip_use(cell_.model, world_.robot.tool, cell_.held->load, cell_.held->mass_kg, way);
+  }
+  static double duration_s(const motion::Trajectory& way) { return to_s(way.back().end() - way.front().start); }
+
+  const Time now_ = Time(from_s(4));
+  const world::World world_ = load();
+  const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
+  link::BridgeEnd bridge_{*link_};
+  link::CerebellumEnd cerebellum_{*link_};
+  Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
+};
+
+TEST_F(CarryTest, WhatIsHeavyAndTallGoesSlowerThanWhatIsLightAndFlat) {
+  const motion::Trajectory light = carry({0.2, 0.15, 0.02}, 0.2);
+  EXPECT_LE(use(light), kReserve);
+  const double light_s = duration_s(light);
+  for (const double mass_kg : {2.0, 3.5}) {
+    const motion::Trajectory heavy = carry({0.2, 0.2, 0.3}, mass_kg);
+    // The light one's haste would take the heavy one off the cups.
+    EXPECT_GT(use(light), 1.5 * kReserve);
+    EXPECT_LE(use(heavy), kReserve) << mass_kg << " kg";
+    EXPECT_GT(duration_s(heavy), 1.15 * light_s) << mass_kg << " kg";
+    // It does not crawl either: no carry is slower than the cups ask for.
+    EXPECT_GT(use(heavy), 0.7 * kReserve) << mass_kg << " kg";
+  }
+}
+
+TEST_F(CarryTest, AsHighOrAsHeavyAloneAlreadySlowsItDown) {
+  const double base_s = duration_s(carry({0.2, 0.2, 0.05}, 1.5));
+  EXPECT_GT(duration_s(carry({0.2, 0.2, 0.3}, 1.5)), 1.05 * base_s);
+  EXPECT_GT(duration_s(carry({0.2, 0.2, 0.05}, 3.4)), 1.05 * base_s);
+}
+
+TEST_F(CarryTest, EndsAtRestAtTheGoalWithinTheLimits) {
+  const motion::Trajectory way = carry({0.2, 0.2, 0.3}, 3);
+  const AxisVector end = goal(motion::sample(way, way.front().start, cell_.model.axes()).position).value();
+  const AxisState last = motion::sample(way, way.back().end(), cell_.model.axes());
+  EXPECT_TRUE(last.position.isApprox(end, 1e-7));
+  EXPECT_TRUE(last.speed.isZero(1e-7));
+  EXPECT_LE(motion::limit_use(way, world_.robot.limits).worst(), 1.0);
+}
+
+TEST_F(CarryTest, AGoalOutOfReachIsNamed) {
+  cell_.held = Held{"P000001", {.size_m = {0.2, 0.2, 0.1}}, 1};
+  const auto way = cell_.carry(
+      now_, [this](const AxisVector& from) { return cell_.model.inverse(Cell::tip_down({3, 0, 1.2}, 0), from); });
+  ASSERT_FALSE(way);
+  EXPECT_FALSE(way.error().what.empty());
+}
+
+}  // namespace
+}  // namespace pons::skills

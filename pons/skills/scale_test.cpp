@@ -1,0 +1,168 @@
+#include "pons/skills/scale.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace pons::skills {
+namespace {
+
+constexpr Duration kTick = std::chrono::milliseconds(10);
+constexpr double kGravity_m_s2 = 9.81;
+constexpr double kSpan_s = 0.15;
+// Four bellows side by side; and as if their folds did not rub.
+constexpr double kStiffness_n_m = 4 * 3000, kDamping_n_s_m = 4 * 25, kHardlyDamped_n_s_m = 4 * 5;
+
+// A load below the cups on a damped spring; the flange moves up and down as it is told. Semi-implicit Euler.
+class SwingingLoad {
+ public:
+  // At rest under a spring that bears `share` of its weight.
+  SwingingLoad(double mass_kg, double share, double damping_n_s_m)
+      : mass_kg_(mass_kg), damping_n_s_m_(damping_n_s_m), sag_m_(share * mass_kg * kGravity_m_s2 / kStiffness_n_m) {}
+  [[nodiscard]] double pull_n() const { return kStiffness_n_m * sag_m_ + damping_n_s_m_ * sinking_m_s_; }
+  // `borne` of its weight rests on a neighbour.
+  void step(double flange_m_s2, double borne, double dt_s) {
+    sinking_m_s_ += dt_s * (kGravity_m_s2 * (1 - borne) + flange_m_s2 - pull_n() / mass_kg_);
+    sag_m_ += dt_s * sinking_m_s_;
+  }
+
+ private:
+  double mass_kg_, damping_n_s_m_, sag_m_, sinking_m_s_ = 0;
+};
+
+struct Reading {
+  double time_s = 0, now_kg = 0;
+  std::optional<double> mass_kg;
+};
+
+class ScaleTest : public ::testing::Test {
+ protected:
+  static world::World load() {
+    auto world = world::load("worlds", "parcel_cell");
+    EXPECT_TRUE(world) << world.error().line();
+    return std::move(*world);
+  }
+
+  // Straight up by `height_m` (which may be 0) within 0.6 s.
+  motion::Trajectory lift(double height_m) {
+    constexpr double kDuration_s = 0.6;
+    const auto path = [&](double t_s) {
+      const double u = std::min(1.0, t_s / kDuration_s);
+      const double rise_m = height_m * u * u * u * (10 - 15 * u + 6 * u * u);
+      return cell_.model.inverse(Cell::tip_down({0.1, 0, 1.0 + rise_m}, 0.3), world_.robot.home);
+    };
+    const auto q = path(0);
+    EXPECT_TRUE(q) << q.error().line();
+    const AxisVector still = AxisVector::Zero(q->size());
+    auto way = motion::follow({*q, still, still}, begin_, path, kDuration_s, 0.02, world_.robot.limits);
+    EXPECT_TRUE(way) << way.error().line();
+    return way.value_or(motion::Trajectory{});
+  }
+
+  // What the wrist feels, and the bridge's tick that weighs it, until the way ends. Before `free_s` a neighbour
+  // bears half of the load.
+  std::vector<Reading> weigh(SwingingLoad load, const motion::Trajectory& way, double free_s = 0) {
+    constexpr int kSubsteps = 40;
+    const double dt_s = to_s(kTick) / kSubsteps;
+    Scale scale;
+    std::vector<Reading> readings;
+    double last_speed_m_s = 0;
+    for (Time now = begin_; now <= way.back().end(); now += kTick) {
+      const double since_s = to_s(now - begin_);
+      const AxisState arm = motion::sample(way, now, cell_.model.axes());
+      const double speed_m_s = (cell_.model.tip_jacobian(arm.position) * arm.speed)(2);
+      const double flange_m_s2 = (speed_m_s - last_speed_m_s) / to_s(kTick);
+      for (int i = 0; i < kSubsteps && now > begin_; ++i) {
+        const double time_s = since_s + (i - kSubsteps) * dt_s;
+        load.step(flange_m_s2, time_s < free_s ? 0.5 : 0, dt_s);
+      }
+      last_speed_m_s = speed_m_s;
+      hear(now, arm, load.pull_n() + world_.robot.tool.mass_kg * (kGravity_m_s2 + flange_m_s2));
+      scale.add(cell_);
+      readings.push_back({since_s, weigh_now(cell_), scale.mass_kg(cell_)});
+    }
+    return readings;
+  }
+
+  void hear(Time now, const AxisState& arm, double pull_n) {
+    const Pose world_from_flange =
+        cell_.model.world_from_tip(arm.position) * world_.robot.tool.flange_from_tip.inverse();
+    const Vector3 in_flange_n = world_from_flange.linear().transpose() * Vector3(0, 0, -pull_n);
+    link::State state;
+    state.stamp = now;
+    state.safety = link::SafetyState::kOperational;
+    state.commanded = arm;
+    state.position = arm.position, state.speed = arm.speed;
+    state.wrist_force_n = {in_flange_n.x(), in_flange_n.y(), in_flange_n.z()};
+    cerebellum_.publish(state);
+    cell_.refresh(now, {});
+    for (link::Command command; cerebellum_.receive(command);) continue;
+  }
+
+  static void expect_right(const std::vector<Reading>& readings, double mass_kg, double from_s, double to_s) {
+    int read = 0;
+    for (const Reading& reading : readings) {
+      if (reading.time_s < from_s || reading.time_s > to_s) continue;
+      ASSERT_TRUE(reading.mass_kg) << mass_kg << " kg after " << reading.time_s << " s";
+      EXPECT_NEAR(*reading.mass_kg, mass_kg, 0.05 * mass_kg) << "after " << reading.time_s << " s";
+      ++read;
+    }
+    EXPECT_GT(read, 5);
+  }
+
+  const Time begin_ = Time(from_s(4));
+  const world::World world_ = load();
+  const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
+  link::BridgeEnd bridge_{*link_};
+  link::CerebellumEnd cerebellum_{*link_};
+  Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
+};
+
+TEST_F(ScaleTest, HeldStillALoadThatSwingsIsWeighedOverTheSwing) {
+  for (const double mass_kg : {0.5, 2.0, 3.5}) {
+    const auto readings = weigh({mass_kg, 0.8, kHardlyDamped_n_s_m}, lift(0));
+    const auto [least, most] = std::ranges::minmax(readings, {}, &Reading::now_kg);
+    EXPECT_GT(most.now_kg - least.now_kg, 0.2 * mass_kg) << "it must swing, or any force would do";
+    expect_right(readings, mass_kg, kSpan_s + 0.011, 1);
+  }
+}
+
+TEST_F(ScaleTest, WhileTheArmSpeedsUpAndSlowsDownTheMassStaysRight) {
+  for (const double mass_kg : {0.5, 2.0, 3.5}) {
+    const auto readings = weigh({mass_kg, 1, kDamping_n_s_m}, lift(0.25));
+    const auto [least, most] = std::ranges::minmax(readings, {}, &Reading::now_kg);
+    EXPECT_GT(most.now_kg - mass_kg, 0.25 * mass_kg) << "inertia must weigh along";
+    expect_right(readings, mass_kg, kSpan_s + 0.011, 1);
+  }
+}
+
+TEST_F(ScaleTest, SaysNothingBeforeASwingIsOver) {
+  int early = 0;
+  for (const Reading& reading : weigh({1.0, 1, kDamping_n_s_m}, lift(0.1))) {
+    if (reading.time_s > kSpan_s - 0.001) continue;
+    EXPECT_FALSE(reading.mass_kg) << "after " << reading.time_s << " s";
+    ++early;
+  }
+  EXPECT_EQ(early, 15);
+}
+
+TEST_F(ScaleTest, SaysNothingWhileANeighbourBoreHalfOfItInTheFirstHalf) {
+  const double mass_kg = 2, free_s = 0.08;
+  const auto readings = weigh({mass_kg, 0.5, kDamping_n_s_m}, lift(0), free_s);
+  int doubtful = 0;
+  for (const Reading& reading : readings) {
+    // The window is 0.15 to 0.16 s long, and its middle lies in the neighbour's last or the load's first moments.
+    if (reading.time_s < kSpan_s - 0.001 || reading.time_s > kSpan_s + 0.021) continue;
+    EXPECT_FALSE(reading.mass_kg) << *reading.mass_kg << " kg after " << reading.time_s << " s";
+    ++doubtful;
+  }
+  EXPECT_GE(doubtful, 2);
+  expect_right(readings, mass_kg, free_s + kSpan_s + 0.011, 1);
+}
+
+}  // namespace
+}  // namespace pons::skills
