@@ -208,6 +208,18 @@ TEST(PerceptionTest, ReportsTheLeanOfAThingThatLeans) {
   EXPECT_TRUE(beliefs[0].crowded);
 }
 
+TEST(PerceptionTest, WhatTakesAThingsPlaceDoesNotTakeItsName) {
+  Eyes eyes;
+  eyes.belt.things = {{.x_m = -0.9, .size_m = {0.2, 0.16, 0.06}, .code = "P000001"}};
+  eyes.belt.watch(eyes.perception, 3);
+  eyes.belt.show(eyes.perception, "label");
+  ASSERT_EQ(eyes.beliefs().at(0).code, "P000001");
+  // Something larger fell on it, label down.
+  eyes.belt.things.push_back({.x_m = -0.9, .size_m = {0.3, 0.2, 0.05}, .base_m = 0.06});
+  eyes.belt.watch(eyes.perception, 4);
+  for (const ObjectBelief& belief : eyes.beliefs()) EXPECT_EQ(belief.code, "");
+}
+
 TEST(PerceptionTest, StartsAgainWhenAThingIsPushed) {
   Eyes eyes;
   eyes.belt.things = {{.x_m = -0.9}};

@@ -27,7 +27,7 @@ struct Sampling {
                               static_cast<std::ptrdiff_t>(column) * step;
     if (step == 1) return from;
     copy.resize(static_cast<std::size_t>(count));
-    for (int i = 0; i < count; ++i) copy[static_cast<std::size_t>(i)] = from[i * step];
+    for (int i = 0; i < count; ++i) copy[static_cast<std::size_t>(i)] = from[static_cast<std::ptrdiff_t>(i) * step];
     return copy.data();
   }
 };

@@ -226,6 +226,11 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   const bool now_whole = was_doubtful && !o.doubtful;
   if (resized && !now_whole && ++track.odd_sizes < 2) return;  // once may be a bad cut between neighbours
   track.last = sighting;
+  if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
+    // Another object lies here now, on this one or in its place: whose label it was is no longer known.
+    track.code.clear();
+    track.reads = track.label_attempts = 0;
+  }
   if (now_whole || (o.doubtful && !was_doubtful) || resized || moved > kDisturbed_m || turned) {
     restart(track, o);
     return;
