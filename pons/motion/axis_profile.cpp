@@ -15,7 +15,8 @@ AxisPoint after(const AxisPoint& from, double t, double jerk) {
 // Takes a phase's extremes into account: speed where the acceleration crosses zero, position where the speed does.
 void extend(AxisProfile::Extent& extent, const AxisPoint& from, double duration, double jerk) {
   const auto see = [&](double t) {
-    if (!(t >= 0 && t <= duration)) return;
+    const bool inside = t >= 0 && t <= duration;  // not so when t is no number
+    if (!inside) return;
     const AxisPoint point = after(from, t, jerk);
     extent.position_min = std::min(extent.position_min, point.position);
     extent.position_max = std::max(extent.position_max, point.position);

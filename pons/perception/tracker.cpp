@@ -42,18 +42,18 @@ bool within(const Sighting& whole, const Sighting& part) {
   return true;
 }
 
+template <typename Tracks>
+auto live(Tracks& tracks, std::uint32_t id) -> decltype(tracks.data()) {
+  const auto found = std::ranges::find_if(tracks, [id](const auto& track) { return track.id == id; });
+  return found == tracks.end() || found->forgotten ? nullptr : &*found;
+}
+
 }  // namespace
 
 Tracker::Tracker(const world::Belt& belt) : belt_(belt) {}
 
-Tracker::Track* Tracker::find(std::uint32_t track) {
-  return const_cast<Track*>(static_cast<const Tracker*>(this)->find(track));
-}
-
-const Tracker::Track* Tracker::find(std::uint32_t track) const {
-  const auto found = std::ranges::find(tracks_, track, &Track::id);
-  return found == tracks_.end() || found->forgotten ? nullptr : &*found;
-}
+Tracker::Track* Tracker::find(std::uint32_t track) { return live(tracks_, track); }
+const Tracker::Track* Tracker::find(std::uint32_t track) const { return live(tracks_, track); }
 
 Tracker::Estimate Tracker::estimate(const std::deque<Observation>& observations) {
   Estimate mean;

@@ -11,6 +11,8 @@
 namespace pons::skills {
 namespace {
 
+constexpr double kElbowRoom_rad = 0.35;
+constexpr double kWholeTurn_rad = 2 * std::numbers::pi;
 // Planned motion stays this far inside the enforced limits, so that rounding never trips them.
 constexpr double kPlanShare = 0.97;
 // A swinging load drives the arm beyond what was planned: so much room for that.
@@ -94,6 +96,13 @@ Pose Cell::tip_down(const Vector3& position, double yaw) {
   Pose pose = pose_xyz_yaw(position.x(), position.y(), position.z(), yaw);
   pose.rotate(Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()));
   return pose;
+}
+
+double Cell::effort(const AxisVector& from, const AxisVector& to) const {
+  const AxisLimits& limits = world.robot.limits;
+  const bool cornered = ((to - limits.position_min).array() < kElbowRoom_rad).any() ||
+                        ((limits.position_max - to).array() < kElbowRoom_rad).any();
+  return (to - from).cwiseAbs().maxCoeff() + (cornered ? kWholeTurn_rad : 0);
 }
 
 AxisLimits Cell::limits_empty() const {

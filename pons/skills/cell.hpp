@@ -57,6 +57,9 @@ class Cell {
 
   // Tip pose, tool pointing down, over (x, y, z) with its x axis at `yaw`.
   [[nodiscard]] static Pose tip_down(const Vector3& position, double yaw);
+  // How far the axis that turns most must turn, rad; far more when an axis would end so near its position limit that
+  // the next small motion needs a whole turn back.
+  [[nodiscard]] double effort(const AxisVector& from, const AxisVector& to) const;
   // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces.
   [[nodiscard]] AxisLimits limits_empty() const;
   // Where a carry shall end, joints, given those it starts from.

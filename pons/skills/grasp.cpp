@@ -75,7 +75,7 @@ Expected<Eigen::Matrix3d> nearest_orientation(Cell& cell, const AxisVector& q, c
     const Eigen::Matrix3d orientation = lean * Cell::tip_down(position, yaw).linear();
     const auto there = cell.model.inverse(posed(position, orientation), q);
     if (!there) continue;
-    const double turn = (*there - q).cwiseAbs().maxCoeff();
+    const double turn = cell.effort(q, *there);
     if (best && turn >= least) continue;
     best = orientation;
     least = turn;

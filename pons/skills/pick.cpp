@@ -23,6 +23,7 @@ constexpr int kPresses = 2;
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
+constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr Duration kBlockedFor = std::chrono::milliseconds(600);
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;      // a prediction off by more is worth a new plan
@@ -120,6 +121,8 @@ class Pick final : public task::Skill {
     for (const ObjectBelief& other : cell_.objects()) {
       if (lies_on(other, *object)) return {Status::kFailed, "covered by " + name_of(other), {}};
     }
+    if (tried_ && now - *tried_ < kTryEvery) return {};
+    tried_ = now;
     const Time from = cell_.arm.splice_time(now);
     auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
     if (!grasp) {
@@ -416,7 +419,7 @@ class Pick final : public task::Skill {
   Vector3 lift_from_ = Vector3::Zero();
   Scale scale_;
   Progress verdict_;
-  std::optional<Time> blocked_since_;
+  std::optional<Time> tried_, blocked_since_;
   std::string last_error_;
   int sealed_ticks_ = 0, presses_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;

@@ -110,7 +110,7 @@ class Place final : public task::Skill {
       pose.translation().head<2>() -= middle.head<2>();
       const auto q = cell_.model.inverse(pose, from);
       if (!q) continue;
-      const double turned = (*q - from).cwiseAbs().maxCoeff();
+      const double turned = cell_.effort(from, *q);
       if (best && turned >= least) continue;
       best = q;
       least = turned;

@@ -36,8 +36,8 @@ std::vector<Vector3> probes(const Load* load) {
   for (const double x : {-0.5, -0.25, 0.0, 0.25, 0.5})
     for (const double y : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
       const double lower_m = kSwing_rad * std::hypot(x * load->size_m.x(), y * load->size_m.y());
-      points.push_back(load->offset_in_tip_m +
-                       turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z() + lower_m));
+      points.emplace_back(load->offset_in_tip_m +
+                          turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z() + lower_m));
     }
   return points;
 }
