@@ -1,11 +1,13 @@
 #include "pons/sim/feeder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "pons/core/random.hpp"
 #include "pons/sim/labels.hpp"
 #include "pons/sim/parcels.hpp"
+#include "pons/world/view.hpp"
 
 namespace pons::sim {
 namespace {
@@ -13,11 +15,22 @@ namespace {
 constexpr std::uint64_t kBeltStream = 0x62656c74, kSpoilStream = 0x73706f69;
 constexpr double kStartMargin_m = 0.01;  // between the belt's start and the rear of what is put down
 constexpr double kEyeHeight_m = 0.008;
-constexpr double kEye_m = 0.45;  // from the belt's start
+constexpr double kEye_m = 0.02;     // downstream of where the cameras' view begins
+constexpr double kJam_m = 0.06;     // a footprint's half diagonal says so much too much of its half length
+constexpr double kHidden_m = 0.03;  // upstream of the view
 constexpr double kTau = 2 * std::numbers::pi;
 
 Vector3 position(const mjData* data, const Slot& slot) {
   return {data->qpos[slot.qpos], data->qpos[slot.qpos + 1], data->qpos[slot.qpos + 2]};
+}
+
+// Where the front of what is put down may lie without a camera seeing it appear.
+double hidden_end_m(const world::World& world) {
+  double end_m = world.belt.x_start_m;
+  for (const world::CameraSpec& camera : world.cameras) {
+    if (const auto seen = world::seen_of_belt(camera, world.belt)) end_m = std::max(end_m, seen->from_m - kHidden_m);
+  }
+  return end_m;
 }
 
 }  // namespace
@@ -39,19 +52,27 @@ void BeltDrive::step(mjModel* model, int geom, Time now, double step_s) {
 }
 
 Feeder::Feeder(const world::World& world, const world::Manifest& manifest, std::vector<Arrival> arrivals)
-    : world_(world), manifest_(manifest), arrivals_(std::move(arrivals)) {}
+    : world_(world), manifest_(manifest), arrivals_(std::move(arrivals)), hidden_end_m_(hidden_end_m(world)) {}
+
+// Out of sight if the belt is long enough for that.
+double Feeder::front_m(double length_m) const {
+  return std::max(hidden_end_m_, world_.belt.x_start_m + kStartMargin_m + length_m);
+}
 
 void Feeder::step(const Composed& cell, mjModel* model, mjData* data, Ledger& ledger, LabelStore& labels,
                   const BeltDrive& belt, Time now) {
   for (const int slot : ledger.leaving()) park(model, data, cell.slots[static_cast<std::size_t>(slot)], slot);
   if (next_ >= manifest_.size()) return;
-  const double needed = arrivals_[next_].group_length_m + last_gap_m_;
+  // From the rear of the last to the front of the next.
+  const double length_m = arrivals_[next_].group_length_m;
+  const double needed = front_m(length_m) - last_rear_m_ + last_gap_m_;
   if (belt.travel_m() - last_travel_m_ < needed) return;
   if (waiting(cell, data, ledger) >= world_.arrivals.waiting) return;
-  if (!room(cell, data, ledger, arrivals_[next_].group_length_m)) return;
+  if (!room(cell, data, ledger, length_m)) return;
   last_gap_m_ = arrivals_[next_].gap_m;
   put_down(cell, model, data, ledger, labels, belt.speed_m_s(), now);
   last_travel_m_ = belt.travel_m();
+  last_rear_m_ = front_m(length_m) - length_m;
 }
 
 std::size_t Feeder::group_size() const {
@@ -70,7 +91,7 @@ int Feeder::waiting(const Composed& cell, const mjData* data, const Ledger& ledg
 }
 
 bool Feeder::room(const Composed& cell, const mjData* data, const Ledger& ledger, double length_m) const {
-  const double front = world_.belt.x_start_m + kStartMargin_m + length_m;
+  const double front = front_m(length_m);
   std::size_t free = 0;
   for (int i = 0; i < kSlots; ++i) {
     const int parcel = ledger.parcel_in(i);
@@ -81,7 +102,7 @@ bool Feeder::room(const Composed& cell, const mjData* data, const Ledger& ledger
     const Vector3 at = position(data, cell.slots[static_cast<std::size_t>(i)]);
     // A jam: what was put down before has not moved on.
     const double radius = 0.5 * manifest_[static_cast<std::size_t>(parcel)].size_m.head<2>().norm();
-    if (ledger.on_belt(i) && at.x() - radius < front - 0.5 * length_m) return false;
+    if (ledger.on_belt(i) && at.x() - radius < front - kJam_m) return false;
   }
   return free >= group_size();
 }
@@ -95,8 +116,7 @@ void Feeder::put_down(const Composed& cell, mjModel* model, mjData* data, Ledger
     while (ledger.parcel_in(free) >= 0) ++free;
     const Arrival& arrival = arrivals_[next_];
     Pose world_from_group = Pose::Identity();
-    world_from_group.translation() =
-        Vector3(belt.x_start_m + kStartMargin_m + arrival.group_length_m, belt.y_center_m, belt.surface_z_m);
+    world_from_group.translation() = Vector3(front_m(arrival.group_length_m), belt.y_center_m, belt.surface_z_m);
     const Pose world_from_middle = world_from_group * arrival.group_from_middle;
     activate(model, data, cell.slots[static_cast<std::size_t>(free)], manifest_[next_], arrival,
              world_.arrivals.label_m, world_from_middle, speed_m_s);
@@ -109,7 +129,7 @@ void Feeder::put_down(const Composed& cell, mjModel* model, mjData* data, Ledger
 }
 
 bool Feeder::photo_eye(const Composed& cell, const mjData* data, const Ledger& ledger) const {
-  const double from[3] = {world_.belt.x_start_m + kEye_m, world_.belt.y_center_m - 0.5 * world_.belt.width_m,
+  const double from[3] = {hidden_end_m_ + kEye_m, world_.belt.y_center_m - 0.5 * world_.belt.width_m,
                           world_.belt.surface_z_m + kEyeHeight_m};
   const double along[3] = {0, world_.belt.width_m, 0};
   for (int i = 0; i < kSlots; ++i) {

@@ -43,6 +43,8 @@ class Feeder {
   [[nodiscard]] bool photo_eye(const Composed& cell, const mjData* data, const Ledger& ledger) const;
 
  private:
+  // Where the front of a group of that length is put down.
+  [[nodiscard]] double front_m(double length_m) const;
   [[nodiscard]] bool room(const Composed& cell, const mjData* data, const Ledger& ledger, double length_m) const;
   [[nodiscard]] int waiting(const Composed& cell, const mjData* data, const Ledger& ledger) const;
   [[nodiscard]] std::size_t group_size() const;
@@ -52,9 +54,11 @@ class Feeder {
   world::World world_;
   world::Manifest manifest_;
   std::vector<Arrival> arrivals_;
+  double hidden_end_m_;  // upstream of it no camera sees the belt
   std::size_t next_ = 0;
   double last_travel_m_ = -1e9;  // belt travel when the last group was put down
   double last_gap_m_ = 0;
+  double last_rear_m_ = 0;  // where its rear was then
 };
 
 }  // namespace pons::sim

@@ -206,7 +206,7 @@ TEST_F(BrokenWorld, RefusesWrongShapesAndNumbers) {
 }
 
 TEST_F(BrokenWorld, RefusesWhatDoesNotFitTogether) {
-  EXPECT_THAT(changed("x_end_m: 1.00", "x_end_m: -2"), HasSubstr("belt.x_end_m: is not above x_start_m"));
+  EXPECT_THAT(changed("x_end_m: 1.00", "x_end_m: -3"), HasSubstr("belt.x_end_m: is not above x_start_m"));
   EXPECT_THAT(changed("pick_x_max_m: 0.52", "pick_x_max_m: -0.60"),
               HasSubstr("belt.pick_x_max_m: is not above pick_x_min_m"));
   EXPECT_THAT(changed("pick_x_max_m: 0.52", "pick_x_max_m: 1.45"),
