@@ -9,7 +9,8 @@
 namespace pons::perception {
 namespace {
 
-constexpr int kPrintContrast = 60;      // grey levels within five cells
+constexpr int kPrintContrast = 60;  // grey levels within five cells
+constexpr std::size_t kFewestSamples = 80;
 constexpr std::size_t kSamples = 2500;  // cells looked at per object
 constexpr double kPlain = 6;            // grey levels: an object of one colour spreads less
 constexpr double kExplained = 0.6;
@@ -139,22 +140,29 @@ bool Splitter::sharp(const Cut& cut) const {
   return std::sqrt(squared(before / count_before - after / count_after)) > kSharp * cut.contrast;
 }
 
-std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<cv::Point>& cells) {
+// Of plain cells, evenly spread; says how much their features vary.
+template <typename Features>
+double Splitter::take_samples(const std::vector<cv::Point>& cells, const Features& features) {
   samples_.clear();
   const std::size_t stride = std::max<std::size_t>(1, cells.size() / kSamples);
   cv::Vec3d sum(0, 0, 0);
   double squares = 0;
   for (std::size_t i = 0; i < cells.size(); i += stride) {
     if (texture_(cells[i]) != 0) continue;
-    const cv::Vec3b& colour = view.colour(cells[i]);
-    samples_.push_back({cells[i], cv::Vec3f(colour[0], colour[1], colour[2])});
-    sum += cv::Vec3d(colour[0], colour[1], colour[2]);
-    squares += squared(cv::Vec3d(colour[0], colour[1], colour[2]));
+    samples_.push_back({cells[i], features(cells[i])});
+    sum += cv::Vec3d(samples_.back().colour);
+    squares += squared(cv::Vec3d(samples_.back().colour));
   }
-  if (samples_.size() < 80) return std::nullopt;
-  const auto count = static_cast<double>(samples_.size());
-  const double variance = squares / count - squared(sum / count);
-  if (variance < kPlain * kPlain) return std::nullopt;
+  const auto count = static_cast<double>(std::max<std::size_t>(1, samples_.size()));
+  return squares / count - squared(sum / count);
+}
+
+std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<cv::Point>& cells) {
+  const double variance = take_samples(cells, [&](const cv::Point& cell) {
+    const cv::Vec3b& colour = view.colour(cell);
+    return cv::Vec3f(colour[0], colour[1], colour[2]);
+  });
+  if (samples_.size() < kFewestSamples || variance < kPlain * kPlain) return std::nullopt;
 
   constexpr double kDegree = std::numbers::pi / 180;
   Cut best;
@@ -175,29 +183,19 @@ std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<c
 std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, cv::Point2d one,
                                       cv::Point2d other, double clear) {
   constexpr float kGreyPerMillimetre = 5;
-  samples_.clear();
-  const std::size_t stride = std::max<std::size_t>(1, cells.size() / kSamples);
-  cv::Vec3d sum(0, 0, 0);
-  double squares = 0;
-  for (std::size_t i = 0; i < cells.size(); i += stride) {
-    if (texture_(cells[i]) != 0) continue;
-    const cv::Vec3b& colour = view.colour(cells[i]);
-    const cv::Vec3f features(colour[0], colour[2],
-                             kGreyPerMillimetre * static_cast<float>(1e3 * TopView::metres(view.height(cells[i]))));
-    samples_.push_back({cells[i], features});
-    sum += cv::Vec3d(features);
-    squares += squared(cv::Vec3d(features));
-  }
-  if (samples_.size() < 80) return std::nullopt;
-  const auto count = static_cast<double>(samples_.size());
-  const double variance = std::max(1.0, squares / count - squared(sum / count));
+  const double variance = take_samples(cells, [&](const cv::Point& cell) {
+    const cv::Vec3b& colour = view.colour(cell);
+    const double height_mm = 1e3 * TopView::metres(view.height(cell));
+    return cv::Vec3f(colour[0], colour[2], kGreyPerMillimetre * static_cast<float>(height_mm));
+  });
+  if (samples_.size() < kFewestSamples) return std::nullopt;
 
   Cut best;
   for (int degrees = 0; degrees < 180; degrees += 3) {
     const double angle = degrees * std::numbers::pi / 180;
     const cv::Point2d normal(std::cos(angle), std::sin(angle));
     const double a = normal.dot(one), b = normal.dot(other);
-    const Cut cut = best_cut(angle, 1, variance, std::min(a, b) + clear, std::max(a, b) - clear);
+    const Cut cut = best_cut(angle, 1, std::max(1.0, variance), std::min(a, b) + clear, std::max(a, b) - clear);
     if (cut.explained > best.explained) best = cut;
   }
   if (best.explained <= 0) return std::nullopt;

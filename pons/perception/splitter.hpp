@@ -36,13 +36,15 @@ class Splitter {
  private:
   struct Sample {
     cv::Point2f at;
-    cv::Vec3f colour;
+    cv::Vec3f colour;  // or what stands for it
   };
   struct Cut {
     double angle_rad = 0, offset = 0;
     double explained = 0;  // share of the colour's variance
     double contrast = 0;   // distance between the two sides' means
   };
+  template <typename Features>
+  double take_samples(const std::vector<cv::Point>& cells, const Features& features);
   // Of the cuts at that angle with an offset between `from` and `to`.
   [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance, double from = -1e9,
                              double to = 1e9) const;

@@ -6,6 +6,8 @@
 #include <memory>
 #include <vector>
 
+#include "pons/skills/test_kit.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr Duration kTick = std::chrono::milliseconds(10);
 
 class ArmTest : public ::testing::Test {
  protected:
-  static world::World load() {
-    auto world = world::load("worlds", "parcel_cell");
-    EXPECT_TRUE(world) << world.error().line();
-    return std::move(*world);
-  }
-
   // What the cerebellum would say, and the bridge's tick that hears it.
   void hear(Time now, SafetyState safety, const AxisVector& position) {
     state_.safety = safety;
@@ -47,7 +43,7 @@ class ArmTest : public ::testing::Test {
     return std::move(*trajectory);
   }
 
-  const world::World world_ = load();
+  const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
   link::CerebellumEnd cerebellum_{*link_};

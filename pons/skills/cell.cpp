@@ -11,7 +11,7 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kElbowRoom_rad = 0.35;
+constexpr double kCornered_rad = 0.35;  // from a position limit
 constexpr double kWholeTurn_rad = 2 * std::numbers::pi;
 // Planned motion stays this far inside the enforced limits, so that rounding never trips them.
 constexpr double kPlanShare = 0.97;
@@ -100,8 +100,8 @@ Pose Cell::tip_down(const Vector3& position, double yaw) {
 
 double Cell::effort(const AxisVector& from, const AxisVector& to) const {
   const AxisLimits& limits = world.robot.limits;
-  const bool cornered = ((to - limits.position_min).array() < kElbowRoom_rad).any() ||
-                        ((limits.position_max - to).array() < kElbowRoom_rad).any();
+  const bool cornered = ((to - limits.position_min).array() < kCornered_rad).any() ||
+                        ((limits.position_max - to).array() < kCornered_rad).any();
   return (to - from).cwiseAbs().maxCoeff() + (cornered ? kWholeTurn_rad : 0);
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "pons/skills/grip.hpp"
+#include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
 namespace {
@@ -13,12 +14,6 @@ constexpr double kReserve = 0.35;  // of the cups' hold, the most that a planned
 
 class CarryTest : public ::testing::Test {
  protected:
-  static world::World load() {
-    auto world = world::load("worlds", "parcel_cell");
-    EXPECT_TRUE(world) << world.error().line();
-    return std::move(*world);
-  }
-
   void SetUp() override {
     // At rest so high over the belt that every way is clear: only the load tells them apart.
     const auto from = cell_.model.inverse(Cell::tip_down({0.1, 0, 1.35}, 0), world_.robot.home);
@@ -48,7 +43,7 @@ class CarryTest : public ::testing::Test {
   static double duration_s(const motion::Trajectory& way) { return to_s(way.back().end() - way.front().start); }
 
   const Time now_ = Time(from_s(4));
-  const world::World world_ = load();
+  const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
   link::CerebellumEnd cerebellum_{*link_};

@@ -1,6 +1,7 @@
 #include "pons/skills/grip.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace pons::skills {

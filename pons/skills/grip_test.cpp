@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "pons/skills/cell.hpp"
+#include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
 namespace {
@@ -17,12 +18,6 @@ constexpr double kCups = 4, kCup_n = 60, kLever_m = 0.022;  // of parcel_cell: a
 
 class GripTest : public ::testing::Test {
  protected:
-  static world::World load() {
-    auto world = world::load("worlds", "parcel_cell");
-    EXPECT_TRUE(world) << world.error().line();
-    return std::move(*world);
-  }
-
   Expected<AxisVector> joints(const Pose& world_from_tip) { return model_.inverse(world_from_tip, world_.robot.home); }
   double use(const Load& load, double mass_kg, const motion::Trajectory& way) {
     return grip_use(model_, world_.robot.tool, load, mass_kg, way);
@@ -56,7 +51,7 @@ class GripTest : public ::testing::Test {
     return way.value_or(motion::Trajectory{});
   }
 
-  const world::World world_ = load();
+  const world::World world_ = parcel_cell();
   model::RobotModel model_ = model::RobotModel::load(world_.robot).value();
   const Pose level_ = Cell::tip_down({0.1, 0, 1.1}, 0);
 };

@@ -6,7 +6,8 @@
 
 namespace pons::skills {
 
-// Arguments {"place": name, "object": code (optional)}. Ends kSucceeded when the wrist no longer feels the load;
+// Arguments {"place": name, "object": code (optional)}. Ends kSucceeded when the wrist no longer feels the load,
+// or when the load came off over the middle of the mouth;
 // kFailed when the parcel was lost on the way or nothing is held. Cancelled, it stops and goes on holding.
 [[nodiscard]] task::SkillType place(Cell& cell);
 

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <optional>
 
+#include "pons/skills/test_kit.hpp"
 #include "pons/world/view.hpp"
 
 namespace pons::skills {
@@ -22,12 +23,6 @@ const Time kBegin = Time(from_s(3));
 
 class RouteTest : public ::testing::Test {
  protected:
-  static world::World load() {
-    auto world = world::load("worlds", "parcel_cell");
-    EXPECT_TRUE(world) << world.error().line();
-    return std::move(*world);
-  }
-
   // Joint angles with the tool pointing down, its tip at (x, y, z).
   AxisVector over(double x, double y, double z) {
     Pose pose = pose_xyz_yaw(x, y, z, 0);
@@ -98,7 +93,7 @@ class RouteTest : public ::testing::Test {
     EXPECT_LE(use.worst(), 1.0 + 1e-6);
   }
 
-  const world::World world_ = load();
+  const world::World world_ = parcel_cell();
   model::RobotModel model_ = model::RobotModel::load(world_.robot).value();
   Router router_{world_, model_.copy()};
   const AxisLimits& limits_ = world_.robot.limits;

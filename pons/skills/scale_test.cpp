@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "pons/skills/test_kit.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -41,12 +43,6 @@ struct Reading {
 
 class ScaleTest : public ::testing::Test {
  protected:
-  static world::World load() {
-    auto world = world::load("worlds", "parcel_cell");
-    EXPECT_TRUE(world) << world.error().line();
-    return std::move(*world);
-  }
-
   // Straight up by `height_m` (which may be 0) within 0.6 s.
   motion::Trajectory lift(double height_m) {
     constexpr double kDuration_s = 0.6;
@@ -115,7 +111,7 @@ class ScaleTest : public ::testing::Test {
   }
 
   const Time begin_ = Time(from_s(4));
-  const world::World world_ = load();
+  const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
   link::CerebellumEnd cerebellum_{*link_};
