@@ -14,6 +14,7 @@ constexpr int kFramesToTrust = 3;
 constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
 constexpr int kMostTries = 3;
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
+constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
 
 double label_view_end_m(const world::World& world) {
   std::optional<double> end;
@@ -38,6 +39,10 @@ double speed_m_s(const ObjectBelief& belief, const world::Belt& belt) {
   return std::max(seen > 0 ? seen : belt.speed_m_s, belt.speed_m_s * (1 - belt.speed_variation));
 }
 
+double left_s(const ObjectBelief& belief, const world::Belt& belt) {
+  return (belt.pick_x_max_m - belief.world_from_top.translation().x()) / speed_m_s(belief, belt);
+}
+
 bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
   return std::any_of(all.begin(), all.end(), [&](const ObjectBelief& other) { return lies_on(other, belief); });
 }
@@ -51,6 +56,7 @@ void Dispatcher::heard(std::string_view id, task::Outcome outcome) {
   const auto asked = asked_.find(id);
   if (asked == asked_.end()) return;
   Known& known = known_.find(asked->second)->second;
+  known.asked = false;
   known.sorted = outcome == task::Outcome::kSucceeded;
   known.failed = outcome == task::Outcome::kFailed && known.tries < kMostTries;
   if (known.failed) decided_.erase(known.track);
@@ -97,13 +103,35 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     if (x_m < label_view_end_m_) return;
     return ride(belief, kRideCovered, decisions);
   }
+  if (order->second.priority >= kExpressPriority && must_wait(belief, all)) return;
   decided_.insert(belief.track);
   known.track = belief.track;
+  known.asked = true;
   known.failed = false;
   known.seen_again.reset();
   ++known.tries;
   decisions.tasks.push_back(task_for(belief, order->second, known.tries, now));
   asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);
+}
+
+bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const {
+  const world::Belt& belt = world_.belt;
+  const double x_m = express.world_from_top.translation().x();
+  std::vector<double> ahead_s;  // that those have which it would overtake
+  for (const ObjectBelief& other : all) {
+    const auto known = known_.find(other.code);
+    if (known == known_.end() || !known->second.asked || other.world_from_top.translation().x() <= x_m) continue;
+    ahead_s.push_back(left_s(other, belt));
+  }
+  std::ranges::sort(ahead_s);
+  const auto turn_s = [](std::size_t place) { return static_cast<double>(place) * kTaskTakes_s + kPickTakes_s; };
+  if (left_s(express, belt) < turn_s(ahead_s.size())) return false;
+  // The arm cannot grip it before it comes into the zone.
+  const double arm_waits_s = std::max(0.0, (belt.pick_x_min_m - x_m) / speed_m_s(express, belt) - kPickTakes_s);
+  for (std::size_t i = 0; i < ahead_s.size(); ++i) {
+    if (ahead_s[i] >= turn_s(i) && ahead_s[i] < turn_s(i + 1) + arm_waits_s) return true;
+  }
+  return false;
 }
 
 bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
@@ -118,13 +146,12 @@ bool Dispatcher::too_large(const ObjectBelief& belief) const {
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
-  const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / speed_m_s(belief, belt);
   // The same for all, so that it keeps their order: what a belt that slows down may add.
   const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
                          (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));
   return {{"id", tries == 1 ? belief.code : belief.code + "." + std::to_string(tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
-          {"deadline_s", now.s() + left_s + slack_s},
+          {"deadline_s", now.s() + left_s(belief, belt) + slack_s},
           {"steps",
            {{{"skill", "pick"}, {"arguments", {{"object", belief.code}}}},
             {{"skill", "place"}, {"arguments", {{"place", order.destination}, {"object", belief.code}}}}}}};

@@ -49,7 +49,8 @@ struct Decisions {
 };
 
 // Asks for a parcel by its code; for one whose task failed and that turns up again, by code and try ("P000123.2"). What
-// lies on or leans on another is asked for first. Pure and deterministic; one thread.
+// lies on or leans on another is asked for first; express parcels overtake, but nothing is lost for them that need not
+// be. Pure and deterministic; one thread.
 class Dispatcher {
  public:
   // `world` must outlive it.
@@ -69,6 +70,7 @@ class Dispatcher {
   struct Known {
     std::uint32_t track = 0;  // that carries the code now
     int tries = 0;            // tasks asked for
+    bool asked = false;       // the last of them has no outcome yet
     bool sorted = false;      // one of them succeeded: whoever else shows the code is a copy
     bool rode = false;        // it was let go by
     bool failed = false;      // the last one failed, and the parcel may turn up again
@@ -76,6 +78,8 @@ class Dispatcher {
   };
 
   void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);
+  // Whether one downstream would ride past for an express parcel that itself can wait.
+  [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] bool too_large(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;

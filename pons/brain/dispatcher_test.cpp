@@ -92,6 +92,25 @@ TEST_F(DispatcherTest, ExpressGoesFirst) {
   EXPECT_EQ(decisions.tasks[1].at("priority"), 90);
 }
 
+TEST_F(DispatcherTest, ExpressWaitsWhereAnotherWouldBeLostForIt) {
+  const auto asked = [](const Decisions& decisions) {
+    std::vector<std::string> ids;
+    for (const Json& task : decisions.tasks) ids.push_back(task.at("id"));
+    return ids;
+  };
+  using Ids = std::vector<std::string>;
+  // P1 has 2 s left in the zone; P2 has 6 s left, and the arm needs 3 s for it.
+  EXPECT_EQ(asked(dispatcher_.observe({parcel(1, 1, "P1"), parcel(2, -1, "P2")}, at(0))), Ids{"P1"});
+  EXPECT_EQ(asked(dispatcher_.observe({parcel(1, 1.05, "P1"), parcel(2, -0.95, "P2")}, at(0.1))), Ids{});
+  EXPECT_EQ(asked(dispatcher_.observe({parcel(2, -0.5, "P2")}, at(1))), Ids{"P2"}) << "the other was taken";
+}
+
+TEST_F(DispatcherTest, ExpressDoesNotWaitForWhatIsLostAnywayOrWhenItWouldBeLostItself) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 1.8, "P1"), parcel(2, -1, "P2")}, at(0)).tasks.size(), 2u);
+  Dispatcher other({{"P1", {"chute_3", 20}}, {"P2", {"chute_1", 90}}}, world_);
+  EXPECT_EQ(other.observe({parcel(1, 0.9, "P1"), parcel(2, 0.5, "P2")}, at(0)).tasks.size(), 2u);
+}
+
 TEST_F(DispatcherTest, WaitsForAFewFrames) {
   ObjectBelief belief = parcel(1, 0, "P1");
   belief.frames_seen = 2;
