@@ -146,12 +146,14 @@ bool Dispatcher::too_large(const ObjectBelief& belief) const {
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
-  // The same for all, so that it keeps their order: what a belt that slows down may add.
+  // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner. The slack,
+  // too, is the same for all: what a belt that slows down may add.
+  const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
   const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
                          (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));
   return {{"id", tries == 1 ? belief.code : belief.code + "." + std::to_string(tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
-          {"deadline_s", now.s() + left_s(belief, belt) + slack_s},
+          {"deadline_s", now.s() + left_s + slack_s},
           {"steps",
            {{{"skill", "pick"}, {"arguments", {{"object", belief.code}}}},
             {{"skill", "place"}, {"arguments", {{"place", order.destination}, {"object", belief.code}}}}}}};

@@ -1,7 +1,9 @@
 #include "pons/skills/grasp.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <utility>
 
@@ -18,7 +20,9 @@ constexpr int kRounds = 8;
 constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
-constexpr double kRideLifted_s = 0.5;  // until the next motion takes over
+constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
+constexpr double kSlower = 1.25;
+constexpr double kRideLifted_s = 0.6;  // with the belt, to be weighed
 
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
@@ -38,20 +42,25 @@ Eigen::Quaterniond lean_of(const ObjectBelief& object) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), up);
 }
 
-// The tip's largest vertical acceleration, by second differences.
-double most_upward_m_s2(Cell& cell, const motion::Trajectory& trajectory) {
-  constexpr double kStep_s = 0.01;
-  const auto height = [&](Time time) {
-    return cell.model.world_from_tip(motion::sample(trajectory, time, cell.model.axes()).position).translation().z();
+// The tip's position, speed and acceleration, by differences.
+std::array<Vector3, 3> tip_motion(Cell& cell, const AxisState& state) {
+  constexpr double kStep_s = 1e-3;
+  const auto tip = [&](double t) -> Vector3 {
+    const AxisVector q = state.position + t * state.speed + 0.5 * t * t * state.acceleration;
+    return cell.model.world_from_tip(q).translation();
   };
-  const Time begin = trajectory.front().start, end = trajectory.back().end();
-  double before = height(begin), now = height(begin + from_s(kStep_s)), most = 0;
-  for (Time time = begin + from_s(2 * kStep_s); time < end; time += from_s(kStep_s)) {
-    const double next = height(time);
-    most = std::max(most, std::abs(before - 2 * now + next) / (kStep_s * kStep_s));
-    before = std::exchange(now, next);
-  }
-  return most;
+  const Vector3 before = tip(-kStep_s), now = tip(0), after = tip(kStep_s);
+  return {now, (after - before) / (2 * kStep_s), (after - 2 * now + before) / (kStep_s * kStep_s)};
+}
+
+// Starting as told, ending at standstill in `end`: the quintic of least jerk in each coordinate.
+std::function<Vector3(double)> least_jerk(const std::array<Vector3, 3>& start, const Vector3& end, double duration_s) {
+  const double d = duration_s;
+  const Vector3 p = start[0], v = start[1], a = start[2], way = end - p;
+  const Vector3 c3 = (10 * way - 6 * d * v - 1.5 * d * d * a) / (d * d * d);
+  const Vector3 c4 = (-15 * way + 8 * d * v + 1.5 * d * d * a) / (d * d * d * d);
+  const Vector3 c5 = (6 * way - 3 * d * v - 0.5 * d * d * a) / (d * d * d * d * d);
+  return [=](double t) -> Vector3 { return p + t * (v + t * (0.5 * a + t * (c3 + t * (c4 + t * c5)))); };
 }
 
 }  // namespace
@@ -104,27 +113,34 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
 }
 
-Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation, double height_m) {
+Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
+                    const Vector3& offset) {
+  // Seen from the belt the way is straight: what touches the load is neither pushed nor left to push.
   const Vector3 belt = belt_velocity(cell);
-  AxisLimits limits = cell.limits_empty();
-  Expected<motion::Trajectory> up = fail("out of reach", "lift");
-  double takes_s = 0.4;
-  for (int round = 0; round < kRounds; ++round) {
-    up = nudge(cell, start, at, orientation, takes_s * belt + Vector3(0, 0, height_m), belt, limits);
-    if (!up) return std::unexpected(up.error());
-    takes_s = to_s(up->back().end() - at);
-    const double too_hard = most_upward_m_s2(cell, *up) / kLift_m_s2;
-    if (too_hard <= 1) break;
-    limits.acceleration_rad_s2 /= std::clamp(too_hard, 1.05, 2.0);
-    limits.jerk_rad_s3 /= std::clamp(too_hard, 1.05, 2.0);
+  std::array<Vector3, 3> from = tip_motion(cell, start);
+  from[1] -= belt;
+  double takes_s = std::sqrt(kLeastJerk * offset.z() / kLift_m_s2), rides_s = kRideLifted_s;
+  Expected<motion::Trajectory> way = fail("out of reach", "lift");
+  for (int round = 0; round < kRounds && !way; ++round) {
+    if (round > 0) takes_s *= kSlower, rides_s /= kSlower;
+    const auto above_belt = least_jerk(from, from[0] + offset, takes_s);
+    AxisVector seed = start.position;
+    const auto path = [&](double t) -> Expected<AxisVector> {
+      auto q = cell.model.inverse(posed(above_belt(std::min(t, takes_s)) + t * belt, orientation), seed);
+      if (q) seed = *q;
+      return q;
+    };
+    way = motion::follow(start, at, path, takes_s + rides_s, kKnot_s, cell.limits_empty());
   }
-  const Time top = up->back().end();
-  const AxisState lifted = motion::sample(*up, top, cell.model.axes());
-  auto on = ride(cell, lifted, top, orientation, kRideLifted_s);
-  if (!on) on = motion::stop(lifted, top, cell.limits_empty());
-  if (!on) return std::unexpected(on.error());
-  append(*up, *on);
-  return Lift{std::move(*up), top};
+  if (!way) return std::unexpected(way.error());
+  // Whoever takes over does so before that.
+  AxisState riding = start;
+  const Time end = way->back().end();
+  sample(way->back(), end, riding);
+  const auto stop = motion::stop(riding, end, cell.limits_empty());
+  if (!stop) return std::unexpected(stop.error());
+  append(*way, *stop);
+  return Lift{std::move(*way), at + from_s(takes_s)};
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,

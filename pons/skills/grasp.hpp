@@ -33,13 +33,13 @@ struct Grasp {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          std::optional<Eigen::Matrix3d> orientation);
 
-// Straight up with a load on the cups, riding along with the belt, so that neighbours stay where they are.
+// Up with a load on the cups, by `offset` seen from the belt, and on with the belt above it.
 struct Lift {
-  motion::Trajectory trajectory;  // goes on with the belt above the top, as far as the arm reaches, and ends at rest
+  motion::Trajectory trajectory;  // ends at rest; whoever takes over does so before
   Time top;                       // when the height is reached
 };
 [[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
-                                  double height_m);
+                                  const Vector3& offset);
 
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at,

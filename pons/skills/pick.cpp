@@ -33,6 +33,8 @@ constexpr double kLift_m = 0.10;
 constexpr double kHighestLift_m = 0.25;
 constexpr double kClose_m = 0.05;    // neighbours within this of the footprint are lifted over
 constexpr double kClear_m = 0.02;    // by this much
+constexpr double kAway_m = 0.02;     // from them, during the lift
+constexpr double kOneSided = 0.3;    // of the sum of unit vectors
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
@@ -317,7 +319,7 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_height());
+    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset());
     if (!up) return {Status::kRetry, up.error().line(), {}};
     if (auto sent = cell_.arm.stream(up->trajectory); !sent) return {Status::kRetry, sent.error().line(), {}};
     lift_end_ = up->top;
@@ -332,19 +334,24 @@ class Pick final : public task::Skill {
     return {};
   }
 
-  // High enough that the load's underside clears whatever stands close to it.
-  [[nodiscard]] double lift_height() const {
-    double height = kLift_m;
+  // High enough that the load's underside clears whatever stands close to it, and a little away from that: what touches
+  // the load would be dragged up by its flank.
+  [[nodiscard]] Vector3 lift_offset() const {
+    Vector3 offset{0, 0, kLift_m}, away = Vector3::Zero();
     const Vector3 top = target_.world_from_top.translation();
     const double own_m = 0.5 * target_.size_m.head<2>().norm() + kClose_m;
     for (const ObjectBelief& object : cell_.objects()) {
       if (object.track == target_.track) continue;
       const Vector3 other = object.world_from_top.translation();
-      const double apart_m = (other - cell_.predict(target_, object.stamp)).head<2>().norm();
-      if (apart_m > own_m + 0.5 * object.size_m.head<2>().norm()) continue;
-      height = std::max(height, other.z() - (top.z() - target_.size_m.z()) + kClear_m);
+      const Eigen::Vector2d apart = (other - cell_.predict(target_, object.stamp)).head<2>();
+      if (apart.norm() > own_m + 0.5 * object.size_m.head<2>().norm()) continue;
+      offset.z() = std::max(offset.z(), other.z() - (top.z() - target_.size_m.z()) + kClear_m);
+      away.head<2>() -= apart.normalized();
     }
-    return std::min(height, kHighestLift_m);
+    offset.z() = std::min(offset.z(), kHighestLift_m);
+    // Between two on opposite sides there is no way out but up.
+    if (away.norm() > kOneSided) offset += kAway_m * away.normalized();
+    return offset;
   }
 
   Progress lift(Time now) {

@@ -1,0 +1,96 @@
+#include "pons/skills/grasp.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "pons/skills/test_kit.hpp"
+
+namespace pons::skills {
+namespace {
+
+constexpr double kStep_s = 0.005;
+
+class LiftTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    link::State state;
+    state.commanded.position = state.position = world_.robot.home;
+    state.belt_speed_m_s = belt_.x();
+    cerebellum_.publish(state);
+    cell_.refresh(kBegin, {});
+    ASSERT_EQ(cell_.belt_speed_m_s(), belt_.x());
+  }
+
+  // The arm's tip on a parcel, as fast as the belt or at rest.
+  AxisState touching(const Vector3& at, bool riding) {
+    AxisState state;
+    state.position = cell_.model.inverse(Cell::tip_down(at, 0.3), world_.robot.home).value();
+    state.speed = state.acceleration = AxisVector::Zero(state.position.size());
+    if (riding) state.speed = joint_speed(cell_, state.position, belt_);
+    return state;
+  }
+  Lift lift(const AxisState& start, const Vector3& offset) {
+    const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
+    auto up = skills::lift(cell_, start, kBegin, orientation, offset);
+    EXPECT_TRUE(up) << up.error().line();
+    return std::move(*up);
+  }
+  AxisState state(const Lift& lift, double after_s) {
+    return motion::sample(lift.trajectory, kBegin + from_s(after_s), cell_.model.axes());
+  }
+  Vector3 tip(const Lift& lift, double after_s) {
+    return cell_.model.world_from_tip(state(lift, after_s).position).translation();
+  }
+  static double top_s(const Lift& lift) { return to_s(lift.top - kBegin); }
+
+  static constexpr Time kBegin{std::chrono::seconds(7)};
+  const world::World world_ = parcel_cell();
+  const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
+  link::BridgeEnd bridge_{*link_};
+  link::CerebellumEnd cerebellum_{*link_};
+  Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
+  const Vector3 belt_{0.22, 0, 0}, place_{-0.2, 0.05, 0.97};
+};
+
+TEST_F(LiftTest, GoesStraightUpOverTheBeltThatMovesOn) {
+  for (const double height_m : {0.10, 0.25}) {
+    const Lift up = lift(touching(place_, true), {0, 0, height_m});
+    for (double t = 0; t < top_s(up) + 0.3; t += kStep_s) {
+      const Vector3 over_belt = tip(up, t) - t * belt_;
+      EXPECT_LT((over_belt - place_).head<2>().norm(), 0.002) << t;
+      EXPECT_LT(over_belt.z() - place_.z(), height_m + 0.0005) << t;
+    }
+    EXPECT_NEAR(tip(up, top_s(up)).z() - place_.z(), height_m, 0.0005);
+  }
+}
+
+TEST_F(LiftTest, IsSoftAndEndsAtRestWithinTheLimits) {
+  const Lift up = lift(touching(place_, true), {0, 0, 0.12});
+  EXPECT_LE(motion::limit_use(up.trajectory, world_.robot.limits).worst(), 1 + 1e-6);
+  for (double t = kStep_s; t < top_s(up); t += kStep_s) {
+    const double acceleration_m_s2 =
+        (tip(up, t - kStep_s) - 2 * tip(up, t) + tip(up, t + kStep_s)).z() / (kStep_s * kStep_s);
+    EXPECT_LT(std::abs(acceleration_m_s2), 5.5) << t;
+  }
+  EXPECT_TRUE(state(up, to_s(up.trajectory.back().end() - kBegin)).speed.isZero(1e-9));
+}
+
+TEST_F(LiftTest, LeavesToTheSideAndAlsoStartsAtRest) {
+  const Vector3 offset{0.02, -0.01, 0.1};
+  for (const bool riding : {true, false}) {
+    const Lift up = lift(touching(place_, riding), offset);
+    const Vector3 moved = tip(up, top_s(up)) - top_s(up) * belt_ - place_;
+    EXPECT_LT((moved - offset).norm(), 0.001) << riding;
+  }
+}
+
+TEST_F(LiftTest, OutOfReachIsAnError) {
+  const AxisState start = touching(place_, true);
+  const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
+  EXPECT_FALSE(skills::lift(cell_, start, kBegin, orientation, {0, 0, 3.0}));
+}
+
+}  // namespace
+}  // namespace pons::skills
