@@ -125,11 +125,11 @@ bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<Object
   }
   std::ranges::sort(ahead_s);
   const auto turn_s = [](std::size_t place) { return static_cast<double>(place) * kTaskTakes_s + kPickTakes_s; };
+  // The arm would only stand and wait for it to come into the zone.
+  if (!ahead_s.empty() && (belt.pick_x_min_m - x_m) / speed_m_s(express, belt) > kPickTakes_s) return true;
   if (left_s(express, belt) < turn_s(ahead_s.size())) return false;
-  // The arm cannot grip it before it comes into the zone.
-  const double arm_waits_s = std::max(0.0, (belt.pick_x_min_m - x_m) / speed_m_s(express, belt) - kPickTakes_s);
   for (std::size_t i = 0; i < ahead_s.size(); ++i) {
-    if (ahead_s[i] >= turn_s(i) && ahead_s[i] < turn_s(i + 1) + arm_waits_s) return true;
+    if (ahead_s[i] >= turn_s(i) && ahead_s[i] < turn_s(i + 1)) return true;
   }
   return false;
 }
@@ -146,8 +146,8 @@ bool Dispatcher::too_large(const ObjectBelief& belief) const {
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
-  // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner. The slack,
-  // too, is the same for all: what a belt that slows down may add.
+  // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner. The
+  // slack, too, is the same for all: what a belt that slows down may add.
   const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
   const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
                          (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));

@@ -107,9 +107,14 @@ TEST_F(DispatcherTest, ExpressWaitsWhereAnotherWouldBeLostForIt) {
 }
 
 TEST_F(DispatcherTest, ExpressDoesNotWaitForWhatIsLostAnywayOrWhenItWouldBeLostItself) {
-  EXPECT_EQ(dispatcher_.observe({parcel(1, 1.8, "P1"), parcel(2, -1, "P2")}, at(0)).tasks.size(), 2u);
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 1.8, "P1"), parcel(2, 0.5, "P2")}, at(0)).tasks.size(), 2u);
   Dispatcher other({{"P1", {"chute_3", 20}}, {"P2", {"chute_1", 90}}}, world_);
   EXPECT_EQ(other.observe({parcel(1, 0.9, "P1"), parcel(2, 0.5, "P2")}, at(0)).tasks.size(), 2u);
+}
+
+TEST_F(DispatcherTest, TheArmDoesNotWaitForExpressWhileThereIsOtherWork) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1"), parcel(2, -0.3, "P2")}, at(0)).tasks.size(), 1u);
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, -0.1, "P2")}, at(0.4)).tasks.size(), 1u);
 }
 
 TEST_F(DispatcherTest, WaitsForAFewFrames) {

@@ -80,19 +80,22 @@ double clamp_to_belt(double y, double half_extent, double belt_width) {
   return std::clamp(y, -room, room);
 }
 
-// Puts `next` down touching the one before it: beside it, behind it, partly on it or leaning on it.
-Pose beside(const Pose& before, const Vector3& before_size, const Vector3& size, double yaw, double belt_width,
-            bool label_down, Random& random) {
+// Puts `next` down touching the one before it: beside it if there is `room_beside` (it may have to move over for that),
+// behind it, partly on it or leaning on it.
+Pose beside(Pose& before, const Vector3& before_size, const Vector3& size, double yaw, double belt_width,
+            bool label_down, bool room_beside, Random& random) {
   const Footprint front = footprint(before_size, yaw), own = footprint(size, yaw);
   const Vector3 at = before.translation();
   const double rest_z = 0.5 * size.z() + kSettle_m;
   const double choice = random.uniform();
   const double shift = random.uniform(-0.25, 0.25) * before_size.y();
   const Eigen::Rotation2Dd turn(yaw);
-  if (choice < 0.3 && front.y + own.y < 0.5 * belt_width - kEdgeFree_m) {
+  if (room_beside && choice < 0.3 && front.y + own.y < 0.5 * belt_width - kEdgeFree_m) {
     const Eigen::Vector2d step = turn * Eigen::Vector2d(0, 0.5 * (before_size.y() + size.y()) + kSide_m);
     const double side = at.y() > 0 ? -1 : 1;
-    return lying(at.x() + side * step.x(), at.y() + side * step.y(), rest_z, yaw, label_down);
+    const double y = at.y() + side * step.y(), inside_y = clamp_to_belt(y, own.y, belt_width);
+    before.translation().y() += inside_y - y;
+    return lying(at.x() + side * step.x(), inside_y, rest_z, yaw, label_down);
   }
   const double top = at.z() + 0.5 * before_size.z();
   if (choice > 0.6 && size.z() < 0.08 && top < 0.3 * size.x()) {
@@ -110,6 +113,17 @@ Pose beside(const Pose& before, const Vector3& before_size, const Vector3& size,
   return lying(at.x() + step.x(), clamp_to_belt(at.y() + step.y(), own.y, belt_width), rest_z, yaw, label_down);
 }
 
+// Upstream along the belt, until `pose` is clear of `other`; the sides of both run along `yaw`.
+void move_behind(Pose& pose, const Vector3& size, const Pose& other, const Vector3& other_size, double yaw) {
+  const Eigen::Rotation2Dd turn(yaw);
+  const Eigen::Vector2d apart = turn.inverse() * (pose.translation() - other.translation()).head<2>();
+  const Eigen::Vector2d touching = 0.5 * (size + other_size).head<2>();
+  if (std::abs(apart.y()) >= touching.y() || apart.x() <= -touching.x()) return;
+  pose.translation().x() -= (touching.x() + kSide_m + apart.x()) / std::cos(yaw);
+}
+
+bool is_level(const Pose& pose) { return std::abs(pose.linear()(2, 2)) > 0.999; }
+
 // Lays out rows [first, first + count) as one group.
 void lay_out(std::vector<Arrival>& arrivals, const world::Manifest& manifest, std::size_t first, std::size_t count,
              double belt_width, Random random) {
@@ -124,13 +138,21 @@ void lay_out(std::vector<Arrival>& arrivals, const world::Manifest& manifest, st
       const double y = clamp_to_belt(random.uniform(-0.08, 0.08), own.y, belt_width);
       arrival.group_from_middle = lying(0, y, 0.5 * size.z() + kSettle_m, yaw, down);
     } else {
-      arrival.group_from_middle =
-          beside(arrivals[i - 1].group_from_middle, manifest[i - 1].size_m, size, yaw, belt_width, down, random);
+      Pose& pose = arrival.group_from_middle;
+      const bool second = i == first + 1;
+      pose = beside(arrivals[i - 1].group_from_middle, manifest[i - 1].size_m, size, yaw, belt_width, down, second,
+                    random);
+      for (std::size_t j = first; j < i; ++j) {
+        if (j + 1 == i && !is_level(pose)) break;  // it leans on that one
+        move_behind(pose, size, arrivals[j].group_from_middle, manifest[j].size_m, yaw);
+      }
     }
     arrival.touching = count > 1;
-    const double x = arrival.group_from_middle.translation().x();
-    front = std::max(front, x + own.x);
-    rear = std::min(rear, x - own.x);
+  }
+  for (std::size_t i = first; i < first + count; ++i) {
+    const double x = arrivals[i].group_from_middle.translation().x(), half_m = footprint(manifest[i].size_m, yaw).x;
+    front = std::max(front, x + half_m);
+    rear = std::min(rear, x - half_m);
   }
   for (std::size_t i = first; i < first + count; ++i) {
     arrivals[i].group_from_middle.translation().x() -= front;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace pons::sim {
 namespace {
@@ -45,11 +46,36 @@ TEST_P(Mix, EverythingFitsBetweenTheBeltsEdges) {
   const auto arrivals = plan_arrivals(world, *manifest, GetParam());
   for (std::size_t i = 0; i < arrivals.size(); ++i) {
     const Vector3 at = arrivals[i].group_from_middle.translation();
-    EXPECT_LE(std::abs(at.y()), 0.5 * world.belt.width_m - 0.02) << i;
+    const Eigen::Matrix3d turn = arrivals[i].group_from_middle.linear();
+    const double half_m = 0.5 * turn.row(1).cwiseAbs().dot((*manifest)[i].size_m);
+    EXPECT_LE(std::abs(at.y()) + half_m, std::max(half_m, 0.5 * world.belt.width_m)) << i;
     EXPECT_GE(at.z(), 0.4 * (*manifest)[i].size_m.minCoeff()) << i;
     EXPECT_LE(at.x(), 0) << i;
     EXPECT_LT(arrivals[i].group_length_m, 1.3) << i;
   }
+}
+
+// Seen from above, with sides along the same direction; what leans lies on the one before it.
+TEST_P(Mix, NothingIsPutDownIntoAnother) {
+  const world::World world = load_cell();
+  const auto manifest = world::draw_manifest(world, 2000, GetParam());
+  ASSERT_TRUE(manifest);
+  const auto arrivals = plan_arrivals(world, *manifest, GetParam());
+  int pairs = 0;
+  for (std::size_t i = 0; i < arrivals.size(); ++i) {
+    const Pose& one = arrivals[i].group_from_middle;
+    for (std::size_t j = i; j-- > 0 && arrivals[j].group == arrivals[i].group;) {
+      const Pose& other = arrivals[j].group_from_middle;
+      const bool leans = std::abs(one.linear()(2, 2)) < 0.999;
+      if (leans && j + 1 == i) continue;
+      const Eigen::Rotation2Dd turn(std::atan2(one.linear()(1, 0), one.linear()(0, 0)));
+      const Eigen::Vector2d apart = (turn.inverse() * (one.translation() - other.translation()).head<2>()).cwiseAbs();
+      const Eigen::Vector2d touching = 0.5 * ((*manifest)[i].size_m + (*manifest)[j].size_m).head<2>();
+      EXPECT_TRUE(apart.x() > touching.x() - 0.002 || apart.y() > touching.y() - 0.002) << i << " in " << j;
+      ++pairs;
+    }
+  }
+  EXPECT_GT(pairs, 200);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, Mix, testing::Values(1, 2, 3));
