@@ -59,32 +59,6 @@ void Bridge::add_reviewer(Reviewer reviewer) { review_.add(std::move(reviewer));
 
 // ---- in ----
 
-Expected<std::size_t> Bridge::recover(Time now) {
-  const auto records = journal_.tasks();
-  if (!records) return std::unexpected(records.error());
-  std::size_t queued = 0;
-  for (const TaskRecord& record : *records) {
-    if (record.outcome || open_.contains(record.task.id)) continue;
-    std::string_view reason;
-    if (record.started) reason = "interrupted: the bridge ended while it ran";
-    if (!record.started && record.task.deadline) reason = "its deadline was in an earlier run";
-    if (!reason.empty()) {
-      auto written = journal_.outcome(record.task.id, task::Outcome::kFailed, reason, now);
-      if (!written) return std::unexpected(written.error());
-      outcomes_.push_back({record.task.id, task::Outcome::kFailed, std::string(reason), Json::object()});
-    } else if (auto good = review_.check(record.task, now); !good) {
-      const std::string why = "no longer possible: " + good.error().line();
-      auto written = journal_.outcome(record.task.id, task::Outcome::kFailed, why, now);
-      if (!written) return std::unexpected(written.error());
-      outcomes_.push_back({record.task.id, task::Outcome::kFailed, why, Json::object()});
-    } else {
-      enqueue(record.task, now);
-      ++queued;
-    }
-  }
-  return queued;
-}
-
 Expected<Admission> Bridge::submit(std::string_view json, Time now) {
   auto admission = admit(json, now);
   if (!admission) ++refused_;

@@ -48,11 +48,6 @@ class Bridge {
 
   void add_reviewer(Reviewer reviewer);
 
-  // What earlier runs left without an outcome: a task that had not started is queued again if it has no deadline (run
-  // time begins at zero in every run); every other one ends as FAILED, for nobody knows how far it came. Call once,
-  // before the first tick. Returns how many were queued again.
-  [[nodiscard]] Expected<std::size_t> recover(Time now);
-
   // Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge is stopping, or
   // the journal cannot be written. An error leaves nothing behind.
   [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);

@@ -208,23 +208,6 @@ TEST_F(BridgeTest, StartedIsInTheJournalBeforeTheSkillMoves) {
   EXPECT_TRUE(was_started);
 }
 
-TEST_F(BridgeTest, RecoversWhatAnEarlierRunLeft) {
-  ASSERT_TRUE(submit("running", "slow"));
-  bridge_->tick(now_);
-  ASSERT_TRUE(submit("queued", "pick"));
-  ASSERT_TRUE(submit("due", "pick", R"(,"deadline_s":500)"));
-  reopen();
-  EXPECT_EQ(bridge_->recover(now_).value(), 1u);
-  EXPECT_EQ(bridge_->recover(now_).value(), 0u);
-  const auto reports = run();
-  ASSERT_EQ(reports.size(), 3u);
-  EXPECT_EQ(reports[0].reason, "interrupted: the bridge ended while it ran");
-  EXPECT_EQ(reports[1].reason, "its deadline was in an earlier run");
-  EXPECT_EQ(reports[2].id, "queued");
-  EXPECT_EQ(reports[2].outcome, Outcome::kSucceeded);
-  EXPECT_EQ(journal_->counts().value().open, 0);
-}
-
 TEST_F(BridgeTest, RefusesAFullQueueAndForgetsWhatItRefused) {
   journal_ = std::move(*Journal::open(":memory:"));
   bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);

@@ -20,6 +20,7 @@ constexpr double kLoadedSpeedShare = 0.92;
 // Of what the cups hold, how much a planned motion may use up: a load on bellows swings to about twice, at a reversal
 // thrice, what it would take were it rigid.
 constexpr double kGripShare = 0.35;
+constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
 constexpr double kSlowestShare = 0.10;
 constexpr double kBoldest = 0.5, kTimid = 0.9;  // of one correction
 constexpr double kUnsure_kg = 0.1;              // the scale's
@@ -130,9 +131,11 @@ Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal) {
     if (!q) return std::unexpected(q.error());
     auto way = router.route(state, from, {*q, AxisVector::Zero(q->size())}, &held->load, objects_, limits);
     if (!way) return way;
-    const double use = grip_use(model, world.robot.tool, held->load, held->mass_kg + kUnsure_kg, *way);
-    if (use <= kGripShare || share <= kSlowestShare) return way;
-    share = std::max(kSlowestShare, share * std::clamp(kGripShare / use, kBoldest, kTimid));
+    const double mass_kg = held->mass_kg + kUnsure_kg;
+    const double grip = grip_use(model, world.robot.tool, held->load, mass_kg, *way) / kGripShare;
+    const double use = std::max(grip, torque_use(model, world.robot, held->load, mass_kg, *way) / kTorqueShare);
+    if (use <= 1 || share <= kSlowestShare) return way;
+    share = std::max(kSlowestShare, share * std::clamp(1 / use, kBoldest, kTimid));
   }
 }
 

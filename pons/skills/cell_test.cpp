@@ -28,9 +28,7 @@ class CarryTest : public ::testing::Test {
     cell_.refresh(now_, {});
   }
 
-  Expected<AxisVector> goal(const AxisVector& from) {
-    return cell_.model.inverse(Cell::tip_down({-0.2, 0.46, 1.3}, 0), from);
-  }
+  Expected<AxisVector> goal(const AxisVector& from) { return cell_.model.inverse(Cell::tip_down(goal_, 0), from); }
   motion::Trajectory carry(const Vector3& size_m, double mass_kg) {
     cell_.held = Held{"P000001", {.size_m = size_m}, mass_kg};
     auto way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); });
@@ -42,6 +40,7 @@ class CarryTest : public ::testing::Test {
   }
   static double duration_s(const motion::Trajectory& way) { return to_s(way.back().end() - way.front().start); }
 
+  Vector3 goal_{-0.2, 0.46, 1.3};
   const Time now_ = Time(from_s(4));
   const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
@@ -69,6 +68,18 @@ TEST_F(CarryTest, AsHighOrAsHeavyAloneAlreadySlowsItDown) {
   const double base_s = duration_s(carry({0.2, 0.2, 0.05}, 1.5));
   EXPECT_GT(duration_s(carry({0.2, 0.2, 0.3}, 1.5)), 1.05 * base_s);
   EXPECT_GT(duration_s(carry({0.2, 0.2, 0.05}, 3.4)), 1.05 * base_s);
+}
+
+TEST_F(CarryTest, AsksNoMoreOfTheMotorsThanTheyGive) {
+  const Vector3 size_m{0.24, 0.18, 0.14};
+  const double mass_kg = 2.2, give = 0.92;
+  const auto torque = [&](const motion::Trajectory& way) {
+    return torque_use(cell_.model, world_.robot, cell_.held->load, mass_kg, way);
+  };
+  goal_ = {-0.8, -0.46, 1.06};
+  const motion::Trajectory light = carry(size_m, 0.1);
+  EXPECT_GT(torque(light), give) << "the light one's haste would be too much for them";
+  EXPECT_LE(torque(carry(size_m, mass_kg)), give);
 }
 
 TEST_F(CarryTest, EndsAtRestAtTheGoalWithinTheLimits) {

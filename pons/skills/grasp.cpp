@@ -16,7 +16,7 @@ constexpr double kPress_m = 0.006;      // bellows pressed together at the conta
 constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
-constexpr int kRounds = 8;
+constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
@@ -119,10 +119,11 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
   const Vector3 belt = belt_velocity(cell);
   std::array<Vector3, 3> from = tip_motion(cell, start);
   from[1] -= belt;
-  double takes_s = std::sqrt(kLeastJerk * offset.z() / kLift_m_s2), rides_s = kRideLifted_s;
+  double takes_s = std::sqrt(kLeastJerk * offset.norm() / kLift_m_s2), rides_s = kRideLifted_s;
   Expected<motion::Trajectory> way = fail("out of reach", "lift");
   for (int round = 0; round < kRounds && !way; ++round) {
-    if (round > 0) takes_s *= kSlower, rides_s /= kSlower;
+    // An axis may come to its limit: sooner or later it would have to turn back all the way.
+    if (round > 0) takes_s *= kSlower, rides_s /= 2;
     const auto above_belt = least_jerk(from, from[0] + offset, takes_s);
     AxisVector seed = start.position;
     const auto path = [&](double t) -> Expected<AxisVector> {
@@ -151,7 +152,8 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   const Vector3 up{0, 0, kHover_m};
   const Vector3 come_down = belt_velocity(cell) - Vector3(0, 0, kComeDown_m_s);
 
-  // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find.
+  // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. The first look at the
+  // way straight there only: where the parcel will not be by then, another may.
   double ahead_s = 0.8;
   Expected<motion::Trajectory> way = fail("out of reach", "grasp");
   AxisVector seed = start.position;
@@ -165,12 +167,15 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const auto q = cell.model.inverse(posed(hover, *orientation), seed);
     if (!q) return std::unexpected(q.error());
     seed = *q;
-    way = cell.router.route(start, at, {*q, joint_speed(cell, *q, come_down)}, nullptr, cell.objects(), limits);
+    const motion::Waypoint there{*q, joint_speed(cell, *q, come_down)};
+    const bool straight = round < kStraightRounds;
+    way = straight ? motion::move(start, at, there, covering(limits, start))
+                   : cell.router.route(start, at, there, nullptr, cell.objects(), limits);
     if (!way) return std::unexpected(way.error());
     const double needed_s = to_s(way->back().end() - at);
     const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;
     ahead_s = needed_s;
-    if (converged) break;
+    if (converged && !straight) break;
   }
   grasp.orientation = *orientation;
   grasp.trajectory = std::move(*way);

@@ -33,10 +33,11 @@ struct Grasp {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          std::optional<Eigen::Matrix3d> orientation);
 
-// Up with a load on the cups, by `offset` seen from the belt, and on with the belt above it.
+// With a load on the cups: straight, by `offset` as seen from the belt, and on with the belt there. Soft enough for the
+// load not to bounce.
 struct Lift {
   motion::Trajectory trajectory;  // ends at rest; whoever takes over does so before
-  Time top;                       // when the height is reached
+  Time top;                       // when the offset is reached
 };
 [[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                                   const Vector3& offset);

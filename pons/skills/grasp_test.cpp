@@ -57,7 +57,7 @@ class LiftTest : public ::testing::Test {
 TEST_F(LiftTest, GoesStraightUpOverTheBeltThatMovesOn) {
   for (const double height_m : {0.10, 0.25}) {
     const Lift up = lift(touching(place_, true), {0, 0, height_m});
-    for (double t = 0; t < top_s(up) + 0.3; t += kStep_s) {
+    for (double t = 0; t < top_s(up) + 0.25; t += kStep_s) {
       const Vector3 over_belt = tip(up, t) - t * belt_;
       EXPECT_LT((over_belt - place_).head<2>().norm(), 0.002) << t;
       EXPECT_LT(over_belt.z() - place_.z(), height_m + 0.0005) << t;
@@ -90,6 +90,36 @@ TEST_F(LiftTest, OutOfReachIsAnError) {
   const AxisState start = touching(place_, true);
   const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
   EXPECT_FALSE(skills::lift(cell_, start, kBegin, orientation, {0, 0, 3.0}));
+}
+
+class GraspTest : public LiftTest {
+ protected:
+  ObjectBelief parcel(std::uint32_t track, const Vector3& top, const Vector3& size_m) const {
+    ObjectBelief belief;
+    belief.track = track;
+    belief.code = std::to_string(track);
+    belief.stamp = kBegin;
+    belief.world_from_top = pose_xyz_yaw(top.x(), top.y(), top.z(), 0.1);
+    belief.velocity_m_s = belt_;
+    belief.size_m = size_m;
+    return belief;
+  }
+};
+
+TEST_F(GraspTest, ATallerNeighbourBehindIsNotInTheWayFromAnyChute) {
+  // While the arm comes, it moves to where the parcel is now.
+  for (const double x : {-0.55, -0.48}) {
+    cell_.refresh(kBegin, {parcel(1, {x, -0.035, 1.06}, {0.17, 0.17, 0.16}),
+                           parcel(2, {x - 0.259, -0.073, 1.08}, {0.35, 0.25, 0.18})});
+    for (const world::Place& place : world_.places) {
+      if (place.kind != world::PlaceKind::kChute) continue;
+      const AxisState start = touching(place.center_m + Vector3(0, 0, 0.12), false);
+      const auto grasp = plan_grasp(cell_, start, kBegin, *cell_.find("1"), std::nullopt);
+      ASSERT_TRUE(grasp) << place.name << ": " << grasp.error().line();
+      const Vector3 meets = cell_.predict(*cell_.find("1"), grasp->contact);
+      EXPECT_LT((grasp->contact_point - meets).head<2>().norm(), 0.001) << place.name;
+    }
+  }
 }
 
 }  // namespace

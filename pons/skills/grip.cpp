@@ -76,4 +76,20 @@ double grip_use(model::RobotModel& model, const world::Tool& tool, const Load& l
   return worst;
 }
 
+double torque_use(model::RobotModel& model, const world::Robot& robot, const Load& load, double mass_kg,
+                  const motion::Trajectory& trajectory) {
+  if (trajectory.empty()) return 0;
+  const Vector3 tip_from_com = load.offset_in_tip_m + Vector3(0, 0, 0.5 * load.size_m.z());
+  const Vector3 com = robot.tool.flange_from_tip * tip_from_com;
+  const model::Payload payload{mass_kg, {com.x(), com.y(), com.z()}};
+  AxisVector torque_nm = AxisVector::Zero(model.axes());
+  double worst = 0;
+  for (Time time = trajectory.front().start; time < trajectory.back().end(); time += from_s(kStep_s)) {
+    const AxisState state = motion::sample(trajectory, time, model.axes());
+    model.inverse_dynamics(state.position, state.speed, state.acceleration, payload, torque_nm);
+    worst = std::max(worst, torque_nm.cwiseAbs().cwiseQuotient(robot.limits.torque_nm).maxCoeff());
+  }
+  return worst;
+}
+
 }  // namespace pons::skills

@@ -1,4 +1,4 @@
-// How much of what the cups can hold a motion uses up.
+// How much a motion uses up of what the cups can hold and of what the motors can give.
 #pragma once
 
 #include "pons/model/robot_model.hpp"
@@ -13,5 +13,9 @@ namespace pons::skills {
 // and shear counts as the pull that friction needs to bear it. Above 1 the load comes off.
 [[nodiscard]] double grip_use(model::RobotModel& model, const world::Tool& tool, const Load& load, double mass_kg,
                               const motion::Trajectory& trajectory);
+
+// The largest share of a motor's torque limit that `trajectory` asks for with the load, were it rigid.
+[[nodiscard]] double torque_use(model::RobotModel& model, const world::Robot& robot, const Load& load, double mass_kg,
+                                const motion::Trajectory& trajectory);
 
 }  // namespace pons::skills

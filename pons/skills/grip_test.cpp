@@ -127,7 +127,21 @@ TEST_F(GripTest, TurnedOverTheWristALoadResistsByHowItLies) {
   EXPECT_NEAR(use(across, mass_kg, way) - use(along, mass_kg, way), expected, 0.01 * expected);
 }
 
-TEST_F(GripTest, NoWayAsksForNothing) { EXPECT_EQ(use({.size_m = {0.2, 0.2, 0.2}}, 3, {}), 0); }
+TEST_F(GripTest, NoWayAsksForNothing) {
+  EXPECT_EQ(use({.size_m = {0.2, 0.2, 0.2}}, 3, {}), 0);
+  EXPECT_EQ(torque_use(model_, world_.robot, {.size_m = {0.2, 0.2, 0.2}}, 3, {}), 0);
+}
+
+TEST_F(GripTest, TheMotorsBearTheLoadsWeightAtItsLever) {
+  // About the second axis, which lies level: what the load adds is its weight times its distance from the axis.
+  const Load load{.size_m = {0.2, 0.2, 0.2}};
+  const motion::Trajectory still = hold(level_);
+  const AxisVector q = joints(level_).value();
+  const auto torque = [&](double mass_kg) { return torque_use(model_, world_.robot, load, mass_kg, still); };
+  const Eigen::Matrix<double, 3, 1> lift = model_.tip_jacobian(q).row(2).transpose().segment<3>(1);
+  // The second axis has the largest share of its limit.
+  EXPECT_NEAR((torque(5) - torque(2)) * world_.robot.limits.torque_nm[1], 3 * kGravity_m_s2 * std::abs(lift[0]), 1e-6);
+}
 
 }  // namespace
 }  // namespace pons::skills

@@ -38,8 +38,9 @@ constexpr double kOneSided = 0.3;    // of the sum of unit vectors
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kSetDown_m = 0.03;  // over the belt, when let go: a heavy load hangs lower than its size says
-constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
+constexpr double kPutBack_m = 0.005;  // over where it was lifted from
+constexpr double kSetDown_m = 0.03;   // over the belt, when let go: a heavy load hangs lower than its size says
+constexpr double kBeyond_m = 0.15;    // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
@@ -88,7 +89,7 @@ class Pick final : public task::Skill {
     if (phase_ == Phase::kSetDown) {
       verdict_ = {Status::kFailed, "cancelled", {}};
     } else if (phase_ == Phase::kLift) {
-      begin_set_down(now, {Status::kFailed, "cancelled", {}});
+      begin_put_back(now, {Status::kFailed, "cancelled", {}});
     } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
     }
@@ -168,8 +169,21 @@ class Pick final : public task::Skill {
     if (way && cell_.arm.stream(*way)) aside_ = true;
   }
 
-  // What cannot be sorted, or what an earlier task left on the cups, goes back on the belt where there is room, and
-  // rides on into the exception chute.
+  // What cannot be sorted goes back to where it was lifted from, which has moved on with the belt, and rides on into
+  // the exception chute.
+  Progress begin_put_back(Time now, Progress verdict) {
+    const Time from = cell_.arm.splice_time(now);
+    const AxisState state = cell_.arm.planned(from);
+    const double risen_m = cell_.model.world_from_tip(state.position).translation().z() - lift_from_.z();
+    const auto down = skills::lift(cell_, state, from, grasp_.orientation, Vector3(0, 0, kPutBack_m - risen_m));
+    if (!down || !cell_.arm.stream(down->trajectory)) return begin_set_down(now, std::move(verdict));
+    verdict_ = std::move(verdict);
+    released_at_ = down->top;
+    phase_ = Phase::kSetDown;
+    return {};
+  }
+
+  // What an earlier task left on the cups goes back on the belt where there is room.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
     // Where there will be room depends on when it gets there, and that on where.
@@ -290,10 +304,16 @@ class Pick final : public task::Skill {
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
-      cell_.arm.vacuum(false);
-      cell_.missed = Miss{code_, now};
-      begin_retreat(now, {Status::kRetry, fmt::format("{} of {} cups sealed", cell_.arm.sealed_cups(), all), {}});
+      return give_up(now, fmt::format("{} of {} cups sealed", cell_.arm.sealed_cups(), all));
     }
+    return {};
+  }
+
+  // Lets go of what is not lifted.
+  Progress give_up(Time now, std::string why) {
+    cell_.arm.vacuum(false);
+    cell_.missed = Miss{code_, now};
+    begin_retreat(now, {Status::kRetry, std::move(why), {}});
     return {};
   }
 
@@ -320,8 +340,9 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset());
-    if (!up) return {Status::kRetry, up.error().line(), {}};
-    if (auto sent = cell_.arm.stream(up->trajectory); !sent) return {Status::kRetry, sent.error().line(), {}};
+    if (!up || !cell_.arm.stream(up->trajectory)) {
+      return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
+    }
     lift_end_ = up->top;
     const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     Held held{.code = code_};
@@ -377,7 +398,7 @@ class Pick final : public task::Skill {
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     if (mass > limit) {
-      return begin_set_down(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
+      return begin_put_back(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
     }
     return success(now);
   }

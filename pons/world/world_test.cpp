@@ -207,9 +207,9 @@ TEST_F(BrokenWorld, RefusesWrongShapesAndNumbers) {
 
 TEST_F(BrokenWorld, RefusesWhatDoesNotFitTogether) {
   EXPECT_THAT(changed("x_end_m: 1.00", "x_end_m: -3"), HasSubstr("belt.x_end_m: is not above x_start_m"));
-  EXPECT_THAT(changed("pick_x_max_m: 0.52", "pick_x_max_m: -0.60"),
+  EXPECT_THAT(changed("pick_x_max_m: 0.58", "pick_x_max_m: -0.60"),
               HasSubstr("belt.pick_x_max_m: is not above pick_x_min_m"));
-  EXPECT_THAT(changed("pick_x_max_m: 0.52", "pick_x_max_m: 1.45"),
+  EXPECT_THAT(changed("pick_x_max_m: 0.58", "pick_x_max_m: 1.45"),
               HasSubstr("belt.pick_x_max_m: 1.45 is out of range"));
   EXPECT_THAT(changed("box: 0.55", "box: 0.56"), HasSubstr("arrivals.kinds: the shares sum to 1.01"));
   EXPECT_THAT(changed("touching: 0.22", "touching: 1.22"), HasSubstr("arrivals.touching: 1.22 is out of range"));
