@@ -20,7 +20,7 @@ constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are
 constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
 constexpr double kLoose_m = 0.012;  // a shorter one falls through flat
-constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180;
+constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180, kLessSteep_rad = 15 * std::numbers::pi / 180;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kWide_m = 0.28;                             // a wider one must hang still to fall through the mouth
 constexpr Duration kSwing = std::chrono::milliseconds(500);  // at most
@@ -85,19 +85,29 @@ class Place final : public task::Skill {
   // Over the middle of the mouth, the parcel's sides along the mouth's; which of the turns, the arm decides.
   Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
     const bool tight = cell_.held->load.size_m.x() > target.size_m.head<2>().minCoeff() - kLoose_m;
-    // A long one goes in end first, if the arm can; flat it would lie across the rim.
-    for (const double tilt : tight ? std::vector{kEndFirst_rad, 0.0} : std::vector{0.0}) {
+    // A long one goes in end first, if the arm can; flat it would lie across the rim. The more it leans the higher it
+    // is let go, and the deeper it falls.
+    for (const double tilt : tight ? std::vector{kEndFirst_rad, kLessSteep_rad, 0.0} : std::vector{0.0}) {
       for (int height = 0; height < kHeights; ++height) {
-        if (auto q = nearest(target, tilt, kHigher_m * height, from)) return q;
+        const double tip_z = height_over(target, tilt) + kHigher_m * height;
+        const double drop_m = tip_z - cell_.held->load.size_m.z() - (target.center_m.z() - target.size_m.z());
+        if (tilt > 0 && drop_m > cell_.world.rules.max_drop_m) break;
+        if (auto q = nearest(target, tilt, tip_z, from)) return q;
       }
     }
     return fail("out of reach", name_);
   }
 
-  Expected<AxisVector> nearest(const world::Place& target, double tilt, double higher_m, const AxisVector& from) {
+  // Of the tip, at least, to let go over the rim.
+  [[nodiscard]] double height_over(const world::Place& target, double tilt) const {
+    const Vector3& size = cell_.held->load.size_m;
+    const double underside_m = size.z() * std::cos(tilt) + 0.5 * size.x() * std::sin(tilt);
+    return target.center_m.z() + std::max(kTipOverRim_m, kOverRim_m + underside_m);
+  }
+
+  Expected<AxisVector> nearest(const world::Place& target, double tilt, double tip_z, const AxisVector& from) {
     const Load& load = cell_.held->load;
-    const double underside_m = load.size_m.z() * std::cos(tilt) + 0.5 * load.size_m.x() * std::sin(tilt);
-    const Vector3 tip = target.center_m + Vector3(0, 0, higher_m + std::max(kTipOverRim_m, kOverRim_m + underside_m));
+    const Vector3 tip(target.center_m.x(), target.center_m.y(), tip_z);
     const Eigen::AngleAxisd tip_from_load(load.yaw_in_tip_rad, Vector3::UnitZ());
     Expected<AxisVector> best = fail("out of reach", name_);
     double least = 0;
