@@ -22,10 +22,12 @@ constexpr int kHeights = 3;
 constexpr double kLoose_m = 0.012;  // a shorter one falls through flat
 constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180, kLessSteep_rad = 15 * std::numbers::pi / 180;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kWide_m = 0.28;                             // a wider one must hang still to fall through the mouth
-constexpr Duration kSwing = std::chrono::milliseconds(500);  // at most
-constexpr double kStill_nm = 0.15;                           // the wrist's moment changes by less within
-constexpr int kStillTicks = 6;
+constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
+constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
+constexpr double kSwings = 2.5;      // a lean when it is let go over the one it may fall in with
+constexpr double kFall_s = 0.1;      // from letting go to the rim
+constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of the swing
+constexpr Duration kSwing = std::chrono::milliseconds(1500);  // at most
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                           // of the load's mass
@@ -92,7 +94,10 @@ class Place final : public task::Skill {
         const double tip_z = height_over(target, tilt) + kHigher_m * height;
         const double drop_m = tip_z - cell_.held->load.size_m.z() - (target.center_m.z() - target.size_m.z());
         if (tilt > 0 && drop_m > cell_.world.rules.max_drop_m) break;
-        if (auto q = nearest(target, tilt, tip_z, from)) return q;
+        auto q = nearest(target, tilt, tip_z, from);
+        if (!q) continue;
+        end_first_ = tilt > 0;
+        return q;
       }
     }
     return fail("out of reach", name_);
@@ -143,24 +148,33 @@ class Place final : public task::Skill {
       const bool over = off.x() < kMiddle * target.size_m.x() && off.y() < kMiddle * target.size_m.y();
       return over ? Progress{Status::kSucceeded, "let go early", detail} : Progress{Status::kFailed, "dropped", detail};
     }
-    const bool wide = cell_.held->load.size_m.head<2>().maxCoeff() > kWide_m;
-    if (now < (wide ? arrives_ : arrives_ - kLetGoEarly)) return {};
-    if (wide && !hangs_still() && now < arrives_ + kSwing) return {};
+    const bool level = hangs_level(now);
+    if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
+    if (!level && now < arrives_ + kSwing) return {};
     cell_.arm.vacuum(false);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
   }
 
-  // By the wrist's moment, which swings with the load.
-  bool hangs_still() {
+  // From the vertical, in radians, and still fall through the mouth: its lower edges move aside with its height.
+  [[nodiscard]] double may_lean() const {
+    const Vector3& size = cell_.held->load.size_m;
+    const double mouth_m = cell_.world.place(name_)->size_m.head<2>().minCoeff();
+    const double across_m = end_first_ ? size.y() : std::max(size.x(), size.y());
+    return std::max(0.0, 0.5 * (mouth_m - across_m) - kAside_m) / size.z();
+  }
+
+  // The cups are springs, and the load swings on them: will it be level when it has fallen to the rim? It keeps turning
+  // as it turned when it was let go.
+  bool hangs_level(Time now) {
     const auto& torque = cell_.arm.state().wrist_torque_nm;
-    const Eigen::Vector2d moment(torque[0], torque[1]);
-    if (still_ticks_ == 0 || (moment - still_nm_).norm() > kStill_nm) {
-      still_nm_ = moment;
-      still_ticks_ = 0;
-    }
-    return ++still_ticks_ > kStillTicks;
+    const Eigen::Vector2d felt_nm(torque[0], torque[1]);
+    if (now > felt_at_) turns_nm_s_ += kFresh * ((felt_nm - felt_nm_) / to_s(now - felt_at_) - turns_nm_s_);
+    felt_nm_ = felt_nm;
+    felt_at_ = now;
+    const double may_nm = kCups_nm_rad * may_lean();
+    return (felt_nm + kFall_s * turns_nm_s_).norm() <= may_nm && felt_nm.norm() <= kSwings * may_nm;
   }
 
   Progress release(Time now) {
@@ -182,9 +196,10 @@ class Place final : public task::Skill {
   std::string name_, object_;
   Time started_, arrives_;
   Phase phase_ = Phase::kPlan;
-  Eigen::Vector2d still_nm_ = Eigen::Vector2d::Zero();
-  int lost_ticks_ = 0, still_ticks_ = 0;
-  bool cancelled_ = false;
+  Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
+  Time felt_at_;
+  int lost_ticks_ = 0;
+  bool end_first_ = false, cancelled_ = false;
 };
 
 }  // namespace
