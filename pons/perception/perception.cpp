@@ -111,6 +111,8 @@ std::vector<ObjectBelief> Perception::beliefs(Time now, double belt_travel_m) co
   return impl_->tracker.beliefs(now, belt_travel_m);
 }
 
+bool Perception::wants_labels() const { return impl_->tracker.wants_labels(); }
+
 void Perception::forget(std::uint32_t track) { impl_->tracker.forget(track); }
 
 int Perception::occupancy(std::string_view place) const {

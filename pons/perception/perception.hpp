@@ -34,6 +34,9 @@ class Perception {
   // most 0.3 while the object is partly hidden or something lies or leans on it: take what hides it first.
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
 
+  // Whether a frame of a camera that reads labels could teach anything: something lies in view unread.
+  [[nodiscard]] bool wants_labels() const;
+
   // The arm took this one (or it fell): stop predicting it with the belt. Frames shuttered within half a second after
   // the newest one taken in do not bring it back; what still lies there later is a new track.
   void forget(std::uint32_t track);

@@ -11,6 +11,7 @@ constexpr double kGate_m = 0.07;
 constexpr double kRescue_m = 0.30;  // how far a push may carry an object between two frames
 constexpr double kSameSize_m = 0.012;
 constexpr double kOtherSize_m = 0.030;
+constexpr double kAsHigh_m = 0.02;
 constexpr double kDisturbed_m = 0.015;
 constexpr double kDisturbed_rad = 6 * std::numbers::pi / 180;
 constexpr double kSquare_m = 0.012;  // sides closer than that may swap between frames
@@ -19,7 +20,9 @@ constexpr std::size_t kMemory = 16;  // observations averaged
 constexpr std::size_t kMotionMemory = 4;
 constexpr double kMoved_m = 0.009;  // over the motion memory: more than noise
 constexpr int kDoubts = 4;
-constexpr double kDoubtful = 0.3;  // confidence of what is partly hidden
+constexpr int kReads = 2;            // of one code until it is sure
+constexpr int kEnoughAttempts = 10;  // whose label shows none of them will show none
+constexpr double kDoubtful = 0.3;    // confidence of what is partly hidden
 constexpr Duration kSwallow = std::chrono::milliseconds(500);
 
 double turn(double from, double to) { return std::remainder(to - from, std::numbers::pi); }
@@ -136,7 +139,7 @@ double Tracker::cost(const Track& track, const Sighting& sighting, Time stamp, d
     // Of a part that shows, only that it lies where the object should is known.
     const Vector3 seen = sighting.world_from_top.translation();
     const bool inside = expected(track, stamp, travel_m).covers(seen.x(), seen.y(), 0.01);
-    const bool as_high = std::abs(seen.z() - track.estimate.z_m) < 0.02;
+    const bool as_high = std::abs(seen.z() - track.estimate.z_m) < kAsHigh_m;
     return inside && as_high ? 0.1 + distance : kNever;
   }
   if (distance > kGate_m) return kNever;
@@ -188,12 +191,12 @@ void Tracker::rescue(const std::vector<Sighting>& sightings, Time stamp, double 
   }
 }
 
-void Tracker::restart(Track& track, const Observation& observation) {
+void Tracker::restart(Track& track, const Observation& observation, bool pushed) {
   // Pushed twice in a row means that it moves on its own: keep its speed.
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
   const Observation& last = track.observations.back();
   const double elapsed_s = to_s(observation.stamp - last.stamp);
-  if (track.restarts > 0 && elapsed_s > 0.05 && elapsed_s < 1) {
+  if (pushed && track.restarts > 0 && elapsed_s > 0.05 && elapsed_s < 1) {
     velocity = Eigen::Vector2d(observation.x_m - last.x_m, observation.y_m - last.y_m) / elapsed_s;
     if (velocity.norm() > 0.6) velocity.setZero();
   }
@@ -201,14 +204,27 @@ void Tracker::restart(Track& track, const Observation& observation) {
   track.estimate = estimate(track.observations);
   track.estimate.velocity = velocity;
   track.odd_sizes = 0;
-  ++track.restarts;
+  if (pushed) ++track.restarts;
 }
 
-void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
+// Where the track should be, another lies beside this sighting: what was taken for one is two.
+bool Tracker::parted(const Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
+                     double travel_m) {
+  const Sighting whole = expected(track, stamp, travel_m);
+  return std::ranges::any_of(sightings, [&](const Sighting& other) {
+    const Vector3 middle = other.world_from_top.translation();
+    return &other != &sighting && std::abs(middle.z() - track.estimate.z_m) < kAsHigh_m &&
+           whole.covers(middle.x(), middle.y(), 0);
+  });
+}
+
+void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
+                      double travel_m) {
   track.last_seen = stamp;
   track.missing = 0;
   track.crowded = sighting.crowded || sighting.covered;
   track.covered = sighting.covered;
+  track.whole = sighting.complete;
   ++track.frames_seen;
   if (!usable(sighting)) return;
   const Observation o = observe(&track, sighting, stamp, travel_m);
@@ -224,7 +240,10 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   const bool turned = !round && std::abs(o.yaw_rad - track.estimate.yaw_rad) > kDisturbed_rad;
   const bool resized = size_difference(o.size_m, track.estimate.size_m) > 0.02;
   const bool now_whole = was_doubtful && !o.doubtful;
-  if (resized && !now_whole && ++track.odd_sizes < 2) return;  // once may be a bad cut between neighbours
+  // Once may be a bad cut between neighbours; a shorter one in the same place, something that hangs over it.
+  const bool hidden =
+      within(expected(track, stamp, travel_m), sighting) && !parted(track, sighting, sightings, stamp, travel_m);
+  if (resized && !now_whole && ++track.odd_sizes < (hidden ? kDoubts : 2)) return;
   track.last = sighting;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
     // Another object lies here now, on this one or in its place: whose label it was is no longer known.
@@ -232,7 +251,9 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
     track.reads = track.label_attempts = 0;
   }
   if (now_whole || (o.doubtful && !was_doubtful) || resized || moved > kDisturbed_m || turned) {
-    restart(track, o);
+    // What is seen of it changed: that its middle moved says nothing of its speed.
+    const bool same_whole = !resized && !o.doubtful && !was_doubtful;
+    restart(track, o, same_whole);
     return;
   }
   track.odd_sizes = 0;
@@ -285,7 +306,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
     seen[t] = true;
     known[s] = usable(sightings[s]) && sightings[s].complete;
     if (tracks_[t].forgotten) continue;
-    take_in(tracks_[t], sightings[s], stamp, belt_travel_m);
+    take_in(tracks_[t], sightings[s], sightings, stamp, belt_travel_m);
     ids[s] = tracks_[t].id;
   }
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
@@ -305,6 +326,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
     track.last_seen = stamp;
     track.crowded = sightings[s].crowded || sightings[s].covered;
     track.covered = sightings[s].covered;
+    track.whole = sightings[s].complete;
     ids[s] = track.id;
     tracks_.push_back(std::move(track));
   }
@@ -317,7 +339,14 @@ void Tracker::label_attempt(std::uint32_t track) {
 
 bool Tracker::wants_label(std::uint32_t track) const {
   const Track* const found = find(track);
-  return found != nullptr && found->reads < 2;
+  return found != nullptr && found->reads < kReads;
+}
+
+bool Tracker::wants_labels() const {
+  return std::ranges::any_of(tracks_, [this](const Track& track) {
+    return !track.forgotten && track.whole && !track.covered && track.last_seen == passages_.back().stamp &&
+           track.reads < kReads && track.label_attempts < kEnoughAttempts;
+  });
 }
 
 void Tracker::label_read(std::uint32_t track, std::string_view code) {

@@ -29,6 +29,8 @@ class Tracker {
   void label_read(std::uint32_t track, std::string_view code);
   // False once its code has been read twice.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
+  // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
+  [[nodiscard]] bool wants_labels() const;
 
   void forget(std::uint32_t track);
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
@@ -57,7 +59,7 @@ class Tracker {
     Sighting last;  // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
-    bool crowded = false, covered = false;  // when last seen
+    bool crowded = false, covered = false, whole = false;  // when last seen
     std::string code, other_code;
     int reads = 0, other_reads = 0, label_attempts = 0;
     bool forgotten = false;  // only kept to swallow frames from before it was taken
@@ -74,8 +76,11 @@ class Tracker {
   [[nodiscard]] double cost(const Track& track, const Sighting& sighting, Time stamp, double travel_m) const;
   std::vector<int> associate(const std::vector<Sighting>& sightings, Time stamp, double travel_m) const;
   void rescue(const std::vector<Sighting>& sightings, Time stamp, double travel_m, std::vector<int>& track_of) const;
-  void take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m);
-  void restart(Track& track, const Observation& observation);
+  [[nodiscard]] static bool parted(const Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings,
+                                   Time stamp, double travel_m);
+  void take_in(Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
+               double travel_m);
+  void restart(Track& track, const Observation& observation, bool pushed);
   [[nodiscard]] bool visibly_gone(const Track& track, const TopView& view, const Segments& segments,
                                   const std::vector<bool>& known, Time stamp, double travel_m) const;
   [[nodiscard]] ObjectBelief belief(const Track& track, Time now, double travel_m, double belt_speed_m_s) const;

@@ -14,6 +14,8 @@ CameraCrew::CameraCrew(const world::World& world, std::vector<body::Camera*> cam
       frames_(cameras_.size()),
       busy_(cameras_.size(), false) {
   for (const world::CameraSpec& spec : world_.cameras) next_shutter_.push_back(Time(from_s(spec.phase_s)));
+  finds_ = std::ranges::any_of(
+      world_.cameras, [](const world::CameraSpec& camera) { return camera.watches == "belt" && !camera.reads_labels; });
   developer_ = std::jthread([this](const std::stop_token& stop) { develop(stop); });
   perceiver_ = std::jthread([this](const std::stop_token& stop) { perceive(stop); });
 }
@@ -32,6 +34,7 @@ void CameraCrew::open_shutters(Time now, const body::Sensors& sensors) {
     next_shutter_[camera] += from_s(world_.cameras[camera].period_s);
     {
       std::unique_lock lock(mutex_);
+      if (finds_ && world_.cameras[camera].reads_labels && !wants_labels_) continue;
       if (pace_ == Pace::kRealTime && busy_[camera]) continue;
       changed_.wait(lock, [&] { return !busy_[camera] || error_; });
       if (error_) return;
@@ -91,8 +94,12 @@ void CameraCrew::perceive(const std::stop_token& stop) {
 Snapshot CameraCrew::take_in(const Shot& shot) {
   for (const std::uint32_t track : shot.forgotten) perception_.forget(track);
   perception_.process(frames_[shot.camera], shot.moment);
-  Snapshot snapshot{
-      shot.stamp, shot.due, shot.moment.belt_travel_m, perception_.beliefs(shot.stamp, shot.moment.belt_travel_m), {}};
+  Snapshot snapshot{shot.stamp,
+                    shot.due,
+                    shot.moment.belt_travel_m,
+                    perception_.beliefs(shot.stamp, shot.moment.belt_travel_m),
+                    {},
+                    perception_.wants_labels()};
   for (const world::CameraSpec& camera : world_.cameras) {
     if (camera.watches != "belt") snapshot.occupancy[camera.watches] = perception_.occupancy(camera.watches);
   }
@@ -116,6 +123,7 @@ Expected<std::optional<Snapshot>> CameraCrew::collect(Time now, const std::vecto
     newest = std::move(snapshots_.front());
     snapshots_.pop_front();
   }
+  if (newest) wants_labels_ = newest->wants_labels;
   return newest;
 }
 

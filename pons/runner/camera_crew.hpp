@@ -27,6 +27,7 @@ struct Snapshot {
   double belt_travel_m = 0;  // at the stamp
   std::vector<ObjectBelief> objects;
   std::map<std::string, int> occupancy;  // of watched places
+  bool wants_labels = false;
 };
 
 enum class Pace : std::uint8_t { kLockstep, kRealTime };
@@ -41,7 +42,8 @@ class CameraCrew {
   CameraCrew(const CameraCrew&) = delete;
   CameraCrew& operator=(const CameraCrew&) = delete;
 
-  // On the thread that advances the body, after each advance.
+  // On the thread that advances the body, after each advance. A camera that reads labels skips its turn while nothing
+  // that it could read is known to lie unread.
   void open_shutters(Time now, const body::Sensors& sensors);
 
   // On the bridge's thread: the newest snapshot that is due, if there is a new one. `forgotten` tracks are passed on to
@@ -65,6 +67,7 @@ class CameraCrew {
   std::vector<body::Camera*> cameras_;
   perception::Perception& perception_;
   Pace pace_;
+  bool finds_ = false;              // what lies on the belt, some camera that reads no labels
   std::vector<Time> next_shutter_;  // a camera; the body's thread only
   std::vector<RgbdFrame> frames_;   // a camera; whose shot is developed or taken in
 
@@ -75,6 +78,7 @@ class CameraCrew {
   std::size_t developed_ = 0;             // so many at the front of shots_
   std::deque<Snapshot> snapshots_;        // taken in, by stamp
   std::vector<std::uint32_t> to_forget_;  // not yet with a shot
+  bool wants_labels_ = false;             // as of the newest snapshot collected
   std::optional<Error> error_;
   std::jthread developer_, perceiver_;
 };
