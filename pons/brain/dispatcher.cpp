@@ -91,7 +91,11 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     decided_.insert(belief.track);
     return;
   }
-  if (too_large(belief)) return ride(belief, kRideTooLarge, decisions);
+  if (too_large(belief)) {
+    // It may be two that touch: as long as a camera looks, they may still be told apart.
+    if (in_reach && x_m < label_view_end_m_) return;
+    return ride(belief, kRideTooLarge, decisions);
+  }
   if (!in_reach) return ride(belief, kRideLate, decisions);
   if (known.failed) {
     // What was in its way may have gone by then; meanwhile the arm takes another.

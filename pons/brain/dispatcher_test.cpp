@@ -136,11 +136,19 @@ TEST_F(DispatcherTest, LetsParcelsWithoutALabelRideOnceTheCameraIsPassed) {
 
 TEST_F(DispatcherTest, LetsStrangersGiantsAndLatecomersRide) {
   EXPECT_EQ(only_reason(dispatcher_.observe({parcel(1, 0, "P9")}, at(0))), kRideUnknown);
-  ObjectBelief giant = parcel(2, 0, "P1");
+  ObjectBelief giant = parcel(2, 0.55, "P1");
   giant.size_m.x() = 0.5;
   EXPECT_EQ(only_reason(dispatcher_.observe({giant}, at(0))), kRideTooLarge);
   EXPECT_EQ(only_reason(dispatcher_.observe({parcel(3, 2.1, "P2")}, at(0))), kRideLate);
   EXPECT_EQ(dispatcher_.unseen(), std::vector<std::string>{"P3"});
+}
+
+TEST_F(DispatcherTest, WhatSeemsTooLargeMayStillBeTwo) {
+  ObjectBelief both = parcel(1, 0, "P1");
+  both.size_m.x() = 0.5;
+  const Decisions first = dispatcher_.observe({both}, at(0));
+  EXPECT_TRUE(first.tasks.empty() && first.rides.empty());
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, 0.1, "P2")}, at(1)).tasks.size(), 2u);
 }
 
 TEST_F(DispatcherTest, TwoParcelsWithOneCodeAreSortedOnce) {

@@ -28,7 +28,7 @@ struct Perception::Impl {
   std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
 
   Impl(const world::World& the_world, model::RobotModel model)
-      : world(the_world), self_filter(std::move(model)), tracker(the_world.belt) {
+      : world(the_world), self_filter(std::move(model)), tracker(the_world) {
     for (const auto& camera : world.cameras) {
       const world::Place* const place = world.place(camera.watches);
       if (place != nullptr) watches.try_emplace(place->name, world, *place);

@@ -79,6 +79,7 @@ world::World belt_world() {
   world.name = "test";
   world.robot = model::hanging_arm();
   world.belt = {-1.6, 1.0, 0.0, 0.5, 0.9, 0.25, 0.3, 7.0, -0.4, 0.45};
+  world.rules.max_size_m = 0.40;
   world.places = {{"tray", world::PlaceKind::kTray, Vector3(0, 0, 0.95), Vector3(2.6, 0.6, 0.1)}};
   world::CameraSpec overhead;
   overhead.name = "overhead", overhead.watches = "belt";

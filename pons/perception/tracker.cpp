@@ -53,7 +53,7 @@ auto live(Tracks& tracks, std::uint32_t id) -> decltype(tracks.data()) {
 
 }  // namespace
 
-Tracker::Tracker(const world::Belt& belt) : belt_(belt) {}
+Tracker::Tracker(const world::World& world) : belt_(world.belt), longest_m_(world.rules.max_size_m + kOtherSize_m) {}
 
 Tracker::Track* Tracker::find(std::uint32_t track) { return live(tracks_, track); }
 const Tracker::Track* Tracker::find(std::uint32_t track) const { return live(tracks_, track); }
@@ -339,13 +339,17 @@ void Tracker::label_attempt(std::uint32_t track) {
 
 bool Tracker::wants_label(std::uint32_t track) const {
   const Track* const found = find(track);
-  return found != nullptr && found->reads < kReads;
+  return found != nullptr && wants_label(*found);
+}
+
+bool Tracker::wants_label(const Track& track) const {
+  return track.reads < kReads || track.estimate.size_m.x() > longest_m_;
 }
 
 bool Tracker::wants_labels() const {
   return std::ranges::any_of(tracks_, [this](const Track& track) {
     return !track.forgotten && track.whole && !track.covered && track.last_seen == passages_.back().stamp &&
-           track.reads < kReads && track.label_attempts < kEnoughAttempts;
+           track.label_attempts < kEnoughAttempts && wants_label(track);
   });
 }
 

@@ -17,7 +17,7 @@ namespace pons::perception {
 // Positions are kept relative to the belt (x minus its travel), where a parcel stands still unless something moves it.
 class Tracker {
  public:
-  explicit Tracker(const world::Belt& belt);
+  explicit Tracker(const world::World& world);
 
   // Takes in one frame's sightings; says which track each became, 0 for none. Frames in the order of their stamps.
   std::vector<std::uint32_t> update(const TopView& view, const Segments& segments,
@@ -27,7 +27,7 @@ class Tracker {
   void label_attempt(std::uint32_t track);
   // A code was read on it. The first sticks; another one replaces it when read twice. No two tracks keep one code.
   void label_read(std::uint32_t track, std::string_view code);
-  // False once its code has been read twice.
+  // False once its code has been read twice; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
   // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
   [[nodiscard]] bool wants_labels() const;
@@ -88,7 +88,10 @@ class Tracker {
   [[nodiscard]] Track* find(std::uint32_t track);
   [[nodiscard]] const Track* find(std::uint32_t track) const;
 
+  [[nodiscard]] bool wants_label(const Track& track) const;
+
   world::Belt belt_;
+  double longest_m_;
   std::vector<Track> tracks_;  // by id
   std::deque<Passage> passages_;
   std::uint32_t next_id_ = 1;

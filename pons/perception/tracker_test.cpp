@@ -11,7 +11,7 @@ namespace {
 struct Bench {
   TopView view;
   Segments segments;
-  Tracker tracker{belt_world().belt};
+  Tracker tracker{belt_world()};
   Time now;
 
   Bench() {
@@ -103,6 +103,34 @@ TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {
   bench.tracker.label_read(ids[1], "B");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(1).code, "B");
+}
+
+TEST(TrackerTest, WantsLabelsOfWhatCouldBeReadAndIsNotSure) {
+  Bench bench;
+  EXPECT_FALSE(bench.tracker.wants_labels());
+  const auto seen = [&](Sighting sighting) { return bench.update({std::move(sighting)}).at(0); };
+  const std::uint32_t id = seen(Bench::sighting(-0.5, 0));
+  bench.tracker.label_read(id, "A");
+  EXPECT_TRUE(bench.tracker.wants_labels()) << "one read may be of a neighbour";
+  Sighting covered = Bench::sighting(-0.5, 0);
+  covered.covered = true;
+  seen(covered);
+  EXPECT_FALSE(bench.tracker.wants_labels());
+  seen(Bench::sighting(-0.5, 0));
+  bench.tracker.label_read(id, "A");
+  EXPECT_FALSE(bench.tracker.wants_labels());
+  bench.tracker.forget(id);
+
+  const std::uint32_t blank = seen(Bench::sighting(0.2, 0));
+  EXPECT_TRUE(bench.tracker.wants_labels());
+  for (int i = 0; i < 10; ++i) bench.tracker.label_attempt(blank);
+  EXPECT_FALSE(bench.tracker.wants_labels()) << "it lies with its label down";
+  bench.tracker.forget(blank);
+
+  const std::uint32_t two = seen(Bench::sighting(-0.3, 0, 0, {0.6, 0.15, 0.1}));
+  bench.tracker.label_read(two, "B");
+  bench.tracker.label_read(two, "B");
+  EXPECT_TRUE(bench.tracker.wants_labels()) << "no parcel is that long";
 }
 
 TEST(TrackerTest, DoesNotStartOnWhatTheRobotTouchesOrTheBorderCuts) {

@@ -16,6 +16,7 @@ constexpr double kPress_m = 0.006;      // bellows pressed together at the conta
 constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
+constexpr double kLater_s = 0.12;
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
@@ -171,12 +172,18 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const bool straight = round < kStraightRounds;
     way = straight ? motion::move(start, at, there, covering(limits, start))
                    : cell.router.route(start, at, there, nullptr, cell.objects(), limits);
-    if (!way) return std::unexpected(way.error());
+    if (!way && straight) return std::unexpected(way.error());
+    if (!way) {
+      // A way round takes longer, and by then what rides behind the parcel is where the parcel was to be met.
+      ahead_s += kLater_s;
+      continue;
+    }
     const double needed_s = to_s(way->back().end() - at);
     const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;
     ahead_s = needed_s;
     if (converged && !straight) break;
   }
+  if (!way) return std::unexpected(way.error());
   grasp.orientation = *orientation;
   grasp.trajectory = std::move(*way);
   grasp.hover = grasp.trajectory.back().end();

@@ -122,5 +122,15 @@ TEST_F(GraspTest, ATallerNeighbourBehindIsNotInTheWayFromAnyChute) {
   }
 }
 
+TEST_F(GraspTest, MeetsASmallOneLaterWhenOnlyAWayRoundATallOneIsClear) {
+  const Vector3 top(-0.36, 0.048, 0.971);
+  ObjectBelief tall = parcel(2, top, {0.35, 0.21, 0.17});
+  tall.world_from_top = pose_xyz_yaw(top.x() - 0.235, top.y() - 0.076, top.z() + 0.10, 0.346);
+  cell_.refresh(kBegin, {parcel(1, top, {0.14, 0.10, 0.07}), tall});
+  const AxisState start = touching(world_.place("chute_6")->center_m + Vector3(0, 0, 0.12), false);
+  const auto grasp = plan_grasp(cell_, start, kBegin, *cell_.find("1"), std::nullopt);
+  EXPECT_TRUE(grasp) << grasp.error().line();
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -5,10 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <deque>
 #include <latch>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "pons/core/digest.hpp"
@@ -27,6 +30,21 @@ world::World load() {
   return std::move(*world);
 }
 
+class CountingCamera final : public body::Camera {
+ public:
+  explicit CountingCamera(body::Camera& camera) : camera_(camera) {}
+  [[nodiscard]] const Intrinsics& intrinsics() const override { return camera_.intrinsics(); }
+  void begin(Time now) override {
+    ++shutters;
+    camera_.begin(now);
+  }
+  [[nodiscard]] Expected<void> finish(RgbdFrame& frame) override { return camera_.finish(frame); }
+  int shutters = 0;
+
+ private:
+  body::Camera& camera_;
+};
+
 // A cell whose parcels ride by; the arm stands.
 struct Scene {
   explicit Scene(Pace pace = Pace::kLockstep) {
@@ -36,7 +54,10 @@ struct Scene {
     EXPECT_TRUE(created) << created.error().line();
     simulation = std::move(*created);
     perception.emplace(world, model::RobotModel::load(world.robot).value());
-    crew.emplace(world, simulation->cameras(), *perception, pace);
+    for (body::Camera* const camera : simulation->cameras()) cameras.emplace_back(*camera);
+    std::vector<body::Camera*> counted;
+    for (CountingCamera& camera : cameras) counted.push_back(&camera);
+    crew.emplace(world, counted, *perception, pace);
   }
 
   // A bridge period of physics and shutters, then what the crew has to say.
@@ -56,6 +77,7 @@ struct Scene {
   world::World world = load();
   std::unique_ptr<sim::Simulation> simulation;
   std::optional<perception::Perception> perception;
+  std::deque<CountingCamera> cameras;  // in the world's order
   std::optional<CameraCrew> crew;
   body::Sensors sensors;
   std::map<Time, double> travel_m;
@@ -84,6 +106,26 @@ TEST(CameraCrew, NothingIsKnownBeforeItsLatencyHasPassed) {
   EXPECT_GE(snapshots.size(), 14U);
   EXPECT_TRUE(std::ranges::any_of(snapshots, [](const Snapshot& s) { return !s.objects.empty(); }));
   EXPECT_EQ(snapshots.back().occupancy.at("tray"), 0);
+}
+
+TEST(CameraCrew, LabelsArePhotographedOnlyWhileSomethingLiesUnread) {
+  Scene scene;
+  const auto reads = std::ranges::find(scene.world.cameras, true, &world::CameraSpec::reads_labels);
+  const CountingCamera& label = scene.cameras[static_cast<std::size_t>(reads - scene.world.cameras.begin())];
+  const auto none_seen = [](const std::optional<Snapshot>& snapshot) { return !snapshot || snapshot->objects.empty(); };
+  while (none_seen(scene.period())) EXPECT_EQ(label.shutters, 0) << "at an empty belt";
+  std::set<std::string> codes;
+  const Time found = scene.now, until = found + std::chrono::seconds(10);
+  while (scene.now < until) {
+    const auto snapshot = scene.period();
+    if (none_seen(snapshot)) continue;
+    for (const ObjectBelief& object : snapshot->objects) codes.insert(object.code);
+  }
+  codes.erase("");
+  EXPECT_GE(codes.size(), 2u);
+  const auto turns = static_cast<int>(to_s(until - found) / reads->period_s);
+  EXPECT_GE(label.shutters, static_cast<int>(codes.size()));
+  EXPECT_LT(label.shutters, turns) << "what is read twice is sure";
 }
 
 TEST(CameraCrew, TheSameSceneGivesTheSameBeliefsWheneverTheThreadRuns) {
