@@ -38,9 +38,10 @@ constexpr double kOneSided = 0.3;    // of the sum of unit vectors
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kPutBack_m = 0.005;  // over where it was lifted from
-constexpr double kSetDown_m = 0.03;   // over the belt, when let go: a heavy load hangs lower than its size says
-constexpr double kBeyond_m = 0.15;    // past the pick zone the arm still reaches down
+constexpr double kPutBack_m =
+    0.02;  // over where it was lifted from: on stretched bellows it hangs 12 mm lower than then
+constexpr double kSetDown_m = 0.03;  // over the belt, when let go: a heavy load hangs lower than its size says
+constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess

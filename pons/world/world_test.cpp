@@ -249,7 +249,7 @@ TEST_F(BrokenWorld, RefusesImpossibleCameras) {
   EXPECT_THAT(changed("reads_labels: yes", "reads_labels: no"),
               HasSubstr("cameras: none watches the belt and reads labels"));
   EXPECT_THAT(changed("fovy_deg: 22.29", "fovy_deg: 180"), HasSubstr("cameras[0].fovy_deg: 180 is out of range"));
-  EXPECT_THAT(changed("width: 800", "width: 1000000"), HasSubstr("cameras[0].width: '1000000' is not possible"));
+  EXPECT_THAT(changed("width: 928", "width: 1000000"), HasSubstr("cameras[0].width: '1000000' is not possible"));
 }
 
 TEST_F(BrokenWorld, RefusesMissingFiles) {
