@@ -11,7 +11,6 @@ namespace pons::brain {
 namespace {
 
 constexpr int kFramesToTrust = 3;
-constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
 constexpr int kMostTries = 3;
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
 constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
@@ -91,7 +90,7 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     decided_.insert(belief.track);
     return;
   }
-  if (too_large(belief)) {
+  if (world_.rules.too_large(belief.size_m)) {
     // It may be two that touch: as long as a camera looks, they may still be told apart.
     if (in_reach && x_m < label_view_end_m_) return;
     return ride(belief, kRideTooLarge, decisions);
@@ -131,11 +130,14 @@ bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<Object
   const auto turn_s = [](std::size_t place) { return static_cast<double>(place) * kTaskTakes_s + kPickTakes_s; };
   // The arm would only stand and wait for it to come into the zone.
   if (!ahead_s.empty() && (belt.pick_x_min_m - x_m) / speed_m_s(express, belt) > kPickTakes_s) return true;
-  if (left_s(express, belt) < turn_s(ahead_s.size())) return false;
-  for (std::size_t i = 0; i < ahead_s.size(); ++i) {
-    if (ahead_s[i] >= turn_s(i) && ahead_s[i] < turn_s(i + 1)) return true;
+  std::size_t place = 0;
+  bool costs_one = false;
+  for (const double other_s : ahead_s) {
+    if (other_s < turn_s(place)) continue;  // rides past either way, and takes no turn of the arm
+    costs_one = costs_one || other_s < turn_s(place + 1);
+    ++place;
   }
-  return false;
+  return costs_one && left_s(express, belt) >= turn_s(place);
 }
 
 bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
@@ -144,20 +146,15 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
   return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
 }
 
-bool Dispatcher::too_large(const ObjectBelief& belief) const {
-  return belief.size_m.maxCoeff() > world_.rules.max_size_m + kSizeMargin_m;
-}
-
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
   // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner. The
   // slack, too, is the same for all: what a belt that slows down may add.
-  const double left_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
-  const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s *
-                         (1 / (1 - belt.speed_variation) - 1 / (1 + belt.speed_variation));
+  const double nominal_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
+  const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s * (1 / (1 - belt.speed_variation) - 1);
   return {{"id", tries == 1 ? belief.code : belief.code + "." + std::to_string(tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
-          {"deadline_s", now.s() + left_s + slack_s},
+          {"deadline_s", now.s() + nominal_s + slack_s},
           {"steps",
            {{{"skill", "pick"}, {"arguments", {{"object", belief.code}}}},
             {{"skill", "place"}, {"arguments", {{"place", order.destination}, {"object", belief.code}}}}}}};

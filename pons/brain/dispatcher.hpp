@@ -81,7 +81,6 @@ class Dispatcher {
   // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
-  [[nodiscard]] bool too_large(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);
 

@@ -112,6 +112,15 @@ TEST_F(DispatcherTest, ExpressDoesNotWaitForWhatIsLostAnywayOrWhenItWouldBeLostI
   EXPECT_EQ(other.observe({parcel(1, 0.9, "P1"), parcel(2, 0.5, "P2")}, at(0)).tasks.size(), 2u);
 }
 
+TEST_F(DispatcherTest, WhatHasLeftTheZoneTakesNoTurnFromOneThatExpressWouldCost) {
+  // P3 is past the zone, its task not yet ended; P1 has 2 s left, P2 has 6 s.
+  const std::vector<ObjectBelief> all = {parcel(3, 1.5, "P3"), parcel(1, 1, "P1"), parcel(2, -1, "P2")};
+  ASSERT_EQ(dispatcher_.observe(all, at(0)).tasks.size(), 2u);
+  const Decisions later =
+      dispatcher_.observe({parcel(3, 2.2, "P3"), parcel(1, 1.02, "P1"), parcel(2, -0.98, "P2")}, at(1));
+  EXPECT_TRUE(later.tasks.empty());
+}
+
 TEST_F(DispatcherTest, TheArmDoesNotWaitForExpressWhileThereIsOtherWork) {
   EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1"), parcel(2, -0.3, "P2")}, at(0)).tasks.size(), 1u);
   EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, -0.1, "P2")}, at(0.4)).tasks.size(), 1u);

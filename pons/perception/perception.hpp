@@ -34,7 +34,8 @@ class Perception {
   // most 0.3 while the object is partly hidden or something lies or leans on it: take what hides it first.
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
 
-  // Whether a frame of a camera that reads labels could teach anything: something lies in view unread.
+  // Whether a frame of a camera that reads labels could teach anything: the newest frame showed something whole and
+  // bare whose code was read less than twice, in fewer than ten attempts, or that seems too large for one parcel.
   [[nodiscard]] bool wants_labels() const;
 
   // The arm took this one (or it fell): stop predicting it with the belt. Frames shuttered within half a second after

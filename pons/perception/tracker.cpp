@@ -53,7 +53,7 @@ auto live(Tracks& tracks, std::uint32_t id) -> decltype(tracks.data()) {
 
 }  // namespace
 
-Tracker::Tracker(const world::World& world) : belt_(world.belt), longest_m_(world.rules.max_size_m + kOtherSize_m) {}
+Tracker::Tracker(const world::World& world) : belt_(world.belt), rules_(world.rules) {}
 
 Tracker::Track* Tracker::find(std::uint32_t track) { return live(tracks_, track); }
 const Tracker::Track* Tracker::find(std::uint32_t track) const { return live(tracks_, track); }
@@ -243,6 +243,8 @@ void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<
   // Once may be a bad cut between neighbours; a shorter one in the same place, something that hangs over it.
   const bool hidden =
       within(expected(track, stamp, travel_m), sighting) && !parted(track, sighting, sightings, stamp, travel_m);
+  if (hidden != track.odd_hidden) track.odd_sizes = 0;
+  track.odd_hidden = hidden;
   if (resized && !now_whole && ++track.odd_sizes < (hidden ? kDoubts : 2)) return;
   track.last = sighting;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
@@ -343,7 +345,7 @@ bool Tracker::wants_label(std::uint32_t track) const {
 }
 
 bool Tracker::wants_label(const Track& track) const {
-  return track.reads < kReads || track.estimate.size_m.x() > longest_m_;
+  return track.reads < kReads || rules_.too_large(track.estimate.size_m);
 }
 
 bool Tracker::wants_labels() const {

@@ -59,6 +59,7 @@ class Tracker {
     Sighting last;  // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
+    bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
     std::string code, other_code;
     int reads = 0, other_reads = 0, label_attempts = 0;
@@ -91,7 +92,7 @@ class Tracker {
   [[nodiscard]] bool wants_label(const Track& track) const;
 
   world::Belt belt_;
-  double longest_m_;
+  world::Rules rules_;
   std::vector<Track> tracks_;  // by id
   std::deque<Passage> passages_;
   std::uint32_t next_id_ = 1;

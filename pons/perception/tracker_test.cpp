@@ -80,7 +80,7 @@ TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   std::uint32_t id = 0;
   for (int i = 0; i < 4; ++i) id = bench.update({Bench::sighting(-0.5, 0)}).at(0);
   bench.tracker.label_read(id, "A");
-  for (const double hidden : {0.02, 0.05, 0.08, 0.04, 0.0, 0.0}) {
+  for (const double hidden : {0.03, 0.05, 0.08, 0.0, 0.0}) {
     bench.update({Bench::sighting(-0.5 - 0.5 * hidden, 0, 0, {0.2 - hidden, 0.15, 0.1})});
   }
   bench.now += from_s(1);
@@ -89,6 +89,21 @@ TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   EXPECT_EQ(beliefs[0].code, "A");
   EXPECT_NEAR(beliefs[0].world_from_top.translation().x(), -0.5, 2e-3);
   EXPECT_NEAR(beliefs[0].size_m.x(), 0.2, 2e-3);
+}
+
+TEST(TrackerTest, OneThatStaysShorterIsAnotherAndABadCutInBetweenIsNot) {
+  Bench bench;
+  std::uint32_t id = 0;
+  for (int i = 0; i < 4; ++i) id = bench.update({Bench::sighting(-0.5, 0)}).at(0);
+  bench.tracker.label_read(id, "A");
+  const Sighting shorter = Bench::sighting(-0.53, 0, 0, {0.14, 0.15, 0.1});
+  for (int i = 0; i < 3; ++i) bench.update({shorter});
+  bench.update({Bench::sighting(-0.54, 0, 0, {0.16, 0.15, 0.1})});
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "A");
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.2, 1e-9);
+  for (int i = 0; i < 4; ++i) bench.update({shorter});
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "");
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.14, 1e-9);
 }
 
 TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {

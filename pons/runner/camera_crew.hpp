@@ -27,7 +27,7 @@ struct Snapshot {
   double belt_travel_m = 0;  // at the stamp
   std::vector<ObjectBelief> objects;
   std::map<std::string, int> occupancy;  // of watched places
-  bool wants_labels = false;
+  bool wants_labels = false;             // Perception::wants_labels()
 };
 
 enum class Pace : std::uint8_t { kLockstep, kRealTime };

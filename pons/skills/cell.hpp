@@ -64,8 +64,9 @@ class Cell {
   [[nodiscard]] AxisLimits limits_empty() const;
   // Where a carry shall end, joints, given those it starts from.
   using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;
-  // The fastest way for what is held, from the present motion to standstill at `goal`, that leaves the cups a reserve.
-  // Something must be held. Errors: those of the goal and of the router.
+  // The fastest way for what is held, from the present motion to standstill at `goal`, that leaves the cups and the
+  // motors a reserve; where no speed does, the slowest. Something must be held. Errors: those of
+  // the goal and of the router.
   [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal);
 
   const world::World& world;

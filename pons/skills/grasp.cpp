@@ -17,13 +17,14 @@ constexpr double kRide_s = 0.40;        // along with the belt, while vacuum bui
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
 constexpr double kLater_s = 0.12;
+constexpr int kMostBlocked = 3;  // a look for a way is work
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
 constexpr double kSlower = 1.25;
-constexpr double kRideLifted_s = 0.6;  // with the belt, to be weighed
+constexpr double kRideLifted_s = 0.8;  // with the belt, to be weighed
 
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
@@ -142,7 +143,7 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
   const auto stop = motion::stop(riding, end, cell.limits_empty());
   if (!stop) return std::unexpected(stop.error());
   append(*way, *stop);
-  return Lift{std::move(*way), at + from_s(takes_s)};
+  return Lift{std::move(*way), at + from_s(takes_s), end};
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
@@ -156,6 +157,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. The first look at the
   // way straight there only: where the parcel will not be by then, another may.
   double ahead_s = 0.8;
+  int blocked = 0;
   Expected<motion::Trajectory> way = fail("out of reach", "grasp");
   AxisVector seed = start.position;
   for (int round = 0; round < kRounds; ++round) {
@@ -172,7 +174,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const bool straight = round < kStraightRounds;
     way = straight ? motion::move(start, at, there, covering(limits, start))
                    : cell.router.route(start, at, there, nullptr, cell.objects(), limits);
-    if (!way && straight) return std::unexpected(way.error());
+    if (!way && (straight || ++blocked > kMostBlocked)) return std::unexpected(way.error());
     if (!way) {
       // A way round takes longer, and by then what rides behind the parcel is where the parcel was to be met.
       ahead_s += kLater_s;

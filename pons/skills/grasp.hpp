@@ -38,6 +38,7 @@ struct Grasp {
 struct Lift {
   motion::Trajectory trajectory;  // ends at rest; whoever takes over does so before
   Time top;                       // when the offset is reached
+  Time rides_until;               // the arm stays behind the belt from then on
 };
 [[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                                   const Vector3& offset);

@@ -26,9 +26,8 @@ constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead o
 constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr Duration kBlockedFor = std::chrono::milliseconds(200);
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
-constexpr double kMoved_m = 0.0015;      // a prediction off by more is worth a new plan
-constexpr double kSizeMargin_m = 0.006;  // a measured size is not the true one
-constexpr double kDensity_kg_m3 = 150;   // of parcels, roughly: what the drives expect until then
+constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
+constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 constexpr double kLift_m = 0.10;
 constexpr double kHighestLift_m = 0.25;
 constexpr double kClose_m = 0.05;    // neighbours within this of the footprint are lifted over
@@ -38,14 +37,14 @@ constexpr double kOneSided = 0.3;    // of the sum of unit vectors
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kPutBack_m =
-    0.02;  // over where it was lifted from: on stretched bellows it hangs 12 mm lower than then
+constexpr double kPutBack_m = 0.02;  // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kSetDown_m = 0.03;  // over the belt, when let go: a heavy load hangs lower than its size says
 constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kSetDownRounds = 3;
+constexpr double kLightest_kg = 0.01;
 constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
@@ -91,6 +90,7 @@ class Pick final : public task::Skill {
       verdict_ = {Status::kFailed, "cancelled", {}};
     } else if (phase_ == Phase::kLift) {
       begin_put_back(now, {Status::kFailed, "cancelled", {}});
+      if (phase_ != Phase::kSetDown) begin_retreat(now, {Status::kFailed, "cancelled; still held", {}});
     } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
     }
@@ -101,8 +101,11 @@ class Pick final : public task::Skill {
 
   Progress find(Time now) {
     if (cell_.held) {
-      if (cell_.held->code == code_) return success(now);
-      return begin_set_down(now, {});
+      // A stop came before the scale had decided; the arm has stood since.
+      if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
+      const double mass = cell_.held->mass_kg;
+      if (cell_.held->code != code_) return begin_set_down(now, {});
+      return mass > cell_.world.rules.max_mass_kg ? begin_set_down(now, overweight(mass)) : success(now);
     }
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
@@ -112,7 +115,7 @@ class Pick final : public task::Skill {
     }
     seen_ = now;
     const world::Belt& belt = cell_.world.belt;
-    if (object->size_m.maxCoeff() > cell_.world.rules.max_size_m + kSizeMargin_m) {
+    if (cell_.world.rules.too_large(object->size_m)) {
       return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
     }
     if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
@@ -170,10 +173,11 @@ class Pick final : public task::Skill {
     if (way && cell_.arm.stream(*way)) aside_ = true;
   }
 
-  // What cannot be sorted goes back to where it was lifted from, which has moved on with the belt, and rides on into
-  // the exception chute.
+  // What cannot be sorted goes back beside its neighbours, to where it was lifted from, which has moved on with the
+  // belt, and rides on into the exception chute.
   Progress begin_put_back(Time now, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
+    if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     const AxisState state = cell_.arm.planned(from);
     const double risen_m = cell_.model.world_from_tip(state.position).translation().z() - lift_from_.z();
     const auto down = skills::lift(cell_, state, from, grasp_.orientation, Vector3(0, 0, kPutBack_m - risen_m));
@@ -345,6 +349,7 @@ class Pick final : public task::Skill {
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
     }
     lift_end_ = up->top;
+    rides_until_ = up->rides_until;
     const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
@@ -399,7 +404,7 @@ class Pick final : public task::Skill {
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     if (mass > limit) {
-      return begin_put_back(now, {Status::kException, fmt::format("overweight: {:.2f} kg", mass), {{"mass_kg", mass}}});
+      return begin_put_back(now, overweight(mass));
     }
     return success(now);
   }
@@ -419,6 +424,10 @@ class Pick final : public task::Skill {
   }
 
   Progress retreat(Time now) { return now < retreated_at_ ? Progress{} : verdict_; }
+
+  static Progress overweight(double mass_kg) {
+    return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
+  }
 
   Progress success(Time now) {
     return {Status::kSucceeded,
@@ -441,7 +450,7 @@ class Pick final : public task::Skill {
 
   Cell& cell_;
   std::string code_;
-  Time started_, seen_, planned_, lift_end_, released_at_, retreated_at_;
+  Time started_, seen_, planned_, lift_end_, rides_until_, released_at_, retreated_at_;
   Phase phase_ = Phase::kFind;
   Grasp grasp_;
   ObjectBelief target_;

@@ -25,6 +25,7 @@ constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
 constexpr double kSwings = 2.5;      // a lean when it is let go over the one it may fall in with
+constexpr double kStill_nm = 0.15;   // nothing hangs stiller than that
 constexpr double kFall_s = 0.1;      // from letting go to the rim
 constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of the swing
 constexpr Duration kSwing = std::chrono::milliseconds(1500);  // at most
@@ -162,7 +163,7 @@ class Place final : public task::Skill {
     const Vector3& size = cell_.held->load.size_m;
     const double mouth_m = cell_.world.place(name_)->size_m.head<2>().minCoeff();
     const double across_m = end_first_ ? size.y() : std::max(size.x(), size.y());
-    return std::max(0.0, 0.5 * (mouth_m - across_m) - kAside_m) / size.z();
+    return std::max(0.0, 0.5 * (mouth_m - across_m) - kAside_m) / std::max(kAside_m, size.z());
   }
 
   // The cups are springs, and the load swings on them: will it be level when it has fallen to the rim? It keeps turning
@@ -173,7 +174,7 @@ class Place final : public task::Skill {
     if (now > felt_at_) turns_nm_s_ += kFresh * ((felt_nm - felt_nm_) / to_s(now - felt_at_) - turns_nm_s_);
     felt_nm_ = felt_nm;
     felt_at_ = now;
-    const double may_nm = kCups_nm_rad * may_lean();
+    const double may_nm = std::max(kStill_nm, kCups_nm_rad * may_lean());
     return (felt_nm + kFall_s * turns_nm_s_).norm() <= may_nm && felt_nm.norm() <= kSwings * may_nm;
   }
 

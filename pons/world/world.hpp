@@ -103,6 +103,9 @@ struct Rules {
   double max_size_m = 0;   // longest side
   double max_press_n = 0;  // damaged above this
   double max_drop_m = 0;   // damaged when dropped further
+
+  // Whether something measured with this size is larger than allowed. A measured size is not the true one.
+  [[nodiscard]] bool too_large(const Vector3& size_m) const { return size_m.maxCoeff() > max_size_m + 0.006; }
 };
 
 struct Resource {

@@ -244,7 +244,7 @@ TEST_F(BrokenWorld, RefusesImpossibleCameras) {
   EXPECT_THAT(changed("2.55], look: down", "2.55], rpy_deg: [180, 0, 0], look: down"),
               HasSubstr("cameras[0].world_from_optical: needs one orientation"));
   EXPECT_THAT(changed(", look: down", ""), HasSubstr("cameras[0].world_from_optical: needs one orientation"));
-  EXPECT_THAT(changed("2.55], look: down", "2.55], look_at: [-0.60, 0.02, 0]"),
+  EXPECT_THAT(changed("2.55], look: down", "2.55], look_at: [-0.50, 0.02, 0]"),
               HasSubstr("look_at: looks straight up, straight down"));
   EXPECT_THAT(changed("reads_labels: yes", "reads_labels: no"),
               HasSubstr("cameras: none watches the belt and reads labels"));
