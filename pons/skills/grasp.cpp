@@ -16,8 +16,8 @@ constexpr double kPress_m = 0.006;      // bellows pressed together at the conta
 constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
-constexpr double kLater_s = 0.12;
-constexpr int kMostBlocked = 3;  // a look for a way is work
+constexpr double kLater_s = 0.20;
+constexpr int kMostBlocked = 1;  // a look for a way takes time, and the motion that it ends with must come in time
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.

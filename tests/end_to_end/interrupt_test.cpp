@@ -76,7 +76,7 @@ TEST_F(Interrupt, BySigtermAtWork) {
 // The line comes with an outcome, when what was let go a moment ago still falls into its chute: the run must see it
 // land.
 TEST_F(Interrupt, RightAfterAnOutcome) {
-  interrupt(10, "14", "--lockstep", 2);
+  interrupt(10, "16", "--lockstep", 2);
   EXPECT_GT(sorted_, 0);
 }
 
