@@ -1,5 +1,6 @@
 #include "pons/runner/realtime.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <optional>
@@ -16,19 +17,18 @@ namespace {
 // Below the loop's: it must not wait for either.
 constexpr int kBodyPriority = 60, kBridgePriority = 10;
 
-// The body as the loop's thread sees it: measurements and set-points change hands without either side waiting.
-class ExchangeBody final : public body::Body {
- public:
-  void read(body::Sensors& sensors) PONS_NONBLOCKING override { sensors = measured_.read(); }
-  void write(const body::SetPoints& set_points) PONS_NONBLOCKING override { asked_.write(set_points); }
+// Neither the body nor the run's clock goes further than this past the last set-points. A real arm falls on while its
+// loop is held up; a simulated one need not, and what a busy computer does to it would say nothing about a robot.
+constexpr Duration kLeash = 4 * kControlPeriod;
 
-  // The body's thread.
-  void publish(const body::Sensors& sensors) { measured_.write(sensors); }
-  [[nodiscard]] const body::SetPoints& fetch() { return asked_.read(); }
-
- private:
-  rt::TripleBuffer<body::Sensors> measured_;
-  rt::TripleBuffer<body::SetPoints> asked_;
+// Measurements and set-points change hands without either side waiting.
+struct Exchange {
+  struct Asked {
+    Time at;
+    body::SetPoints set_points;
+  };
+  rt::TripleBuffer<body::Sensors> measured;
+  rt::TripleBuffer<Asked> asked;
 };
 
 // The threads' common end.
@@ -45,38 +45,43 @@ struct Shared {
   }
 };
 
-void run_body(Parts& parts, const rt::MonotonicClock& clock, ExchangeBody& exchange, Shared& shared) {
+void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
   // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
   (void)rt::make_realtime({.period = kControlPeriod, .priority = kBodyPriority});
   body::Sensors sensors;
-  rt::PeriodicLoop loop(clock, kControlPeriod);
-  loop.run([&](Time now) {
-    if (const body::SetPoints& asked = exchange.fetch(); asked.torque_nm.size() > 0) parts.plant.body->write(asked);
+  const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
+  rt::PeriodicLoop loop(own, kControlPeriod);
+  loop.run([&](Time) {
+    const Exchange::Asked& asked = exchange.asked.read();
+    if (asked.set_points.torque_nm.size() > 0) parts.plant.body->write(asked.set_points);
+    const Time now = std::min(clock.now(), asked.at + kLeash);
     parts.plant.advance(now);
+    clock.reach(now);
     parts.plant.body->read(sensors);
-    exchange.publish(sensors);
+    exchange.measured.write(sensors);
     parts.crew->open_shutters(now, sensors);
     shared.finished.store(parts.plant.finished());
     if (auto healthy = parts.plant.health(); !healthy) shared.fail(healthy.error());
     return shared.running.load();
   });
+  clock.let_go();
 }
 
-LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, ExchangeBody& exchange, Shared& shared) {
+LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
   const rt::Grant grant = rt::make_realtime({.period = kControlPeriod});
-  body::Sensors sensors;
-  body::SetPoints set_points;
+  Exchange::Asked asked;
   rt::PeriodicLoop loop(clock, kControlPeriod);
   loop.run([&](Time now) {
-    exchange.read(sensors);
+    const body::Sensors& sensors = exchange.measured.read();
     if (sensors.position.size() > 0) {
-      parts.cerebellum->step(now, sensors, *parts.link, set_points);
-      exchange.write(set_points);
+      parts.cerebellum->step(now, sensors, *parts.link, asked.set_points);
+      asked.at = now;
+      exchange.asked.write(asked);
     }
     return shared.running.load();
   });
   return {.ticks = loop.ticks(),
-          .missed = loop.missed(),
+          .missed = loop.missed() + static_cast<std::uint64_t>(clock.stood_still() / kControlPeriod),
           .p50_us = 1e6 * to_s(loop.execution().percentile(50)),
           .p99_us = 1e6 * to_s(loop.execution().percentile(99)),
           .degraded = grant.refused};
@@ -85,8 +90,8 @@ LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, ExchangeBody
 }  // namespace
 
 Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
-  const rt::MonotonicClock clock;
-  ExchangeBody exchange;
+  rt::MonotonicClock clock(kLeash);
+  Exchange exchange;
   Shared shared;
   RunResult result;
   Ending ending(watch, *parts.bridge_side);
