@@ -27,10 +27,10 @@ struct Request {
 };
 
 struct SocketLimits {
-  std::size_t line_bytes = 64 * 1024;          // a longer line: an error line back, and the end of the connection
-  std::size_t clients = 32;                    // one more is told so and closed
-  std::size_t reply_bytes = 16 * 1024 * 1024;  // waiting for one client; more ends the connection
-  std::chrono::milliseconds patience{10'000};  // for half a line, and for a client to read what waits for it
+  std::size_t line_bytes = 64UL * 1024;          // a longer line: an error line back, and the end of the connection
+  std::size_t clients = 32;                      // one more is told so and closed
+  std::size_t reply_bytes = 16UL * 1024 * 1024;  // waiting for one client; more ends the connection
+  std::chrono::milliseconds patience{10'000};    // for half a line, and for a client to read what waits for it
 };
 
 class LocalSocket {

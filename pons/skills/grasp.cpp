@@ -44,6 +44,12 @@ Eigen::Quaterniond lean_of(const ObjectBelief& object) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), up);
 }
 
+const Vector3 kHover{0, 0, kHover_m};
+
+motion::Waypoint coming_down(Cell& cell, const AxisVector& q) {
+  return {q, joint_speed(cell, q, belt_velocity(cell) - Vector3(0, 0, kComeDown_m_s))};
+}
+
 // The tip's position, speed and acceleration, by differences.
 std::array<Vector3, 3> tip_motion(Cell& cell, const AxisState& state) {
   constexpr double kStep_s = 1e-3;
@@ -66,6 +72,8 @@ std::function<Vector3(double)> least_jerk(const std::array<Vector3, 3>& start, c
 }
 
 }  // namespace
+
+double yaw_of(const Eigen::Matrix3d& orientation) { return std::atan2(orientation(1, 0), orientation(0, 0)); }
 
 AxisVector joint_speed(Cell& cell, const AxisVector& q, const Vector3& tip_speed_m_s) {
   const model::Jacobian jacobian = cell.model.tip_jacobian(q);
@@ -146,35 +154,47 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
   return Lift{std::move(*way), at + from_s(takes_s), end};
 }
 
-Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                           std::optional<Eigen::Matrix3d> orientation) {
-  Grasp grasp;
-  const double object_yaw = std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
-  const AxisLimits limits = cell.limits_empty();
-  const Vector3 up{0, 0, kHover_m};
-  const Vector3 come_down = belt_velocity(cell) - Vector3(0, 0, kComeDown_m_s);
+Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                                const std::optional<Eigen::Matrix3d>& orientation) {
+  Meeting meeting{.ahead_s = 0.8, .q = start.position};
+  for (int round = 0; round < kStraightRounds; ++round) {
+    meeting.hover = cell.predict(object, at + from_s(meeting.ahead_s)) + kHover;
+    if (round == 0) {
+      const auto wanted = orientation ? Expected<Eigen::Matrix3d>(*orientation)
+                                      : nearest_orientation(cell, start.position, meeting.hover,
+                                                            yaw_of(object.world_from_top.linear()), lean_of(object));
+      if (!wanted) return std::unexpected(wanted.error());
+      meeting.orientation = *wanted;
+    }
+    const auto q = cell.model.inverse(posed(meeting.hover, meeting.orientation), meeting.q);
+    if (!q) return std::unexpected(q.error());
+    meeting.q = *q;
+    const auto way = motion::move(start, at, coming_down(cell, *q), covering(cell.limits_empty(), start));
+    if (!way) return std::unexpected(way.error());
+    meeting.ahead_s = to_s(way->back().end() - at);
+  }
+  return meeting;
+}
 
-  // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. The first look at the
-  // way straight there only: where the parcel will not be by then, another may.
-  double ahead_s = 0.8;
+Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                           const std::optional<Eigen::Matrix3d>& orientation) {
+  const AxisLimits limits = cell.limits_empty();
+  // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. They begin with the
+  // straight way: where the parcel will not be by then, another may.
+  const auto straight = meet_straight(cell, start, at, object, orientation);
+  if (!straight) return std::unexpected(straight.error());
+  Grasp grasp{.orientation = straight->orientation};
+  double ahead_s = straight->ahead_s;
   int blocked = 0;
   Expected<motion::Trajectory> way = fail("out of reach", "grasp");
-  AxisVector seed = start.position;
-  for (int round = 0; round < kRounds; ++round) {
-    const Vector3 hover = cell.predict(object, at + from_s(ahead_s)) + up;
-    if (!orientation) {
-      const auto nearest = nearest_orientation(cell, start.position, hover, object_yaw, lean_of(object));
-      if (!nearest) return std::unexpected(nearest.error());
-      orientation = *nearest;
-    }
-    const auto q = cell.model.inverse(posed(hover, *orientation), seed);
+  AxisVector seed = straight->q;
+  for (int round = kStraightRounds; round < kRounds; ++round) {
+    const Vector3 hover = cell.predict(object, at + from_s(ahead_s)) + kHover;
+    const auto q = cell.model.inverse(posed(hover, grasp.orientation), seed);
     if (!q) return std::unexpected(q.error());
     seed = *q;
-    const motion::Waypoint there{*q, joint_speed(cell, *q, come_down)};
-    const bool straight = round < kStraightRounds;
-    way = straight ? motion::move(start, at, there, covering(limits, start))
-                   : cell.router.route(start, at, there, nullptr, cell.objects(), limits);
-    if (!way && (straight || ++blocked > kMostBlocked)) return std::unexpected(way.error());
+    way = cell.router.route(start, at, coming_down(cell, *q), nullptr, cell.objects(), limits);
+    if (!way && ++blocked > kMostBlocked) return std::unexpected(way.error());
     if (!way) {
       // A way round takes longer, and by then what rides behind the parcel is where the parcel was to be met.
       ahead_s += kLater_s;
@@ -183,10 +203,9 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const double needed_s = to_s(way->back().end() - at);
     const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;
     ahead_s = needed_s;
-    if (converged && !straight) break;
+    if (converged) break;
   }
   if (!way) return std::unexpected(way.error());
-  grasp.orientation = *orientation;
   grasp.trajectory = std::move(*way);
   grasp.hover = grasp.trajectory.back().end();
 

@@ -15,6 +15,9 @@ struct Grasp {
 
 // Orientations are the tip's in the world frame.
 
+// Of its x axis, rad; leaning changes that little.
+[[nodiscard]] double yaw_of(const Eigen::Matrix3d& orientation);
+
 // Along with the belt from `start`, with the tip over a point that moves on with it.
 [[nodiscard]] Expected<motion::Trajectory> ride(Cell& cell, const AxisState& start, Time at,
                                                 const Eigen::Matrix3d& orientation, double duration_s);
@@ -28,10 +31,20 @@ struct Grasp {
     Cell& cell, const AxisVector& q, const Vector3& position, double object_yaw_rad,
     const Eigen::Quaterniond& lean = Eigen::Quaterniond::Identity());
 
+// Over the parcel, about to come down, by a way that heeds nothing: no way round gets there sooner.
+struct Meeting {
+  double ahead_s = 0;  // after `at`
+  Vector3 hover = Vector3::Zero();
+  Eigen::Matrix3d orientation = Eigen::Matrix3d::Identity();
+  AxisVector q;
+};
+[[nodiscard]] Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                                              const std::optional<Eigen::Matrix3d>& orientation);
+
 // The earliest grasp from `start` at `at`. With `orientation` given that grip is kept. Errors: out of reach, no clear
 // way.
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                                         std::optional<Eigen::Matrix3d> orientation);
+                                         const std::optional<Eigen::Matrix3d>& orientation);
 
 // With a load on the cups: straight, by `offset` as seen from the belt, and on with the belt there. Soft enough for the
 // load not to bounce.

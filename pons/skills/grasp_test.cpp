@@ -132,5 +132,23 @@ TEST_F(GraspTest, MeetsASmallOneLaterWhenOnlyAWayRoundATallOneIsClear) {
   EXPECT_TRUE(grasp) << grasp.error().line();
 }
 
+TEST_F(GraspTest, MeetsAParcelNoLaterOnTheStraightWay) {
+  for (const double x : {-0.6, -0.4, -0.2}) {
+    const Vector3 top(x, 0.03, 0.98);
+    cell_.refresh(kBegin,
+                  {parcel(1, top, {0.14, 0.10, 0.08}), parcel(2, top + Vector3(0.25, 0, 0.1), {0.2, 0.2, 0.18})});
+    const AxisState start = touching(world_.place("chute_2")->center_m + Vector3(0, 0, 0.12), false);
+    const auto meeting = meet_straight(cell_, start, kBegin, *cell_.find("1"), std::nullopt);
+    const auto grasp = plan_grasp(cell_, start, kBegin, *cell_.find("1"), std::nullopt);
+    ASSERT_TRUE(meeting && grasp);
+    EXPECT_LT(meeting->ahead_s, to_s(grasp->hover - kBegin) + 0.01) << x;
+    EXPECT_GT(meeting->ahead_s, 0.1) << x;
+    EXPECT_EQ(meeting->orientation, grasp->orientation) << x;
+    const Vector3 over = cell_.predict(*cell_.find("1"), kBegin + from_s(meeting->ahead_s));
+    EXPECT_LT((meeting->hover - over).head<2>().norm(), 0.05) << x;
+    EXPECT_GT(meeting->hover.z(), over.z()) << x;
+  }
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -24,6 +24,7 @@ constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load s
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kTryEvery = std::chrono::milliseconds(40);
+constexpr double kWayRound_s = 0.6;  // what a way round what is in the way may take longer
 constexpr Duration kBlockedFor = std::chrono::milliseconds(200);
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
@@ -131,7 +132,10 @@ class Pick final : public task::Skill {
     if (tried_ && now - *tried_ < kTryEvery) return {};
     tried_ = now;
     const Time from = cell_.arm.splice_time(now);
-    auto grasp = plan_grasp(cell_, cell_.arm.planned(from), from, *object, std::nullopt);
+    const AxisState state = cell_.arm.planned(from);
+    const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
+    if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
+    auto grasp = plan_grasp(cell_, state, from, *object, std::nullopt);
     if (!grasp) {
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
@@ -166,7 +170,7 @@ class Pick final : public task::Skill {
     const Pose tip = cell_.model.world_from_tip(state.position);
     const Vector3 point(belt.pick_x_max_m, belt.y_center_m,
                         std::max(tip.translation().z(), belt.surface_z_m + kAside_m));
-    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of_tip(tip.linear())), state.position);
+    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of(tip.linear())), state.position);
     if (!q) return;
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
                                         cell_.limits_empty());
@@ -265,7 +269,7 @@ class Pick final : public task::Skill {
     for (const ObjectBelief& other : cell_.objects()) {
       point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
     }
-    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of_tip(grasp.orientation)), state.position);
+    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of(grasp.orientation)), state.position);
     if (!q) return {};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
                                         cell_.limits_empty());
@@ -288,7 +292,7 @@ class Pick final : public task::Skill {
       const Vector3 contact = cell_.predict(*object, grasp_.contact);
       if ((contact - grasp_.contact_point).head<2>().norm() > kMoved_m) {
         const Time from = cell_.arm.splice_time(now);
-        const double turn = yaw_of(*object) - yaw_of(target_);
+        const double turn = yaw_of(object->world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
         auto better = plan_grasp(cell_, cell_.arm.planned(from), from, *object,
                                  Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
         if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) return start(*better, *object, now);
@@ -353,7 +357,7 @@ class Pick final : public task::Skill {
     const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
     Held held{.code = code_};
     held.load.size_m = target_.size_m;
-    held.load.yaw_in_tip_rad = yaw_of_tip(grasp_.orientation) - yaw_of(target_);
+    held.load.yaw_in_tip_rad = yaw_of(grasp_.orientation) - yaw_of(target_.world_from_top.linear());
     cell_.held = held;
     cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
     cell_.forget(target_.track);
@@ -435,15 +439,8 @@ class Pick final : public task::Skill {
             {{"mass_kg", cell_.held->mass_kg}, {"sealed", cell_.arm.sealed_cups()}, {"seconds", to_s(now - started_)}}};
   }
 
-  static double yaw_of(const ObjectBelief& object) {
-    return std::atan2(object.world_from_top.linear()(1, 0), object.world_from_top.linear()(0, 0));
-  }
   static std::string name_of(const ObjectBelief& object) {
     return object.code.empty() ? fmt::format("track {}", object.track) : object.code;
-  }
-  // Of the tip's x axis; leaning with what it grips changes that little.
-  static double yaw_of_tip(const Eigen::Matrix3d& orientation) {
-    return std::atan2(orientation(1, 0), orientation(0, 0));
   }
   // A belief's yaw is known up to half a turn.
   static double wrapped(double angle) { return std::remainder(angle, M_PI); }
