@@ -12,9 +12,8 @@ brain::Orders orders_of(const world::Manifest& manifest) {
   return orders;
 }
 
-// On a computer shared with others a bridge tick comes late by tens of milliseconds, and so does a simulated body.
+// On a computer shared with others a bridge tick comes late by tens of milliseconds.
 constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
-constexpr Duration kSimulatedSilence = std::chrono::milliseconds(60);
 
 }  // namespace
 
@@ -37,10 +36,10 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   self->journal = std::move(*journal);
 
   const bool realtime = options.pace == runner::Pace::kRealTime;
-  cerebellum::Settings settings;
-  if (realtime) settings.silence_timeout = kSimulatedSilence;
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), settings, Time{});
-  self->perception = std::make_unique<perception::Perception>(self->world, model->copy());
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
+  self->perception = std::make_unique<perception::Perception>(
+      self->world, model->copy(),
+      [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
   self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
                                               realtime ? kRealTimeLead : skills::kSpliceLead);
   skills::add_skills(self->registry, *self->cell);

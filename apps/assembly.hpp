@@ -16,6 +16,7 @@
 #include "pons/perception/perception.hpp"
 #include "pons/runner/bridge_side.hpp"
 #include "pons/runner/camera_crew.hpp"
+#include "pons/runner/helper.hpp"
 #include "pons/runner/lockstep.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/cell.hpp"
@@ -48,6 +49,7 @@ class Assembly {
   link::BridgeEnd bridge_end{link};
   link::CerebellumEnd cerebellum_end{link};
   std::unique_ptr<cerebellum::Cerebellum> cerebellum;
+  runner::Helper helper;  // perception's
   std::unique_ptr<perception::Perception> perception;
   std::unique_ptr<skills::Cell> cell;
   task::SkillRegistry registry;

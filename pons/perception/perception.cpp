@@ -19,6 +19,7 @@ namespace pons::perception {
 
 struct Perception::Impl {
   const world::World& world;
+  Both both;
   SelfFilter self_filter;
   Segmenter segmenter;
   LabelReader label_reader;
@@ -27,8 +28,8 @@ struct Perception::Impl {
   std::map<std::string, TrayWatch, std::less<>> watches;  // by place
   std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
 
-  Impl(const world::World& the_world, model::RobotModel model)
-      : world(the_world), self_filter(std::move(model)), tracker(the_world) {
+  Impl(const world::World& the_world, model::RobotModel model, Both the_both)
+      : world(the_world), both(std::move(the_both)), self_filter(std::move(model)), tracker(the_world) {
     for (const auto& camera : world.cameras) {
       const world::Place* const place = world.place(camera.watches);
       if (place != nullptr) watches.try_emplace(place->name, world, *place);
@@ -56,7 +57,7 @@ std::vector<LabelMark> Perception::Impl::marks(const TopView& view, double belt_
 void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment) {
   auto viewer = viewers.find(frame.camera);
   if (viewer == viewers.end() || !viewer->second.fits(frame)) {
-    viewer = viewers.insert_or_assign(frame.camera, TopViewer(frame, world.belt)).first;
+    viewer = viewers.insert_or_assign(frame.camera, TopViewer(frame, world.belt, both)).first;
   }
   const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
   const TopView& view = viewer->second.build(frame, robot);
@@ -86,10 +87,10 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
   }
 }
 
-Perception::Perception(const world::World& world, model::RobotModel model) {
-  // One thread is what the caller was promised; the library would start its own.
+Perception::Perception(const world::World& world, model::RobotModel model, Both both) {
+  // The caller says how many threads there are; the library would start its own.
   cv::setNumThreads(1);
-  impl_ = std::make_unique<Impl>(world, std::move(model));
+  impl_ = std::make_unique<Impl>(world, std::move(model), std::move(both));
 }
 
 Perception::~Perception() = default;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pons/core/belief.hpp"
+#include "pons/core/both.hpp"
 #include "pons/core/image.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/world/world.hpp"
@@ -18,10 +19,10 @@ struct Moment {
   double belt_travel_m = 0;
 };
 
-// Deterministic; one thread. `world` must outlive it.
+// Deterministic; one thread, and what `both` lends it for the halves of a picture. `world` must outlive it.
 class Perception {
  public:
-  Perception(const world::World& world, model::RobotModel model);
+  Perception(const world::World& world, model::RobotModel model, Both both = one_after_the_other);
   ~Perception();
 
   // Takes in one frame (in the order of their stamps). Frames of a camera that watches the belt update tracks; those of

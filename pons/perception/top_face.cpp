@@ -297,10 +297,13 @@ std::vector<Sighting> measure(const TopView& view, const Segments& segments) {
     sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
     sightings.push_back(sighting);
   }
-  // What leans on a lower neighbour hides a part of it, however whole the rest looks.
+  // What leans on a lower neighbour hides a part of it, however whole the rest looks; of what is still coming into view
+  // nobody knows whether it leans.
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     for (const int label : segments.regions[i].higher) {
-      if (sightings[static_cast<std::size_t>(label - 1)].tilt_rad > kLeaning_rad) sightings[i].covered = true;
+      const Sighting& higher = sightings[static_cast<std::size_t>(label - 1)];
+      const bool comes = higher.at_border && higher.world_from_top.translation().x() < view.camera_m.x();
+      if (higher.tilt_rad > kLeaning_rad || comes) sightings[i].covered = true;
     }
   }
   return sightings;

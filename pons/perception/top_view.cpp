@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace pons::perception {
 namespace {
@@ -19,8 +20,8 @@ constexpr int kBorder = 2;              // samples
 
 }  // namespace
 
-TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt)
-    : sampling_(frame.intrinsics), world_from_optical_(frame.world_from_optical) {
+TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt, Both both)
+    : both_(std::move(both)), sampling_(frame.intrinsics), world_from_optical_(frame.world_from_optical) {
   const Pose& pose = frame.world_from_optical;
   const Pose optical_from_world = pose.inverse();
   double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
@@ -61,12 +62,17 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt)
   view_.camera_m = pose.translation();
   const int columns = std::max(8, static_cast<int>((std::min(belt.x_end_m, x_max) - view_.x0_m) / view_.cell_m));
   const int rows = std::max(8, static_cast<int>((belt.width_m + 2 * kOverhang_m) / view_.cell_m));
-  highest_.create(rows, columns);
-  sum_.create(rows, columns), count_.create(rows, columns);
+  highest_.create(rows, columns), filled_.create(rows, columns), view_.height.create(rows, columns);
   view_.colour.create(rows, columns), view_.flags.create(rows, columns);
+  const int middle = window_.y + window_.height / 2;
+  strips_[0].begin = window_.y, strips_[0].end = strips_[1].begin = middle, strips_[1].end = window_.br().y;
   const auto width = static_cast<std::size_t>(window_.width);
-  cell_row_.resize(width), height_row_.resize(width);
-  raised_.resize(width * static_cast<std::size_t>(window_.height));
+  for (Strip& strip : strips_) {
+    strip.cell_row.resize(width), strip.height_row.resize(width);
+    strip.raised.resize(width * static_cast<std::size_t>(strip.end - strip.begin));
+    strip.highest.create(rows, columns), strip.flags.create(rows, columns), strip.colour.create(rows, columns);
+    strip.sum.create(rows, columns), strip.count.create(rows, columns);
+  }
 }
 
 bool TopViewer::fits(const RgbdFrame& frame) const {
@@ -78,7 +84,7 @@ bool TopViewer::fits(const RgbdFrame& frame) const {
 
 // Of each sample in a row: its cell, −1 for none, and its height. A plain loop without branches: the compiler turns it
 // into vector code.
-void TopViewer::project(const RgbdFrame& frame, int row) {
+void TopViewer::project(const RgbdFrame& frame, int row, Strip& strip) const {
   const Eigen::Matrix3f rotation = world_from_optical_.linear().cast<float>();
   const auto inverse_cell = static_cast<float>(1 / view_.cell_m);
   const auto from_x = static_cast<float>(view_.camera_m.x() - view_.x0_m) * inverse_cell;
@@ -92,9 +98,9 @@ void TopViewer::project(const RgbdFrame& frame, int row) {
       rotation.col(1) * static_cast<float>((row - sampling_.cy) / sampling_.fy) + rotation.col(2);
   const int columns = highest_.cols;
   const auto limit_x = static_cast<float>(columns), limit_y = static_cast<float>(highest_.rows);
-  const float* const depth = sampling_.row(frame, row, window_.x, window_.width, depth_row_);
-  int* const cell = cell_row_.data();
-  int* const height = height_row_.data();
+  const float* const depth = sampling_.row(frame, row, window_.x, window_.width, strip.depth_row);
+  int* const cell = strip.cell_row.data();
+  int* const height = strip.height_row.data();
   const int count = window_.width;
   for (int i = 0; i < count; ++i) {
     const float u = first + static_cast<float>(i) * step;
@@ -112,10 +118,10 @@ void TopViewer::project(const RgbdFrame& frame, int row) {
 }
 
 // `seen` is the row of the robot's mask, `from` and `to` the columns that hold any of it.
-void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to) {
-  auto* const flags = view_.flags.ptr<std::uint8_t>();
+void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to, Strip& strip) const {
+  auto* const flags = strip.flags.ptr<std::uint8_t>();
   for (int column = from; column < to; ++column) {
-    int& cell = cell_row_[static_cast<std::size_t>(column - window_.x)];
+    int& cell = strip.cell_row[static_cast<std::size_t>(column - window_.x)];
     if (seen[column] == 0 || cell < 0) continue;
     if (seen[column] == SelfFilter::kRobot) {
       cell = -1;
@@ -126,39 +132,39 @@ void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to) {
 }
 
 // The highest reading of each cell. Those above bare belt are kept: they are few, and of the others only the height
-// matters.
-void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot) {
-  highest_.setTo(0), view_.flags.setTo(0);
-  auto* const highest = highest_.ptr<std::uint16_t>();
+// matters. The robot is within `near`.
+void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const {
+  strip.highest.setTo(0), strip.flags.setTo(0);
+  auto* const highest = strip.highest.ptr<std::uint16_t>();
   const std::uint16_t bare = TopView::steps(kBare_m);
-  const cv::Rect near = cv::boundingRect(robot) & window_;
-  raised_count_ = 0;
-  for (int row = window_.y; row < window_.br().y; ++row) {
-    project(frame, row);
-    if (row >= near.y && row < near.br().y) drop_robot(robot.ptr<std::uint8_t>(row), near.x, near.br().x);
+  std::size_t count = 0;
+  for (int row = strip.begin; row < strip.end; ++row) {
+    project(frame, row, strip);
+    if (row >= near.y && row < near.br().y) drop_robot(robot.ptr<std::uint8_t>(row), near.x, near.br().x, strip);
     for (int i = 0; i < window_.width; ++i) {
-      const int cell = cell_row_[static_cast<std::size_t>(i)];
+      const int cell = strip.cell_row[static_cast<std::size_t>(i)];
       if (cell < 0) continue;
-      const auto height = static_cast<std::uint16_t>(height_row_[static_cast<std::size_t>(i)]);
+      const auto height = static_cast<std::uint16_t>(strip.height_row[static_cast<std::size_t>(i)]);
       highest[cell] = std::max(highest[cell], height);
-      raised_[raised_count_] = {cell, static_cast<std::int16_t>(window_.x + i), static_cast<std::int16_t>(row), height};
-      raised_count_ += height >= bare ? 1U : 0U;
+      strip.raised[count] = {cell, static_cast<std::int16_t>(window_.x + i), static_cast<std::int16_t>(row), height};
+      count += height >= bare ? 1U : 0U;
     }
   }
+  strip.raised_count = count;
 }
 
-// The highest surface of each cell, averaged over its readings; and what was seen of it.
-void TopViewer::accumulate(const RgbdFrame& frame) {
-  sum_.setTo(0), count_.setTo(0), view_.colour.setTo(cv::Scalar::all(0));
-  auto* const highest = highest_.ptr<std::uint16_t>();
-  auto* const sum = sum_.ptr<int>();
-  auto* const count = count_.ptr<int>();
-  auto* const colour = view_.colour.ptr<cv::Vec3b>();
-  auto* const flags = view_.flags.ptr<std::uint8_t>();
+// What was read of the highest surface of each cell.
+void TopViewer::accumulate(const RgbdFrame& frame, Strip& strip) const {
+  strip.sum.setTo(0), strip.count.setTo(0), strip.colour.setTo(cv::Scalar::all(0));
+  const auto* const highest = highest_.ptr<std::uint16_t>();
+  auto* const sum = strip.sum.ptr<int>();
+  auto* const count = strip.count.ptr<int>();
+  auto* const colour = strip.colour.ptr<cv::Vec3b>();
+  auto* const flags = strip.flags.ptr<std::uint8_t>();
   const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
   const cv::Rect inner(kBorder, kBorder, sampling_.width - 2 * kBorder, sampling_.height - 2 * kBorder);
-  for (std::size_t i = 0; i < raised_count_; ++i) {
-    const Reading& reading = raised_[i];
+  for (std::size_t i = 0; i < strip.raised_count; ++i) {
+    const Reading& reading = strip.raised[i];
     if (reading.height + kSameSurface < highest[reading.cell]) continue;
     sum[reading.cell] += reading.height;
     ++count[reading.cell];
@@ -167,20 +173,27 @@ void TopViewer::accumulate(const RgbdFrame& frame) {
     colour[reading.cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
     if (!inner.contains({reading.column, reading.row})) flags[reading.cell] |= TopView::kAtBorder;
   }
-  const int total = highest_.rows * highest_.cols;
-  for (int cell = 0; cell < total; ++cell) {
-    if (count[cell] > 1) highest[cell] = static_cast<std::uint16_t>(sum[cell] / count[cell]);
+}
+
+// The highest surface of each cell, averaged over its readings; and what was seen of it.
+void TopViewer::merge(int begin, int end) {
+  const auto& [first, second] = strips_;
+  for (int cell = begin * highest_.cols; cell < end * highest_.cols; ++cell) {
+    const int count = first.count(cell) + second.count(cell);
+    if (count > 1) highest_(cell) = static_cast<std::uint16_t>((first.sum(cell) + second.sum(cell)) / count);
+    view_.colour(cell) = second.count(cell) > 0 ? second.colour(cell) : first.colour(cell);
+    view_.flags(cell) = first.flags(cell) | second.flags(cell);
   }
 }
 
 // Lost readings leave single empty cells; hidden belt leaves wide ones, which must stay unknown.
-void TopViewer::fill_pinholes() {
-  highest_.copyTo(filled_);
+void TopViewer::fill_pinholes(int begin, int end) {
+  highest_.rowRange(begin, end).copyTo(filled_.rowRange(begin, end));
   const auto* const raw = highest_.ptr<std::uint16_t>();
   auto* const filled = filled_.ptr<std::uint16_t>();
   auto* const colour = view_.colour.ptr<cv::Vec3b>();
   const int stride = highest_.cols;
-  for (int row = 1; row + 1 < highest_.rows; ++row) {
+  for (int row = std::max(1, begin); row < std::min(highest_.rows - 1, end); ++row) {
     for (int column = 1; column + 1 < stride; ++column) {
       const int i = row * stride + column;
       if (raw[i] > 0 || raw[i - 1] + raw[i + 1] == 0) continue;
@@ -200,11 +213,29 @@ void TopViewer::fill_pinholes() {
   }
 }
 
+void TopViewer::smooth(int begin, int end) {
+  constexpr int kSize = 5, kReach = kSize / 2;
+  const int from = std::max(0, begin - kReach), to = std::min(filled_.rows, end + kReach);
+  cv::Mat1w smoothed;
+  cv::medianBlur(filled_.rowRange(from, to), smoothed, kSize);
+  smoothed.rowRange(begin - from, end - from).copyTo(view_.height.rowRange(begin, end));
+}
+
+template <typename Work>
+void TopViewer::halves(const Work& work) {
+  const int middle = highest_.rows / 2;
+  both_([&] { work(0, middle); }, [&] { work(middle, highest_.rows); });
+}
+
 const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) {
-  find_highest(frame, robot);
-  accumulate(frame);
-  fill_pinholes();
-  cv::medianBlur(filled_, view_.height, 5);
+  const cv::Rect near = cv::boundingRect(robot) & window_;
+  auto& [first, second] = strips_;
+  both_([&] { find_highest(frame, robot, near, first); }, [&] { find_highest(frame, robot, near, second); });
+  cv::max(cv::InputArray(first.highest), second.highest, highest_);
+  both_([&] { accumulate(frame, first); }, [&] { accumulate(frame, second); });
+  halves([&](int begin, int end) { merge(begin, end); });
+  halves([&](int begin, int end) { fill_pinholes(begin, end); });
+  halves([&](int begin, int end) { smooth(begin, end); });
   return view_;
 }
 

@@ -3,9 +3,13 @@
 // was seen.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "pons/core/both.hpp"
 #include "pons/core/image.hpp"
 #include "pons/perception/self_filter.hpp"
 #include "pons/world/world.hpp"
@@ -47,7 +51,7 @@ struct TopView {
 class TopViewer {
  public:
   // `frame` is any frame of the camera: intrinsics and pose must stay.
-  TopViewer(const RgbdFrame& frame, const world::Belt& belt);
+  TopViewer(const RgbdFrame& frame, const world::Belt& belt, Both both);
 
   // The picture as this class samples it: every so many pixels, about 800 a row.
   [[nodiscard]] const Sampling& sampling() const { return sampling_; }
@@ -61,23 +65,38 @@ class TopViewer {
     std::int16_t column = 0, row = 0;  // sample
     std::uint16_t height = 0;
   };
+  // Some rows of samples, and the map as they alone would make it.
+  struct Strip {
+    int begin = 0, end = 0;
+    std::vector<float> depth_row;  // of one row of samples in the window:
+    std::vector<int> cell_row;     // −1: nothing there
+    std::vector<int> height_row;
+    std::vector<Reading> raised;  // above bare belt; the first raised_count
+    std::size_t raised_count = 0;
+    cv::Mat1w highest;
+    cv::Mat1i sum, count;
+    cv::Mat3b colour;
+    cv::Mat1b flags;
+  };
 
-  void project(const RgbdFrame& frame, int row);
-  void drop_robot(const std::uint8_t* seen, int from, int to);
-  void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot);
-  void accumulate(const RgbdFrame& frame);
-  void fill_pinholes();
+  void project(const RgbdFrame& frame, int row, Strip& strip) const;
+  void drop_robot(const std::uint8_t* seen, int from, int to, Strip& strip) const;
+  void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const;
+  void accumulate(const RgbdFrame& frame, Strip& strip) const;
+  // Of the map's rows from `begin` to `end`:
+  void merge(int begin, int end);
+  void fill_pinholes(int begin, int end);
+  void smooth(int begin, int end);
+  // Does it for each half of the map's rows.
+  template <typename Work>
+  void halves(const Work& work);
 
+  Both both_;
   Sampling sampling_;
   Pose world_from_optical_;
-  cv::Rect window_;               // of the sampled picture: what can see the belt
-  std::vector<float> depth_row_;  // of one row of samples in the window:
-  std::vector<int> cell_row_;     // −1: nothing there
-  std::vector<int> height_row_;
-  std::vector<Reading> raised_;  // above bare belt; the first raised_count_
-  std::size_t raised_count_ = 0;
+  cv::Rect window_;  // of the sampled picture: what can see the belt
+  std::array<Strip, 2> strips_;
   cv::Mat1w highest_, filled_;
-  cv::Mat1i sum_, count_;
   TopView view_;
 };
 
