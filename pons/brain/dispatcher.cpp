@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "pons/world/mouth.hpp"
 #include "pons/world/view.hpp"
 
 namespace pons::brain {
@@ -90,7 +91,7 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     decided_.insert(belief.track);
     return;
   }
-  if (world_.rules.too_large(belief.size_m)) {
+  if (too_large(belief.size_m, order->second)) {
     // It may be two that touch: as long as a camera looks, they may still be told apart.
     if (in_reach && x_m < label_view_end_m_) return;
     return ride(belief, kRideTooLarge, decisions);
@@ -115,6 +116,14 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   ++known.tries;
   decisions.tasks.push_back(task_for(belief, order->second, known.tries, now));
   asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);
+}
+
+// A measured size is not the true one: what passes by a little, passes.
+bool Dispatcher::too_large(const Vector3& size_m, const Order& order) const {
+  constexpr double kMisjudged_m = 0.004;
+  if (world_.rules.too_large(size_m)) return true;
+  const world::Place* const chute = world_.place(order.destination);
+  return chute != nullptr && world::ways_in(size_m - Vector3::Constant(kMisjudged_m), *chute).empty();
 }
 
 bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const {

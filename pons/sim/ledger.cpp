@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "pons/sim/truth.hpp"
+#include "pons/world/mouth.hpp"
 
 namespace pons::sim {
 namespace {
@@ -83,7 +84,9 @@ Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const
     parcel.mass_kg = arrivals[i].mass_kg;
     parcel.size_m = manifest[i].size_m;
     parcel.overweight = parcel.mass_kg > world.rules.max_mass_kg;
-    parcel.oversize = parcel.size_m.maxCoeff() > world.rules.max_size_m;
+    const world::Place* const chute = world.place(parcel.destination);
+    parcel.oversize = parcel.size_m.maxCoeff() > world.rules.max_size_m ||
+                      (chute != nullptr && world::ways_in(parcel.size_m, *chute).empty());
     parcel.place = name(parcel.where);
   }
 }

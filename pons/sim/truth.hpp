@@ -27,7 +27,7 @@ struct ParcelTruth {
   LabelTruth label = LabelTruth::kReadable;
   bool touching = false;             // was put down touching, overlapping or leaning on a neighbour
   bool overweight = false;           // really heavier than rules.max_mass_kg
-  bool oversize = false;             // really longer than rules.max_size_m
+  bool oversize = false;             // really longer than rules.max_size_m, or too large for its chute
   Vector3 size_m = Vector3::Zero();  // length, width, height
   double mass_kg = 0;                // real
   Time offered;                      // when it was put on the belt; meaningless while kNotOffered

@@ -8,6 +8,7 @@
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
+#include "pons/world/mouth.hpp"
 
 namespace pons::skills {
 namespace {
@@ -19,8 +20,6 @@ constexpr double kOverRim_m = 0.03;     // between rim and the parcel's undersid
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
 constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
-constexpr double kLoose_m = 0.012;  // a shorter one falls through flat
-constexpr double kEndFirst_rad = 25 * std::numbers::pi / 180, kLessSteep_rad = 15 * std::numbers::pi / 180;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
@@ -85,19 +84,21 @@ class Place final : public task::Skill {
     return {};
   }
 
-  // Over the middle of the mouth, the parcel's sides along the mouth's; which of the turns, the arm decides.
+  // Over the middle of the mouth, turned as one goes in; which of the turns, the arm decides.
   Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
-    const bool tight = cell_.held->load.size_m.x() > target.size_m.head<2>().minCoeff() - kLoose_m;
-    // A long one goes in end first, if the arm can; flat it would lie across the rim. The more it leans the higher it
-    // is let go, and the deeper it falls.
-    for (const double tilt : tight ? std::vector{kEndFirst_rad, kLessSteep_rad, 0.0} : std::vector{0.0}) {
+    const Vector3& size = cell_.held->load.size_m;
+    std::vector<world::Entry> entries = world::ways_in(size, target);
+    // As measured it does not pass; it may have been misjudged, and it is on the cups.
+    if (entries.empty()) entries.push_back({});
+    // The more it leans the higher it is let go, and the deeper it falls.
+    for (const world::Entry& entry : entries) {
       for (int height = 0; height < kHeights; ++height) {
-        const double tip_z = height_over(target, tilt) + kHigher_m * height;
-        const double drop_m = tip_z - cell_.held->load.size_m.z() - (target.center_m.z() - target.size_m.z());
-        if (tilt > 0 && drop_m > cell_.world.rules.max_drop_m) break;
-        auto q = nearest(target, tilt, tip_z, from);
+        const double tip_z = height_over(target, entry.lean_rad) + kHigher_m * height;
+        const double drop_m = tip_z - size.z() - (target.center_m.z() - target.size_m.z());
+        if (entry.lean_rad > 0 && drop_m > cell_.world.rules.max_drop_m) break;
+        auto q = nearest(target, entry, tip_z, from);
         if (!q) continue;
-        end_first_ = tilt > 0;
+        entry_ = entry;
         return q;
       }
     }
@@ -111,16 +112,18 @@ class Place final : public task::Skill {
     return target.center_m.z() + std::max(kTipOverRim_m, kOverRim_m + underside_m);
   }
 
-  Expected<AxisVector> nearest(const world::Place& target, double tilt, double tip_z, const AxisVector& from) {
+  Expected<AxisVector> nearest(const world::Place& target, const world::Entry& entry, double tip_z,
+                               const AxisVector& from) {
     const Load& load = cell_.held->load;
     const Vector3 tip(target.center_m.x(), target.center_m.y(), tip_z);
     const Eigen::AngleAxisd tip_from_load(load.yaw_in_tip_rad, Vector3::UnitZ());
     Expected<AxisVector> best = fail("out of reach", name_);
     double least = 0;
     for (int turn = 0; turn < 8; ++turn) {
-      const double yaw = load.yaw_in_tip_rad + 0.5 * std::numbers::pi * (turn % 4);
+      const double yaw =
+          load.yaw_in_tip_rad + 0.5 * std::numbers::pi * ((turn % 4) + (entry.across_corners ? 0.5 : 0.0));
       Pose pose = Cell::tip_down(tip, yaw);
-      pose.rotate(Eigen::AngleAxisd(turn < 4 ? tilt : -tilt, tip_from_load * Vector3::UnitY()));
+      pose.rotate(Eigen::AngleAxisd(turn < 4 ? entry.lean_rad : -entry.lean_rad, tip_from_load * Vector3::UnitY()));
       // The middle of the load, not of its top face, over the middle of the mouth.
       const Vector3 middle = pose.linear() * Vector3(0, 0, 0.5 * load.size_m.z());
       pose.translation().head<2>() -= middle.head<2>();
@@ -162,7 +165,9 @@ class Place final : public task::Skill {
   [[nodiscard]] double may_lean() const {
     const Vector3& size = cell_.held->load.size_m;
     const double mouth_m = cell_.world.place(name_)->size_m.head<2>().minCoeff();
-    const double across_m = end_first_ ? size.y() : std::max(size.x(), size.y());
+    const double across_m = entry_.across_corners ? (size.x() + size.y()) / std::numbers::sqrt2
+                            : entry_.lean_rad > 0 ? size.y()
+                                                  : std::max(size.x(), size.y());
     return std::max(0.0, 0.5 * (mouth_m - across_m) - kAside_m) / std::max(kAside_m, size.z());
   }
 
@@ -200,7 +205,8 @@ class Place final : public task::Skill {
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
   int lost_ticks_ = 0;
-  bool end_first_ = false, cancelled_ = false;
+  world::Entry entry_;
+  bool cancelled_ = false;
 };
 
 }  // namespace

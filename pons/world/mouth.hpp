@@ -1,0 +1,21 @@
+// How a parcel goes through the mouth of a chute.
+#pragma once
+
+#include <vector>
+
+#include "pons/core/pose.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::world {
+
+struct Entry {
+  double lean_rad = 0;          // end first: about the shorter of its horizontal sides
+  bool across_corners = false;  // its longer side along the mouth's diagonal, else along the mouth's sides
+};
+
+// The ways in for something of that size (as it lies: x, y horizontal, z up), the best first; none: it is too large.
+// Level it needs as much room as it is long. Leaning it is no longer at the rim than its height over the sine of the
+// lean. Along the diagonal of a square mouth it needs (length + width) / √2.
+[[nodiscard]] std::vector<Entry> ways_in(const Vector3& size_m, const Place& mouth);
+
+}  // namespace pons::world
