@@ -118,12 +118,10 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   asked_.emplace(decisions.tasks.back().at("id").get<std::string>(), belief.code);
 }
 
-// A measured size is not the true one: what passes by a little, passes.
 bool Dispatcher::too_large(const Vector3& size_m, const Order& order) const {
-  constexpr double kMisjudged_m = 0.004;
   if (world_.rules.too_large(size_m)) return true;
   const world::Place* const chute = world_.place(order.destination);
-  return chute != nullptr && world::ways_in(size_m - Vector3::Constant(kMisjudged_m), *chute).empty();
+  return chute != nullptr && world::ways_in(size_m, *chute, world::kMisjudged_m).empty();
 }
 
 bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const {

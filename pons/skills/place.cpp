@@ -21,13 +21,16 @@ constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are
 constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
 constexpr int kHeights = 3;
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
+constexpr double kAside_m = 0.004;  // a load hangs beside where the cups were believed to hold it, at most
+constexpr double kGravity_m_s2 = 9.81;
 constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
 constexpr double kSwings = 2.5;      // a lean when it is let go over the one it may fall in with
 constexpr double kStill_nm = 0.15;   // nothing hangs stiller than that
+constexpr double kTight_rad = 0.10;  // may it lean less than that, it jams easily
 constexpr double kFall_s = 0.1;      // from letting go to the rim
 constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of the swing
-constexpr Duration kSwing = std::chrono::milliseconds(1500);  // at most
+constexpr Duration kSwing = std::chrono::milliseconds(1500);       // at most,
+constexpr Duration kSwingTight = std::chrono::milliseconds(4000);  // and for what would jam in the mouth
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
 constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                           // of the load's mass
@@ -88,8 +91,9 @@ class Place final : public task::Skill {
   Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
     const Vector3& size = cell_.held->load.size_m;
     std::vector<world::Entry> entries = world::ways_in(size, target);
-    // As measured it does not pass; it may have been misjudged, and it is on the cups.
-    if (entries.empty()) entries.push_back({});
+    if (entries.empty()) entries = world::ways_in(size, target, world::kMisjudged_m);
+    if (entries.empty())
+      return fail(fmt::format("too large for its mouth: {:.2f} x {:.2f} m", size.x(), size.y()), name_);
     // The more it leans the higher it is let go, and the deeper it falls.
     for (const world::Entry& entry : entries) {
       for (int height = 0; height < kHeights; ++height) {
@@ -112,10 +116,17 @@ class Place final : public task::Skill {
     return target.center_m.z() + std::max(kTipOverRim_m, kOverRim_m + underside_m);
   }
 
+  // How far the tool leans so that the load does: its weight, half its height off the axis, bends the cups back.
+  [[nodiscard]] double tool_lean(double lean_rad) const {
+    const double sag_nm = cell_.held->mass_kg * kGravity_m_s2 * 0.5 * cell_.held->load.size_m.z() * std::sin(lean_rad);
+    return lean_rad + sag_nm / kCups_nm_rad;
+  }
+
   Expected<AxisVector> nearest(const world::Place& target, const world::Entry& entry, double tip_z,
                                const AxisVector& from) {
     const Load& load = cell_.held->load;
     const Vector3 tip(target.center_m.x(), target.center_m.y(), tip_z);
+    const double lean_rad = tool_lean(entry.lean_rad);
     const Eigen::AngleAxisd tip_from_load(load.yaw_in_tip_rad, Vector3::UnitZ());
     Expected<AxisVector> best = fail("out of reach", name_);
     double least = 0;
@@ -123,7 +134,7 @@ class Place final : public task::Skill {
       const double yaw =
           load.yaw_in_tip_rad + 0.5 * std::numbers::pi * ((turn % 4) + (entry.across_corners ? 0.5 : 0.0));
       Pose pose = Cell::tip_down(tip, yaw);
-      pose.rotate(Eigen::AngleAxisd(turn < 4 ? entry.lean_rad : -entry.lean_rad, tip_from_load * Vector3::UnitY()));
+      pose.rotate(Eigen::AngleAxisd(turn < 4 ? lean_rad : -lean_rad, tip_from_load * Vector3::UnitY()));
       // The middle of the load, not of its top face, over the middle of the mouth.
       const Vector3 middle = pose.linear() * Vector3(0, 0, 0.5 * load.size_m.z());
       pose.translation().head<2>() -= middle.head<2>();
@@ -154,7 +165,7 @@ class Place final : public task::Skill {
     }
     const bool level = hangs_level(now);
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
-    if (!level && now < arrives_ + kSwing) return {};
+    if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "pons/motion/axis_profile.hpp"
 #include "pons/world/view.hpp"
 
 namespace pons::skills {
@@ -72,6 +73,12 @@ AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
   AxisLimits wider = limits;
   wider.acceleration_rad_s2 = limits.acceleration_rad_s2.cwiseMax(kCover * start.acceleration.cwiseAbs());
   wider.speed_rad_s = limits.speed_rad_s.cwiseMax(kCover * start.speed.cwiseAbs());
+  for (Eigen::Index i = 0; i < start.speed.size(); ++i) {
+    // While its acceleration is taken back it gets faster still.
+    const double ahead =
+        motion::coasting_speed({start.position[i], start.speed[i], start.acceleration[i]}, limits.jerk_rad_s3[i]);
+    wider.speed_rad_s[i] = std::max(wider.speed_rad_s[i], kCover * std::abs(ahead));
+  }
   return wider;
 }
 

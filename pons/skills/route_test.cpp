@@ -268,6 +268,10 @@ TEST_F(RouteTest, LimitsCoverWhatTheArmAlreadyDoes) {
   EXPECT_EQ(wider.acceleration_rad_s2[0], gentle.acceleration_rad_s2[0]);
   EXPECT_EQ(wider.speed_rad_s[0], gentle.speed_rad_s[0]);
   EXPECT_EQ(wider.jerk_rad_s3, gentle.jerk_rad_s3);
+
+  start.speed[1] = -gentle.speed_rad_s[1];
+  const AxisVector end = start.position + AxisVector::Constant(start.position.size(), 0.4);
+  EXPECT_TRUE(motion::move(start, kBegin, halt(end), covering(gentle, start)));
 }
 
 }  // namespace

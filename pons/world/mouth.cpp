@@ -7,24 +7,27 @@
 namespace pons::world {
 namespace {
 
-constexpr double kPlay_m = 0.010;  // of mouth and parcel together: where it is let go is not known to the millimetre
+// Between parcel and mouth, both sides together: where it is let go is not known to the millimetre; and the taller it
+// is the farther it swings and the wider it is when it hangs askew.
+constexpr double kPlay_m = 0.008, kAskewPerHeight_m = 0.3;
 constexpr double kDegree = std::numbers::pi / 180;
 // The more it leans the more surely it slides in, but the farther the arm has to turn and the load hangs askew.
-constexpr double kLean_rad = 25 * kDegree, kLeastLean_rad = 15 * kDegree, kMostLean_rad = 35 * kDegree;
+constexpr double kLean_rad = 25 * kDegree, kLeastLean_rad = 15 * kDegree;
+// Leaning it has to be so much shorter at the rim: what fills it catches on the edge and falls flat across.
+constexpr double kSlides = 0.8;
 
 }  // namespace
 
-std::vector<Entry> ways_in(const Vector3& size_m, const Place& mouth) {
-  const double room_m = mouth.size_m.head<2>().minCoeff() - kPlay_m;
+std::vector<Entry> ways_in(const Vector3& full_size_m, const Place& mouth, double misjudged_m) {
+  const Vector3 size_m = full_size_m - Vector3::Constant(misjudged_m);
+  const double room_m = mouth.size_m.head<2>().minCoeff() - kPlay_m - kAskewPerHeight_m * size_m.z() * size_m.z();
   const auto [width_m, length_m] = std::minmax(size_m.x(), size_m.y());
   if (width_m > room_m) return {};
   if (length_m <= room_m) return {{}};
   std::vector<Entry> ways;
-  const double least_rad = std::asin(std::min(1.0, size_m.z() / room_m));
   for (const double lean_rad : {kLean_rad, kLeastLean_rad}) {
-    if (lean_rad >= least_rad) ways.push_back({.lean_rad = lean_rad});
+    if (size_m.z() <= kSlides * room_m * std::sin(lean_rad)) ways.push_back({.lean_rad = lean_rad});
   }
-  if (ways.empty() && least_rad <= kMostLean_rad) ways.push_back({.lean_rad = least_rad});
   if (length_m + width_m <= std::numbers::sqrt2 * room_m) ways.push_back({.across_corners = true});
   return ways;
 }

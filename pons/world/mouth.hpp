@@ -16,6 +16,9 @@ struct Entry {
 // The ways in for something of that size (as it lies: x, y horizontal, z up), the best first; none: it is too large.
 // Level it needs as much room as it is long. Leaning it is no longer at the rim than its height over the sine of the
 // lean. Along the diagonal of a square mouth it needs (length + width) / √2.
-[[nodiscard]] std::vector<Entry> ways_in(const Vector3& size_m, const Place& mouth);
+// A measured size may be too large by `misjudged_m`: what passes by so little, passes.
+[[nodiscard]] std::vector<Entry> ways_in(const Vector3& size_m, const Place& mouth, double misjudged_m = 0);
+
+inline constexpr double kMisjudged_m = 0.004;
 
 }  // namespace pons::world
