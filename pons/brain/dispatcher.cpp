@@ -44,7 +44,8 @@ double left_s(const ObjectBelief& belief, const world::Belt& belt) {
 }
 
 bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
-  return std::any_of(all.begin(), all.end(), [&](const ObjectBelief& other) { return lies_on(other, belief); });
+  return std::any_of(all.begin(), all.end(),
+                     [&](const ObjectBelief& other) { return lies_on(other, belief) || is_part(other, belief); });
 }
 
 }  // namespace

@@ -157,7 +157,7 @@ TEST_F(DispatcherTest, WhatSeemsTooLargeMayStillBeTwo) {
   both.size_m.x() = 0.5;
   const Decisions first = dispatcher_.observe({both}, at(0));
   EXPECT_TRUE(first.tasks.empty() && first.rides.empty());
-  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, 0.1, "P2")}, at(1)).tasks.size(), 2u);
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, -0.1, "P2")}, at(1)).tasks.size(), 2u);
 }
 
 TEST_F(DispatcherTest, TwoParcelsWithOneCodeAreSortedOnce) {
@@ -191,7 +191,7 @@ TEST_F(DispatcherTest, AsksAgainForWhatFailedAndTurnsUp) {
   EXPECT_EQ(again.tasks[0].at("id"), "P1.2");
   EXPECT_EQ(again.tasks[0].at("steps").at(0).at("arguments"), (Json{{"object", "P1"}}));
   dispatcher_.heard("P1.2", task::Outcome::kException);
-  const Decisions never = dispatcher_.observe({parcel(2, 0.3, "P1"), parcel(3, 0.3, "P2")}, at(6));
+  const Decisions never = dispatcher_.observe({parcel(2, 0.3, "P1"), parcel(3, 0.65, "P2")}, at(6));
   ASSERT_EQ(never.tasks.size(), 1u);
   EXPECT_EQ(never.tasks[0].at("id"), "P2");
 }
@@ -231,6 +231,32 @@ TEST_F(DispatcherTest, WhatStaysCoveredBeyondTheCameraRides) {
   beside.confidence = 0.3;
   upper.world_from_top.translation().x() = 0.9 + 0.01;
   EXPECT_EQ(dispatcher_.observe({beside, upper}, at(0)).tasks.size(), 1u);
+}
+
+TEST_F(DispatcherTest, WhatMayBeTwoIsNotAskedFor) {
+  ObjectBelief whole = parcel(1, 0.2, "P1");
+  whole.size_m = Vector3(0.17, 0.09, 0.1);
+  ObjectBelief part = parcel(2, 0.25, "P2");
+  part.size_m = Vector3(0.08, 0.08, 0.1);
+  const Decisions doubtful = dispatcher_.observe({whole, part}, at(0));
+  ASSERT_EQ(doubtful.tasks.size(), 1U);
+  EXPECT_EQ(doubtful.tasks[0].at("id"), "P2");
+  whole.size_m = Vector3(0.09, 0.09, 0.1);
+  whole.world_from_top.translation().x() = 0.16;
+  EXPECT_EQ(dispatcher_.observe({whole, part}, at(1)).tasks.size(), 1U);
+}
+
+TEST_F(DispatcherTest, WhatDoesNotPassItsChuteRides) {
+  world::World world = small_world();
+  world.places.push_back({.name = "chute_1", .kind = world::PlaceKind::kChute, .size_m = {0.38, 0.38, 0.45}});
+  Dispatcher dispatcher({{"P1", {.destination = "chute_1"}}, {"P2", {.destination = "chute_1"}}}, world);
+  ObjectBelief square = parcel(1, 0.55, "P1"), flat = parcel(2, 0.8, "P2");
+  square.size_m = Vector3(0.39, 0.39, 0.05);
+  flat.size_m = Vector3(0.39, 0.30, 0.05);
+  const Decisions decided = dispatcher.observe({square, flat}, at(0));
+  ASSERT_EQ(decided.tasks.size(), 1U);
+  EXPECT_EQ(decided.tasks[0].at("id"), "P2");
+  EXPECT_EQ(only_reason({.rides = decided.rides}), kRideTooLarge);
 }
 
 TEST_F(DispatcherTest, WithoutALabelCameraTheReachIsTheEnd) {

@@ -8,6 +8,7 @@ namespace {
 constexpr double kSure = 0.5;        // of the confidence: below it something hides a part of the object
 constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
 constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
+constexpr double kSameHeight_m = 0.02;
 constexpr double kUpright = 0.9986;  // cosine of 3 degrees
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
@@ -40,6 +41,13 @@ bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
   // seem to overlap when one was measured too large.
   if (leans(upper) != leans(lower)) return leans(upper);
   return is_hidden && upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
+}
+
+bool is_part(const ObjectBelief& part, const ObjectBelief& whole) {
+  if (part.track == whole.track) return false;
+  const Vector3 off = whole.world_from_top.inverse() * part.world_from_top.translation();
+  return std::abs(off.x()) < 0.5 * whole.size_m.x() - kOverlap_m &&
+         std::abs(off.y()) < 0.5 * whole.size_m.y() - kOverlap_m && std::abs(off.z()) < kSameHeight_m;
 }
 
 }  // namespace pons

@@ -76,6 +76,14 @@ TEST(Belief, NeighboursThatTouchDoNotLieOnEachOther) {
   EXPECT_FALSE(lies_on(box(2, 0.25, 0.22, 0.2, 0.7), lower));
 }
 
+TEST(Belief, APartIsWithinAndAsHigh) {
+  const ObjectBelief whole = box(1, 0, 0, 0.2, 0.7);
+  EXPECT_TRUE(is_part(box(2, 0.08, 0.05, 0.21), whole));
+  EXPECT_FALSE(is_part(box(2, 0.08, 0.05, 0.25), whole)) << "lies on it";
+  EXPECT_FALSE(is_part(box(2, 0.2, 0.2, 0.2), whole)) << "touches it";
+  EXPECT_FALSE(is_part(whole, whole));
+}
+
 TEST(Belief, WhatLeansLiesOnWhatStandsHoweverHigh) {
   const ObjectBelief lower = box(1, 0, 0, 0.2);
   ObjectBelief upper = box(2, 0.2, 0, 0.1);
