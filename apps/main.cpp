@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <cstdio>
+#include <exception>
 
 #include "apps/commands.hpp"
 
@@ -17,10 +18,9 @@ int bad_run(const Error& error) {
   return kExitBadRun;
 }
 
-}  // namespace pons::apps
+namespace {
 
-int main(int argc, char** argv) {
-  using namespace pons::apps;
+int run_command_line(int argc, char** argv) {
   CLI::App app{"Pons: the bridge between a robot's brain and its body.", "pons"};
   app.set_version_flag("--version", PONS_VERSION);
   app.require_subcommand(1);
@@ -50,4 +50,17 @@ int main(int argc, char** argv) {
     return kExitBadInput;
   }
   return chosen();
+}
+
+}  // namespace
+}  // namespace pons::apps
+
+int main(int argc, char** argv) {
+  try {
+    return pons::apps::run_command_line(argc, argv);
+  } catch (const std::exception& error) {
+    // Whatever a person can cause has an error of its own: this is a fault of the program, or memory ran out.
+    std::fprintf(stderr, "pons: internal error: %s\n", error.what());
+    return pons::apps::kExitBadRun;
+  }
 }

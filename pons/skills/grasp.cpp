@@ -19,7 +19,7 @@ constexpr double kConverged_s = 0.002;
 constexpr double kLater_s = 0.20;
 constexpr int kMostBlocked = 1;  // a look for a way takes time, and the motion that it ends with must come in time
 constexpr int kRounds = 8, kStraightRounds = 2;
-constexpr double kUpright = 0.9986, kSteepest = 0.88;  // cosines of 3 and 28 degrees
+constexpr double kUpright = 0.9986, kSteepest = 0.80;  // cosines of 3 and 37 degrees
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
@@ -38,9 +38,10 @@ Pose posed(const Vector3& position, const Eigen::Matrix3d& orientation) {
 }
 
 // The cups seal on a leaning top only when they lean with it.
-Eigen::Quaterniond lean_of(const ObjectBelief& object) {
+Expected<Eigen::Quaterniond> lean_of(const ObjectBelief& object) {
   const Vector3 up = object.world_from_top.linear().col(2);
-  if (up.z() > kUpright || up.z() < kSteepest) return Eigen::Quaterniond::Identity();
+  if (up.z() > kUpright) return Eigen::Quaterniond::Identity();
+  if (up.z() < kSteepest) return fail("its top leans too steeply to be gripped", "grasp", "let it ride or lay it flat");
   return Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), up);
 }
 
@@ -160,9 +161,11 @@ Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, con
   for (int round = 0; round < kStraightRounds; ++round) {
     meeting.hover = cell.predict(object, at + from_s(meeting.ahead_s)) + kHover;
     if (round == 0) {
+      const auto lean = lean_of(object);
+      if (!lean) return std::unexpected(lean.error());
       const auto wanted = orientation ? Expected<Eigen::Matrix3d>(*orientation)
                                       : nearest_orientation(cell, start.position, meeting.hover,
-                                                            yaw_of(object.world_from_top.linear()), lean_of(object));
+                                                            yaw_of(object.world_from_top.linear()), *lean);
       if (!wanted) return std::unexpected(wanted.error());
       meeting.orientation = *wanted;
     }

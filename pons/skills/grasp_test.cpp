@@ -150,5 +150,19 @@ TEST_F(GraspTest, MeetsAParcelNoLaterOnTheStraightWay) {
   }
 }
 
+TEST_F(GraspTest, TheToolLeansWithALeaningTopUpToALimit) {
+  for (const double lean_rad : {0.3, 0.52, 0.9}) {
+    ObjectBelief leaning = parcel(1, {-0.3, 0.03, 1.0}, {0.14, 0.11, 0.09});
+    leaning.world_from_top.rotate(Eigen::AngleAxisd(lean_rad, Vector3::UnitY()));
+    cell_.refresh(kBegin, {leaning});
+    const AxisState start = touching(world_.place("chute_2")->center_m + Vector3(0, 0, 0.12), false);
+    const auto grasp = plan_grasp(cell_, start, kBegin, *cell_.find("1"), std::nullopt);
+    ASSERT_EQ(grasp.has_value(), lean_rad < 0.6) << lean_rad;
+    if (!grasp) continue;
+    const Vector3 out = grasp->orientation.col(2);
+    EXPECT_NEAR(out.dot(leaning.world_from_top.linear().col(2)), -1, 1e-6) << lean_rad;
+  }
+}
+
 }  // namespace
 }  // namespace pons::skills
