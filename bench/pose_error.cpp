@@ -58,7 +58,7 @@ class Bench {
   void run() {
     body::Sensors sensors;
     std::vector<Time> next;
-    for (const auto& camera : world_.cameras) next.push_back(Time(from_s(camera.phase_s)));
+    for (const auto& camera : world_.cameras) next.emplace_back(from_s(camera.phase_s));
     RgbdFrame frame;
     for (Time now; !simulation_.finished(); now += from_s(0.01)) {
       simulation_.advance_to(now);

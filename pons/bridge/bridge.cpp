@@ -215,8 +215,8 @@ void Bridge::conclude(const std::string& id, Open& open, const task::Progress& p
 }
 
 void Bridge::finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now) {
-  const std::string name = id;  // `id` may live in what is erased
-  open_.erase(open_.find(name));
+  const auto closed = open_.extract(open_.find(id));  // until the end of this: `id` may live in it
+  const std::string& name = closed.key();
   const auto written = journal_.outcome(name, outcome, reason, now, detail);
   keep(written);
   if (written) outcomes_.push_back({name, outcome, std::move(reason), std::move(detail)});

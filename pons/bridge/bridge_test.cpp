@@ -264,7 +264,7 @@ std::string mutated(const std::string& text, Random& random) {
       case 3:
         result.insert(place, kPieces[random.below(kPieces.size())]);
         break;
-      case 4:
+      default:
         result.resize(place);
         break;
     }

@@ -16,7 +16,7 @@
 namespace pons::gate {
 namespace {
 
-constexpr std::size_t kMaxAnswer = 64 * 1024 * 1024;
+constexpr std::size_t kMaxAnswer = 64UL * 1024 * 1024;
 
 // Makes room for a new socket at `path`, or says why not.
 Expected<void> clear_stale(const std::filesystem::path& path, const sockaddr_un& address) {
@@ -138,7 +138,7 @@ Expected<void> send_all(const Descriptor& socket, std::string_view text, Clock::
 Expected<std::string> receive_line(const Descriptor& socket, Clock::time_point until,
                                    const std::filesystem::path& path) {
   std::string text;
-  std::array<char, 16 * 1024> buffer;
+  std::array<char, 16UL * 1024> buffer;
   while (text.size() <= kMaxAnswer) {
     if (!wait_for(socket, POLLIN, until)) return silent(path);
     const ssize_t got = ::recv(socket.get(), buffer.data(), buffer.size(), 0);

@@ -69,8 +69,8 @@ struct RobotModel::Impl final : Chain {
   std::vector<pinocchio::FrameIndex> capsule_frames;
   Eigen::VectorXd q, v, a;
 
-  Impl(world::Robot robot_in, pinocchio::Model model_in)
-      : robot(std::move(robot_in)), model(std::move(model_in)), data(model) {
+  Impl(world::Robot robot_in, const pinocchio::Model& model_in)
+      : robot(std::move(robot_in)), model(model_in), data(model) {
     model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravityMS2);
     model.armature = robot.rotor_inertia_kg_m2;
     const auto flange = model.getFrameId(robot.flange_link);

@@ -58,8 +58,9 @@ cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, co
 }
 
 std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, const cv::Rect& area) {
-  const cv::Mat3b picture(frame.intrinsics.height, frame.intrinsics.width,
-                          reinterpret_cast<cv::Vec3b*>(const_cast<std::uint8_t*>(frame.rgb.data())));
+  // A cv::Mat knows no const data; nothing writes here. NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
+  auto* const pixels = const_cast<std::uint8_t*>(frame.rgb.data());
+  const cv::Mat3b picture(frame.intrinsics.height, frame.intrinsics.width, reinterpret_cast<cv::Vec3b*>(pixels));
   cv::cvtColor(picture(area), grey_, cv::COLOR_RGB2GRAY);
   // Small modules are found more surely when enlarged; the plain picture goes first because it is four times cheaper.
   struct Attempt {

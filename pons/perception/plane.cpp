@@ -15,7 +15,8 @@ Plane fit_plane(const TopView& view, const std::vector<cv::Point>& cells) {
   Plane plane;
   const std::size_t stride = std::max<std::size_t>(1, cells.size() / kCells);
   for (std::size_t i = 0; i < cells.size(); i += stride) plane.middle += Eigen::Vector2d(cells[i].x, cells[i].y);
-  plane.middle /= static_cast<double>((cells.size() + stride - 1) / stride);
+  const std::size_t count = (cells.size() + stride - 1) / stride;
+  plane.middle /= static_cast<double>(count);
   struct Sample {
     double x = 0, y = 0, z = 0, residual = 0;
   };

@@ -37,7 +37,9 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt, Both both)
       }
     }
   }
-  const auto within = [](double value, int count) { return static_cast<int>(std::clamp(value, 0.0, double(count))); };
+  const auto within = [](double value, int count) {
+    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(count)));
+  };
   window_.x = within(left, sampling_.width);
   window_.y = within(top, sampling_.height);
   window_.width = within(right + 1, sampling_.width) - window_.x;
@@ -112,6 +114,7 @@ void TopViewer::project(const RgbdFrame& frame, int row, Strip& strip) const {
     const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
     const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
     cell[i] = outside ? -1 : row_of * columns + column_of;
+    // lround would leave the vector. NOLINTNEXTLINE(bugprone-incorrect-roundings)
     height[i] =
         static_cast<int>(static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F);
   }

@@ -11,11 +11,11 @@ CameraCrew::CameraCrew(const world::World& world, std::vector<body::Camera*> cam
       cameras_(std::move(cameras)),
       perception_(perception),
       pace_(pace),
+      finds_(std::ranges::any_of(world.cameras,
+                                 [](const world::CameraSpec& c) { return c.watches == "belt" && !c.reads_labels; })),
       frames_(cameras_.size()),
       busy_(cameras_.size(), false) {
-  for (const world::CameraSpec& spec : world_.cameras) next_shutter_.push_back(Time(from_s(spec.phase_s)));
-  finds_ = std::ranges::any_of(
-      world_.cameras, [](const world::CameraSpec& camera) { return camera.watches == "belt" && !camera.reads_labels; });
+  for (const world::CameraSpec& spec : world_.cameras) next_shutter_.emplace_back(from_s(spec.phase_s));
   developer_ = std::jthread([this](const std::stop_token& stop) { develop(stop); });
   perceiver_ = std::jthread([this](const std::stop_token& stop) { perceive(stop); });
 }

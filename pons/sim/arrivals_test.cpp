@@ -64,7 +64,8 @@ TEST_P(Mix, NothingIsPutDownIntoAnother) {
   int pairs = 0;
   for (std::size_t i = 0; i < arrivals.size(); ++i) {
     const Pose& one = arrivals[i].group_from_middle;
-    for (std::size_t j = i; j-- > 0 && arrivals[j].group == arrivals[i].group;) {
+    for (std::size_t next = i; next > 0 && arrivals[next - 1].group == arrivals[i].group; --next) {
+      const std::size_t j = next - 1;
       const Pose& other = arrivals[j].group_from_middle;
       const bool leans = std::abs(one.linear()(2, 2)) < 0.999;
       if (leans && j + 1 == i) continue;

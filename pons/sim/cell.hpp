@@ -57,7 +57,7 @@ struct Cell {
   std::string failure;  // what MuJoCo said when it gave up
 
  private:
-  std::vector<double> brake_acceleration, brake_torque;  // scratch, one a degree of freedom
+  std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom
 
   void drive();
   void brake();

@@ -35,10 +35,9 @@ double hidden_end_m(const world::World& world) {
 
 }  // namespace
 
-BeltDrive::BeltDrive(const world::Belt& belt, std::uint64_t seed) : belt_(belt) {
+BeltDrive::BeltDrive(const world::Belt& belt, std::uint64_t seed) : belt_(belt), speed_m_s_(belt.speed_m_s) {
   Random random = Random(seed).fork(kBeltStream);
   for (double& phase : phase_) phase = random.uniform(0, kTau);
-  speed_m_s_ = belt.speed_m_s;
 }
 
 void BeltDrive::step(mjModel* model, int geom, Time now, double step_s) {

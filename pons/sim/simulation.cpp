@@ -31,10 +31,10 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       feeder(world, manifest, arrivals),
       body(this),
       noise(Random(seed).fork(kNoiseStream)),
-      step_length(from_s(world.physics_step_s)) {
+      step_length(from_s(world.physics_step_s)),
+      brake_acceleration_(static_cast<std::size_t>(composed.model->nv)),
+      brake_torque_(brake_acceleration_) {
   set_points.torque_nm = AxisVector::Zero(world.robot.home.size());
-  brake_acceleration.assign(static_cast<std::size_t>(composed.model->nv), 0.0);
-  brake_torque = brake_acceleration;
   for (int i = 0; i < kSlots; ++i) {
     const Slot& slot = composed.slots[static_cast<std::size_t>(i)];
     park(composed.model.get(), data.get(), slot, i);
@@ -79,18 +79,18 @@ void Cell::brake() {
     held.resize(axes);
     for (Eigen::Index i = 0; i < axes; ++i) held[i] = data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
   }
-  std::fill(brake_acceleration.begin(), brake_acceleration.end(), 0.0);
+  std::fill(brake_acceleration_.begin(), brake_acceleration_.end(), 0.0);
   for (Eigen::Index i = 0; i < axes; ++i) {
     const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
     const double away = held.size() == 0 ? 0 : held[i] - data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
-    brake_acceleration[static_cast<std::size_t>(dof)] = kBrakeStiffness * away - kBrakeDamping * data->qvel[dof];
+    brake_acceleration_[static_cast<std::size_t>(dof)] = kBrakeStiffness * away - kBrakeDamping * data->qvel[dof];
   }
-  mj_mulM(model, data.get(), brake_torque.data(), brake_acceleration.data());
+  mj_mulM(model, data.get(), brake_torque_.data(), brake_acceleration_.data());
   for (Eigen::Index i = 0; i < axes; ++i) {
     const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
     const double most = kBrake * world.robot.limits.torque_nm[i];
     data->qfrc_applied[dof] =
-        std::clamp(brake_torque[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof], -most, most);
+        std::clamp(brake_torque_[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof], -most, most);
   }
 }
 

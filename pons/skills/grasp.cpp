@@ -65,7 +65,8 @@ std::array<Vector3, 3> tip_motion(Cell& cell, const AxisState& state) {
 // Starting as told, ending at standstill in `end`: the quintic of least jerk in each coordinate.
 std::function<Vector3(double)> least_jerk(const std::array<Vector3, 3>& start, const Vector3& end, double duration_s) {
   const double d = duration_s;
-  const Vector3 p = start[0], v = start[1], a = start[2], way = end - p;
+  const auto& [p, v, a] = start;
+  const Vector3 way = end - p;
   const Vector3 c3 = (10 * way - 6 * d * v - 1.5 * d * d * a) / (d * d * d);
   const Vector3 c4 = (-15 * way + 8 * d * v + 1.5 * d * d * a) / (d * d * d * d);
   const Vector3 c5 = (6 * way - 3 * d * v - 0.5 * d * d * a) / (d * d * d * d * d);

@@ -74,8 +74,8 @@ std::string read_bounded(const std::filesystem::path& file) {
 
 }  // namespace
 
-YamlValue::YamlValue(std::shared_ptr<const std::filesystem::path> file, YAML::Node node, std::string key)
-    : file_(std::move(file)), node_(std::move(node)), key_(std::move(key)) {}
+YamlValue::YamlValue(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node, std::string key)
+    : file_(std::move(file)), node_(node), key_(std::move(key)) {}
 
 void YamlValue::refuse(std::string what, std::string mend) const {
   std::string where = fmt::format("{}:{}", file_->string(), std::max(node_.Mark().line, 0) + 1);

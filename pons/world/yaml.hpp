@@ -25,7 +25,7 @@ struct LoadError {
 // node is of another shape or out of range.
 class YamlValue {
  public:
-  YamlValue(std::shared_ptr<const std::filesystem::path> file, YAML::Node node, std::string key);
+  YamlValue(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node, std::string key);
 
   // In [low, high], finite.
   [[nodiscard]] double number(double low, double high) const;

@@ -20,7 +20,7 @@ constexpr const char* kHeader = "parcel_id,destination,kind,length_m,width_m,hei
 class BadInput : public ::testing::Test {
  protected:
   // One line on the error stream with all of `parts`, code 2, and no file left behind.
-  void expect_refused(std::vector<std::string> arguments, const std::vector<std::string>& parts,
+  void expect_refused(const std::vector<std::string>& arguments, const std::vector<std::string>& parts,
                       const std::vector<std::string>& environment = {}) {
     const auto before = files();
     const Finished run = run_pons(arguments, environment);
