@@ -55,6 +55,19 @@ TEST(Sorting, ThirtyParcelsAreSortedOrExceptedAndAccountedFor) {
   for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
 }
 
+// Of every kind, with sides drawn evenly up to 0.40 m: also what hardly passes a mouth, and what does not.
+TEST(Sorting, ParcelsOfAnySizeAreSortedOrLetRide) {
+  const Folder folder;
+  const Finished run = run_pons({"run", "parcel_cell", "--manifest", "tests/end_to_end/any_size.csv", "--quiet",
+                                 "--explain", "--report", folder / "report.json"});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  expect_accounted_for(report);
+  EXPECT_EQ(report["parcels"]["offered"], 55);
+  EXPECT_GE(report["parcels"]["sorted"], 50) << run.out;
+  EXPECT_EQ(report["parcels"]["damaged"], 0) << run.out;
+}
+
 TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   const Folder folder;
   const Finished run =
