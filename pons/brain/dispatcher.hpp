@@ -78,8 +78,8 @@ class Dispatcher {
   };
 
   void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);
-  // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool too_large(const Vector3& size_m, const Order& order) const;
+  // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
