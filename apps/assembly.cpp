@@ -64,7 +64,8 @@ runner::SkillPort Assembly::skill_port() {
   return {.refresh = [this](Time now, std::vector<ObjectBelief> objects) { cell->refresh(now, std::move(objects)); },
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
-          .arm = [this](Time now) { cell->arm.arm(now); }};
+          .arm = [this](Time now) { cell->arm.arm(now); },
+          .rest = [this](Time now) { cell->keep_clear(now); }};
 }
 
 runner::Parts Assembly::parts() {

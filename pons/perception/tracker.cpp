@@ -245,6 +245,9 @@ void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<
       within(expected(track, stamp, travel_m), sighting) && !parted(track, sighting, sightings, stamp, travel_m);
   if (hidden != track.odd_hidden) track.odd_sizes = 0;
   track.odd_hidden = hidden;
+  // Cuts that differ from one another say nothing.
+  if (resized && size_difference(o.size_m, track.odd_size_m) > kOtherSize_m) track.odd_sizes = 0;
+  if (resized) track.odd_size_m = o.size_m;
   if (resized && !now_whole && ++track.odd_sizes < (hidden ? kDoubts : 2)) return;
   track.last = sighting;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {

@@ -59,6 +59,7 @@ class Tracker {
     Sighting last;  // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
     Time last_seen;
+    Vector3 odd_size_m = Vector3::Zero();
     bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
     std::string code, other_code;

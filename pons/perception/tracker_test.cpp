@@ -74,6 +74,19 @@ TEST(TrackerTest, OneBadCutChangesNothingTwoDo) {
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1u);
 }
 
+TEST(TrackerTest, CutsThatAllDifferChangeNothing) {
+  Bench bench;
+  std::uint32_t id = 0;
+  for (int i = 0; i < 2; ++i) id = bench.update({Bench::sighting(-0.5, 0, 0, {0.12, 0.10, 0.1})}).at(0);
+  bench.tracker.label_read(id, "A");
+  for (const Vector3& cut : {Vector3(0.18, 0.16, 0.1), Vector3(0.22, 0.13, 0.1), Vector3(0.26, 0.15, 0.1)}) {
+    bench.update({Bench::sighting(-0.53, 0.02, 0, cut)});
+    EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.12, 1e-9);
+    EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).world_from_top.translation().x(), -0.5, 1e-9);
+    EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "A");
+  }
+}
+
 // As a load carried over it hides more and more of it, and then less.
 TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   Bench bench;

@@ -38,6 +38,7 @@ Expected<void> BridgeSide::tick(Time now, CameraCrew& crew) {
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
+  if (bridge_.running().empty()) skills_.rest(now);
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     dispatcher_.heard(report.id, report.outcome);
     last_outcome_ = now;

@@ -24,6 +24,7 @@ struct SkillPort {
   std::function<const link::State&()> state;                     // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;    // tracks that were taken off the belt
   std::function<void(Time)> arm;                                 // one step out of a stop, towards operational
+  std::function<void(Time)> rest;                                // once a period while no skill runs
 };
 
 class BridgeSide {

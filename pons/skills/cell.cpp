@@ -24,6 +24,10 @@ constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
 constexpr double kSlowestShare = 0.10;
 constexpr double kBoldest = 0.5, kTimid = 0.9;  // of one correction
 constexpr double kUnsure_kg = 0.1;              // the scale's
+constexpr Duration kLookEvery = std::chrono::milliseconds(100);
+constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
+constexpr double kRise_m = 0.05;
+constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
 
@@ -104,6 +108,28 @@ double Cell::effort(const AxisVector& from, const AxisVector& to) const {
   const bool cornered = ((to - limits.position_min).array() < kCornered_rad).any() ||
                         ((limits.position_max - to).array() < kCornered_rad).any();
   return (to - from).cwiseAbs().maxCoeff() + (cornered ? kWholeTurn_rad : 0);
+}
+
+void Cell::keep_clear(Time now) {
+  if (!arm.operational() || now < arm.motion_end() || now < looked_at_ + kLookEvery) return;
+  looked_at_ = now;
+  const Time from = arm.splice_time(now);
+  const AxisVector rests = arm.planned(from).position;
+  const Load* const load = held ? &held->load : nullptr;
+  const auto clear = [&](const AxisVector& q) { return router.clear_at(q, from, from + kLookAhead, load, objects_); };
+  if (clear(rests)) return;
+  Pose pose = model.world_from_tip(rests);
+  for (int step = 0; step < kRises; ++step) {
+    pose.translation().z() += kRise_m;
+    const auto q = model.inverse(pose, rests);
+    if (!q) return;
+    if (step + 1 < kRises && !clear(*q)) continue;
+    const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
+    const auto way = held ? carry(now, [&](const AxisVector&) -> Expected<AxisVector> { return *q; })
+                          : motion::move(arm.planned(from), from, end, limits_empty());
+    if (way) (void)arm.stream(*way);
+    return;
+  }
 }
 
 AxisLimits Cell::limits_empty() const {

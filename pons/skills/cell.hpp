@@ -69,6 +69,10 @@ class Cell {
   // the goal and of the router.
   [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal);
 
+  // For an arm that waits: up, with what it holds, before anything that rides along the belt meets it. Does nothing
+  // while it moves or where it is clear.
+  void keep_clear(Time now);
+
   const world::World& world;
   Arm arm;
   model::RobotModel model;
@@ -80,7 +84,7 @@ class Cell {
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
 
   double view_end_m_;
-  Time now_;
+  Time now_, looked_at_;
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;

@@ -49,6 +49,52 @@ class CarryTest : public ::testing::Test {
   Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
 };
 
+class RestTest : public CarryTest {
+ protected:
+  // On the belt, coming along, its front `ahead_m` from the tip.
+  ObjectBelief coming(double ahead_m, double height_m) const {
+    ObjectBelief object;
+    object.track = 7;
+    object.stamp = now_;
+    object.size_m = {0.2, 0.2, height_m};
+    object.world_from_top.translation() = Vector3(0.1 - ahead_m - 0.1, 0, world_.belt.surface_z_m + height_m);
+    object.velocity_m_s.x() = 0.25;
+    return object;
+  }
+  double highest_tip_m() {
+    double highest = 0;
+    for (Time time = now_; time <= cell_.arm.motion_end(); time += std::chrono::milliseconds(10))
+      highest = std::max(highest, cell_.model.world_from_tip(cell_.arm.planned(time).position).translation().z());
+    return highest;
+  }
+};
+
+TEST_F(RestTest, AnArmThatWaitsMakesRoomForWhatIsTallAndNearOnly) {
+  const Time rested = cell_.arm.motion_end();
+  Time now = now_;
+  for (const ObjectBelief& harmless : {coming(0.2, 0.40), coming(1.0, 0.46)}) {
+    cell_.refresh(now_, {harmless});
+    cell_.keep_clear(now += std::chrono::milliseconds(200));
+    EXPECT_EQ(cell_.arm.motion_end(), rested) << harmless.size_m.z();
+  }
+  cell_.refresh(now_, {coming(0.4, 0.46)});
+  cell_.keep_clear(now += std::chrono::milliseconds(200));
+  EXPECT_GT(cell_.arm.motion_end(), rested);
+}
+
+TEST_F(RestTest, ItRisesOverWhatWouldMeetTheTool) {
+  cell_.refresh(now_, {coming(0.2, 0.46)});
+  cell_.keep_clear(now_);
+  EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.46 + 0.01);
+}
+
+TEST_F(RestTest, WhatItHoldsRisesToo) {
+  cell_.held = Held{"P000001", {.size_m = {0.2, 0.15, 0.15}}, 1.0};
+  cell_.refresh(now_, {coming(0.2, 0.32)});
+  cell_.keep_clear(now_);
+  EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.32 + 0.15 + 0.01);
+}
+
 TEST_F(CarryTest, WhatIsHeavyAndTallGoesSlowerThanWhatIsLightAndFlat) {
   const motion::Trajectory light = carry({0.2, 0.15, 0.02}, 0.2);
   EXPECT_LE(use(light), kReserve);

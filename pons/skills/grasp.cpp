@@ -20,9 +20,15 @@ constexpr double kLater_s = 0.20;
 constexpr int kMostBlocked = 1;  // a look for a way takes time, and the motion that it ends with must come in time
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.80;  // cosines of 3 and 37 degrees
+constexpr double kLeastLift_m = 0.10, kHighestLift_m = 0.25;
+constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
+constexpr double kClear_m = 0.02;  // by this much
+constexpr double kAway_m = 0.02;   // from them, during the lift
+constexpr double kOneSided = 0.3;  // of the sum of unit vectors
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLift_m_s2 = 5.0;
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
+constexpr double kThinnest_m = 0.005;  // of what is carried
 constexpr double kSlower = 1.25;
 constexpr double kRideLifted_s = 0.8;  // with the belt, to be weighed
 
@@ -123,6 +129,32 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   const auto q = cell.model.inverse(posed(from + offset, orientation), start.position);
   if (!q) return std::unexpected(q.error());
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
+}
+
+Vector3 lift_offset(const Cell& cell, const ObjectBelief& target) {
+  Vector3 offset{0, 0, kLeastLift_m}, away = Vector3::Zero();
+  const Vector3 top = target.world_from_top.translation();
+  const double own_m = 0.5 * target.size_m.head<2>().norm() + kClose_m;
+  for (const ObjectBelief& object : cell.objects()) {
+    if (object.track == target.track) continue;
+    const Vector3 other = object.world_from_top.translation();
+    const Eigen::Vector2d apart = (other - cell.predict(target, object.stamp)).head<2>();
+    if (apart.norm() > own_m + 0.5 * object.size_m.head<2>().norm()) continue;
+    offset.z() = std::max(offset.z(), other.z() - (top.z() - target.size_m.z()) + kClear_m);
+    away.head<2>() -= apart.normalized();
+  }
+  offset.z() = std::min(offset.z(), kHighestLift_m);
+  // Between two on opposite sides there is no way out but up.
+  if (away.norm() > kOneSided) offset += kAway_m * away.normalized();
+  return offset;
+}
+
+Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation) {
+  const Eigen::Matrix3d& axes = object.world_from_top.linear();
+  const double middle_over_edge_m = 0.5 * axes.row(2).head<2>().cwiseAbs().dot(object.size_m.head<2>());
+  Load load{.size_m = object.size_m, .yaw_in_tip_rad = yaw_of(orientation) - yaw_of(axes)};
+  load.size_m.z() = std::max(kThinnest_m, (object.size_m.z() - middle_over_edge_m) / axes(2, 2));
+  return load;
 }
 
 Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,

@@ -46,6 +46,10 @@ struct Meeting {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          const std::optional<Eigen::Matrix3d>& orientation);
 
+// As seen from the belt: high enough that its underside clears whatever stands close to it, and a little away from
+// that. What touches a load would be dragged up by its flank.
+[[nodiscard]] Vector3 lift_offset(const Cell& cell, const ObjectBelief& target);
+
 // With a load on the cups: straight, by `offset` as seen from the belt, and on with the belt there. Soft enough for the
 // load not to bounce.
 struct Lift {
@@ -55,6 +59,10 @@ struct Lift {
 };
 [[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                                   const Vector3& offset);
+
+// What hangs on the cups that took the object so. One that leans stands on its lower edge, and is so much thinner than
+// its middle is high.
+[[nodiscard]] Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation);
 
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at,

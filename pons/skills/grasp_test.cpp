@@ -164,5 +164,33 @@ TEST_F(GraspTest, TheToolLeansWithALeaningTopUpToALimit) {
   }
 }
 
+// As high in its middle as a thick one, of which one edge stands on the belt.
+TEST_F(GraspTest, WhatLeansIsAsThickAsItIs) {
+  const Vector3 size_m(0.36, 0.14, 0.05);
+  for (const double lean_rad : {0.0, 0.2, -0.35}) {
+    ObjectBelief object = parcel(1, {-0.3, 0.03, 1.0}, size_m);
+    object.world_from_top.rotate(Eigen::AngleAxisd(lean_rad, Vector3::UnitY()));
+    object.size_m.z() = size_m.z() * std::cos(lean_rad) + 0.5 * size_m.x() * std::abs(std::sin(lean_rad));
+    const Eigen::Matrix3d orientation = Cell::tip_down({-0.3, 0.03, 1.0}, 0.7).linear();
+    const Load load = load_of(object, orientation);
+    EXPECT_TRUE(load.size_m.isApprox(size_m, 1e-9)) << lean_rad << ": " << load.size_m.transpose();
+    EXPECT_NEAR(load.yaw_in_tip_rad, 0.6, 0.03) << lean_rad;
+  }
+}
+
+TEST_F(GraspTest, ALiftGoesOverWhatStandsCloseAndAwayFromIt) {
+  const ObjectBelief target = parcel(1, {-0.3, 0, 1.0}, {0.14, 0.10, 0.10});
+  cell_.refresh(kBegin, {target});
+  const Vector3 alone = lift_offset(cell_, target);
+  EXPECT_EQ(alone.head<2>().norm(), 0);
+  EXPECT_GT(alone.z(), 0.08);
+  cell_.refresh(kBegin, {target, parcel(2, {-0.5, 0, 1.05}, {0.2, 0.2, 0.15})});
+  const Vector3 beside = lift_offset(cell_, target);
+  EXPECT_GT(beside.x(), 0.01);
+  EXPECT_GT(1.0 - target.size_m.z() + beside.z(), 1.05) << "its underside over the other's top";
+  cell_.refresh(kBegin, {target, parcel(2, {-0.8, 0, 1.05}, {0.2, 0.2, 0.15})});
+  EXPECT_EQ(lift_offset(cell_, target), alone) << "far away it does not matter";
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
@@ -27,20 +29,16 @@ constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr double kWayRound_s = 0.6;  // what a way round what is in the way may take longer
 constexpr Duration kBlockedFor = std::chrono::milliseconds(200);
 constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
-constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan
+constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan,
+constexpr double kElsewhere_m = 0.015;  // and by so much, when it is too late for one, another try
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
-constexpr double kLift_m = 0.10;
-constexpr double kHighestLift_m = 0.25;
-constexpr double kClose_m = 0.05;    // neighbours within this of the footprint are lifted over
-constexpr double kClear_m = 0.02;    // by this much
-constexpr double kAway_m = 0.02;     // from them, during the lift
-constexpr double kOneSided = 0.3;    // of the sum of unit vectors
-constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
-constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
+constexpr double kLifted_m = 0.030;     // nothing below supports the load any more
+constexpr double kNearLimit = 0.15;     // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
 constexpr double kPutBack_m = 0.02;  // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
-constexpr double kSetDown_m = 0.03;  // over the belt, when let go: a heavy load hangs lower than its size says
-constexpr double kBeyond_m = 0.15;   // past the pick zone the arm still reaches down
+// Over the belt, when let go: a heavy load hangs lower than its size says. Higher when that is blocked.
+constexpr std::array kSetDowns_m = {0.03, 0.10, 0.20};
+constexpr double kBeyond_m = 0.15;  // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
 constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
@@ -101,12 +99,17 @@ class Pick final : public task::Skill {
   enum class Phase : std::uint8_t { kFind, kApproach, kGrip, kLift, kSetDown, kRetreat };
 
   Progress find(Time now) {
+    cell_.keep_clear(now);
     if (cell_.held) {
+      if (tried_ && now - *tried_ < kTryEvery) return {};
+      tried_ = now;
       // A stop came before the scale had decided; the arm has stood since.
       if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
       const double mass = cell_.held->mass_kg;
-      if (cell_.held->code != code_) return begin_set_down(now, {});
-      return mass > cell_.world.rules.max_mass_kg ? begin_set_down(now, overweight(mass)) : success(now);
+      const bool wanted = cell_.held->code == code_;
+      if (wanted && mass <= cell_.world.rules.max_mass_kg) return success(now);
+      const Progress begun = begin_set_down(now, wanted ? overweight(mass) : Progress{});
+      return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
@@ -135,8 +138,12 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
     if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
-    auto grasp = plan_grasp(cell_, state, from, *object, std::nullopt);
+    // One side of the parcel may have room for the wrist where another has a tall neighbour.
+    std::optional<Eigen::Matrix3d> turned;
+    if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
+    auto grasp = plan_grasp(cell_, state, from, *object, turned);
     if (!grasp) {
+      ++quarters_;
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       last_error_ = grasp.error().line();
@@ -195,12 +202,25 @@ class Pick final : public task::Skill {
   // What an earlier task left on the cups goes back on the belt where there is room.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
+    Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
+    for (const double over_belt_m : kSetDowns_m) {
+      way = way_to_belt(now, over_belt_m);
+      if (way) break;
+    }
+    if (!way) return {Status::kRetry, way.error().line(), {}};
+    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
+    released_at_ = way->back().end();
+    phase_ = Phase::kSetDown;
+    return {};
+  }
+
+  Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m) {
     // Where there will be room depends on when it gets there, and that on where.
     Time arrives = now + kSetDownTakes;
     Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
     for (int round = 0; round < kSetDownRounds; ++round) {
       way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
-        const Vector3 spot = free_spot(arrives);
+        const Vector3 spot = free_spot(arrives, over_belt_m);
         const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
         if (!down) return fail("no room on the belt", cell_.held->code);
         Pose pose = Pose::Identity();
@@ -208,21 +228,18 @@ class Pick final : public task::Skill {
         pose.linear() = *down;
         return cell_.model.inverse(pose, from);
       });
-      if (!way) return {Status::kRetry, way.error().line(), {}};
+      if (!way) return way;
       arrives = way->back().end();
     }
-    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
-    released_at_ = way->back().end();
-    phase_ = Phase::kSetDown;
-    return {};
+    return way;
   }
 
   // Tip position over the belt, from the middle of the pick zone on: the first with room enough at `time`, else the one
   // with the most.
-  [[nodiscard]] Vector3 free_spot(Time time) const {
+  [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const {
     const world::Belt& belt = cell_.world.belt;
     const Vector3& size = cell_.held->load.size_m;
-    Vector3 spot{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + size.z() + kSetDown_m};
+    Vector3 spot{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + size.z() + over_belt_m};
     double most_m = -1;
     for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m;
          x += kSpotStep_m) {
@@ -287,16 +304,14 @@ class Pick final : public task::Skill {
   }
 
   Progress approach(Time now) {
-    const ObjectBelief* object = cell_.find(code_);
-    if (object != nullptr && now - planned_ >= kReplanEvery && now + kNoReplanBefore < grasp_.hover) {
-      const Vector3 contact = cell_.predict(*object, grasp_.contact);
-      if ((contact - grasp_.contact_point).head<2>().norm() > kMoved_m) {
-        const Time from = cell_.arm.splice_time(now);
-        const double turn = yaw_of(object->world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
-        auto better = plan_grasp(cell_, cell_.arm.planned(from), from, *object,
-                                 Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
-        if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) return start(*better, *object, now);
-        planned_ = now;
+    if (const ObjectBelief* object = cell_.find(code_)) {
+      const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
+      const double moved_m = off.head<2>().norm();
+      if (now + kNoReplanBefore >= grasp_.hover) {
+        // The cups would take hold of its neighbour, too.
+        if (moved_m > kElsewhere_m) return give_up(now, "it lies elsewhere than it seemed to");
+      } else if (now - planned_ >= kReplanEvery) {
+        replan(now, *object, moved_m);
       }
     }
     if (now + kVacuumLead >= grasp_.contact) {
@@ -304,6 +319,18 @@ class Pick final : public task::Skill {
       phase_ = Phase::kGrip;
     }
     return {};
+  }
+
+  // When it lies elsewhere than was believed, or something else stands in the way.
+  void replan(Time now, const ObjectBelief& object, double moved_m) {
+    if (moved_m <= kMoved_m && cell_.router.clear(grasp_.trajectory, now, grasp_.hover, nullptr, cell_.objects()))
+      return;
+    const Time from = cell_.arm.splice_time(now);
+    const double turn = yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
+    const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
+                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
+    planned_ = now;
+    if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
   }
 
   Progress grip(Time now) {
@@ -348,41 +375,19 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset());
+    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_));
     if (!up || !cell_.arm.stream(up->trajectory)) {
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
     }
     lift_end_ = up->top;
     rides_until_ = up->rides_until;
-    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * target_.size_m.prod());
-    Held held{.code = code_};
-    held.load.size_m = target_.size_m;
-    held.load.yaw_in_tip_rad = yaw_of(grasp_.orientation) - yaw_of(target_.world_from_top.linear());
-    cell_.held = held;
-    cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
+    cell_.held = Held{.code = code_, .load = load_of(target_, grasp_.orientation)};
+    const Vector3& size = cell_.held->load.size_m;
+    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
+    cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
     cell_.forget(target_.track);
     phase_ = Phase::kLift;
     return {};
-  }
-
-  // High enough that the load's underside clears whatever stands close to it, and a little away from that: what touches
-  // the load would be dragged up by its flank.
-  [[nodiscard]] Vector3 lift_offset() const {
-    Vector3 offset{0, 0, kLift_m}, away = Vector3::Zero();
-    const Vector3 top = target_.world_from_top.translation();
-    const double own_m = 0.5 * target_.size_m.head<2>().norm() + kClose_m;
-    for (const ObjectBelief& object : cell_.objects()) {
-      if (object.track == target_.track) continue;
-      const Vector3 other = object.world_from_top.translation();
-      const Eigen::Vector2d apart = (other - cell_.predict(target_, object.stamp)).head<2>();
-      if (apart.norm() > own_m + 0.5 * object.size_m.head<2>().norm()) continue;
-      offset.z() = std::max(offset.z(), other.z() - (top.z() - target_.size_m.z()) + kClear_m);
-      away.head<2>() -= apart.normalized();
-    }
-    offset.z() = std::min(offset.z(), kHighestLift_m);
-    // Between two on opposite sides there is no way out but up.
-    if (away.norm() > kOneSided) offset += kAway_m * away.normalized();
-    return offset;
   }
 
   Progress lift(Time now) {
@@ -406,7 +411,7 @@ class Pick final : public task::Skill {
     const double mass = weighed.value_or(kUnweighable * limit);
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
-    cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * target_.size_m.z()));
+    cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * cell_.held->load.size_m.z()));
     if (mass > limit) {
       return begin_put_back(now, overweight(mass));
     }
@@ -417,10 +422,10 @@ class Pick final : public task::Skill {
     verdict_ = std::move(verdict);
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-    auto up = phase_ == Phase::kFind || phase_ == Phase::kApproach
-                  ? motion::stop(state, from, cell_.limits_empty())
-                  : nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
-                          {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
+    const bool over_it = phase_ != Phase::kFind && now + kNoReplanBefore >= grasp_.hover;
+    auto up = !over_it ? motion::stop(state, from, cell_.limits_empty())
+                       : nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
+                               {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
     if (!up) up = motion::stop(state, from, cell_.limits_empty());
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();
@@ -442,6 +447,10 @@ class Pick final : public task::Skill {
   static std::string name_of(const ObjectBelief& object) {
     return object.code.empty() ? fmt::format("track {}", object.track) : object.code;
   }
+  static Eigen::Matrix3d quarter_turns(const ObjectBelief& object, int count) {
+    const Vector3 up = object.world_from_top.linear().col(2);
+    return Eigen::AngleAxisd(count * std::numbers::pi / 2, up).toRotationMatrix();
+  }
   // A belief's yaw is known up to half a turn.
   static double wrapped(double angle) { return std::remainder(angle, M_PI); }
 
@@ -456,7 +465,7 @@ class Pick final : public task::Skill {
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_;
   std::string last_error_;
-  int sealed_ticks_ = 0, presses_ = 0;
+  int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
 };
 

@@ -18,8 +18,9 @@ using task::Status;
 
 constexpr double kOverRim_m = 0.03;     // between rim and the parcel's underside when it is let go
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
-constexpr double kHigher_m = 0.05;      // tried next when a mouth is out of reach
-constexpr int kHeights = 3;
+constexpr double kHigher_m = 0.025;     // tried next when a mouth is out of reach
+constexpr int kHeights = 5;
+constexpr double kSofter_m = 0.015;  // than the longest fall that is allowed: sizes are measured
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;  // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kGravity_m_s2 = 9.81;
@@ -32,8 +33,11 @@ constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of
 constexpr Duration kSwing = std::chrono::milliseconds(1500);       // at most,
 constexpr Duration kSwingTight = std::chrono::milliseconds(4000);  // and for what would jam in the mouth
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
-constexpr Duration kRested = std::chrono::milliseconds(20);  // after the motion, before the wrist is believed
-constexpr double kGoneShare = 0.4;                           // of the load's mass
+constexpr Duration kBlockedFor = std::chrono::milliseconds(400);
+constexpr Duration kLookEvery = std::chrono::milliseconds(60);
+constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
+constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
+constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
 constexpr int kLostTicks = 3;
 constexpr double kMiddle = 0.15;  // of the mouth, from its centre
@@ -79,12 +83,29 @@ class Place final : public task::Skill {
     }
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
-    const auto way = cell_.carry(now, [&](const AxisVector& from) { return over(*target, from); });
-    if (!way) return {Status::kFailed, name_ + ": " + way.error().line(), {}};
+    auto way = cell_.carry(now, [&](const AxisVector& from) { return over(*target, from); });
+    if (!way) {
+      // Others may be in the way, and ride on.
+      if (!blocked_since_) blocked_since_ = now;
+      cell_.keep_clear(now);
+      return now < *blocked_since_ + kBlockedFor ? Progress{}
+                                                 : Progress{Status::kFailed, name_ + ": " + way.error().line(), {}};
+    }
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
-    arrives_ = way->back().end();
+    way_ = std::move(*way);
+    arrives_ = way_.back().end();
+    looked_at_ = now;
     phase_ = Phase::kCarry;
     return {};
+  }
+
+  // What was upstream of the cameras' view when the way was planned may stand in it.
+  void look_out(Time now) {
+    if (now < looked_at_ + kLookEvery || now + kNoReplanBefore > arrives_) return;
+    looked_at_ = now;
+    const Time from = cell_.arm.splice_time(now);
+    if (cell_.router.clear(way_, from, arrives_, &cell_.held->load, cell_.objects())) return;
+    (void)plan(now);  // if there is none, the way under way is as good as any
   }
 
   // Over the middle of the mouth, turned as one goes in; which of the turns, the arm decides.
@@ -99,7 +120,7 @@ class Place final : public task::Skill {
       for (int height = 0; height < kHeights; ++height) {
         const double tip_z = height_over(target, entry.lean_rad) + kHigher_m * height;
         const double drop_m = tip_z - size.z() - (target.center_m.z() - target.size_m.z());
-        if (entry.lean_rad > 0 && drop_m > cell_.world.rules.max_drop_m) break;
+        if (entry.lean_rad > 0 && drop_m > cell_.world.rules.max_drop_m - kSofter_m) break;
         auto q = nearest(target, entry, tip_z, from);
         if (!q) continue;
         entry_ = entry;
@@ -163,6 +184,7 @@ class Place final : public task::Skill {
       const bool over = off.x() < kMiddle * target.size_m.x() && off.y() < kMiddle * target.size_m.y();
       return over ? Progress{Status::kSucceeded, "let go early", detail} : Progress{Status::kFailed, "dropped", detail};
     }
+    look_out(now);
     const bool level = hangs_level(now);
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
@@ -211,10 +233,12 @@ class Place final : public task::Skill {
 
   Cell& cell_;
   std::string name_, object_;
-  Time started_, arrives_;
+  Time started_, arrives_, looked_at_;
+  motion::Trajectory way_;
   Phase phase_ = Phase::kPlan;
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
+  std::optional<Time> blocked_since_;
   int lost_ticks_ = 0;
   world::Entry entry_;
   bool cancelled_ = false;

@@ -17,6 +17,9 @@ constexpr double kObjectMargin_m = 0.020;  // over an object
 constexpr double kObjectGrow_m = 0.030;    // around an object's footprint,
 constexpr double kEndGrow_m = 0.003;       // and close to both ends, where the skill knows what it does
 constexpr double kEndRadius_m = 0.08;
+constexpr double kComesDown_m = 0.045;  // further, after a way that ends in motion: that is on a parcel's top
+constexpr double kOwnMargin_m = 0.03;   // between a load, which swings, and the arm itself
+constexpr double kStill_rad_s = 1e-3;
 constexpr double kSink_m = 0.005;  // what comes from between others may leave as low as it is
 constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
@@ -53,6 +56,36 @@ double unseen_end_m(const world::World& world) {
   return end_m;
 }
 
+// Of an object's top face over (x, y), at its own lean; nothing beside its footprint grown by `grow_m`.
+double top_z(const ObjectBelief& object, double x, double y, Time time, double grow_m) {
+  const Vector3 middle = object.world_from_top.translation() + to_s(time - object.stamp) * object.velocity_m_s;
+  const Eigen::Matrix3d& axes = object.world_from_top.linear();
+  const Vector3 off = axes.transpose() * Vector3(x - middle.x(), y - middle.y(), 0);
+  const bool over =
+      std::abs(off.x()) < 0.5 * object.size_m.x() + grow_m && std::abs(off.y()) < 0.5 * object.size_m.y() + grow_m;
+  if (!over) return -std::numeric_limits<double>::infinity();
+  const Vector3 up = axes.col(2);
+  return middle.z() - (up.x() * (x - middle.x()) + up.y() * (y - middle.y())) / up.z();
+}
+
+struct Neighbour {
+  const ObjectBelief* object;
+  bool beside;  // tool or load begins lower than its top, close to it: it must not sink, and may leave
+};
+
+std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const Pose& world_from_tip, Time time,
+                                     std::span<const ObjectBelief> objects) {
+  std::vector<Neighbour> neighbours;
+  for (const ObjectBelief& object : objects) {
+    const bool beside = std::any_of(points.begin(), points.end(), [&](const Vector3& point) {
+      const Vector3 low = world_from_tip * point;
+      return low.z() < top_z(object, low.x(), low.y(), time, kObjectGrow_m) + kObjectMargin_m;
+    });
+    neighbours.push_back({&object, beside});
+  }
+  return neighbours;
+}
+
 double highest_m(const ObjectBelief& object) {
   const Eigen::Matrix3d& axes = object.world_from_top.linear();
   return object.world_from_top.translation().z() + 0.5 * std::abs(axes(2, 0)) * object.size_m.x() +
@@ -83,53 +116,104 @@ AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
 }
 
 Router::Router(const world::World& world, model::RobotModel model)
-    : world_(world), unseen_end_m_(unseen_end_m(world)), rims_z_m_(rims_z_m(world)), model_(std::move(model)) {}
+    : world_(world),
+      unseen_end_m_(unseen_end_m(world)),
+      rims_z_m_(rims_z_m(world)),
+      tool_m_(world.robot.tool.flange_from_tip.translation().norm()),
+      model_(std::move(model)) {}
 
-// What a point over (x, y) must stay above at `time`, when the way was planned at `begin`.
-double Router::floor_z(double x, double y, Time time, Time begin, double grow_m,
-                       std::span<const ObjectBelief> obstacles) const {
+// What a point over (x, y) must stay above at `time` but for objects, when the way was planned at `begin`.
+double Router::floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const {
   const world::Belt& belt = world_.belt;
-  const bool over_belt = std::abs(y - belt.y_center_m) < 0.5 * belt.width_m + kBeltMargin_m;
-  double floor = over_belt ? belt.surface_z_m + kBeltMargin_m : rims_z_m_;
-  if (over_belt && x < unseen_end_m_ + to_s(time - begin) * belt.speed_m_s) floor += kUnseenHeight_m;
-  for (const ObjectBelief& object : obstacles) {
-    const Vector3 middle = object.world_from_top.translation() + to_s(time - object.stamp) * object.velocity_m_s;
-    const Vector3 off = object.world_from_top.linear().transpose() * Vector3(x - middle.x(), y - middle.y(), 0);
-    const bool over =
-        std::abs(off.x()) < 0.5 * object.size_m.x() + grow_m && std::abs(off.y()) < 0.5 * object.size_m.y() + grow_m;
-    if (!over) continue;
-    // The top's own height there: one that leans is higher on one side.
-    const Vector3 up = object.world_from_top.linear().col(2);
-    const double rise = -(up.x() * (x - middle.x()) + up.y() * (y - middle.y())) / up.z();
-    floor = std::max(floor, middle.z() + rise + kObjectMargin_m);
-  }
-  return floor;
+  if (std::abs(y - belt.y_center_m) > 0.5 * belt.width_m + kBeltMargin_m) return rims_z_m_;
+  const bool unseen = x < unseen_end_m_ + to_s(time - begin) * belt.speed_m_s;
+  return belt.surface_z_m + belt_margin_m + (unseen ? kUnseenHeight_m : 0);
 }
 
-// The smallest height over what stands below, along the whole way; positive is clear.
-double Router::worst_clearance(const motion::Trajectory& trajectory, const Load* load,
+// The smallest height over what stands below, all the time; positive is clear. At the end the tool goes `further_m`
+// down.
+double Router::worst_clearance(const Positions& at, Time begin, Time end, double further_m, const Load* load,
                                std::span<const ObjectBelief> obstacles) {
-  const std::vector<Vector3> points = probes(load);
-  const Eigen::Index axes = model_.axes();
-  const Time begin = trajectory.front().start, end = trajectory.back().end();
-  const Pose first = model_.world_from_tip(motion::sample(trajectory, begin, axes).position);
-  const Pose last = model_.world_from_tip(motion::sample(trajectory, end, axes).position);
+  const Pose first = model_.world_from_tip(at(begin)), last = model_.world_from_tip(at(end));
   const auto close = [](const Pose& a, const Pose& b) {
     return (a.translation() - b.translation()).head<2>().norm() < kEndRadius_m;
   };
+  const std::vector<Vector3> points = probes(load);
+  const std::vector<Neighbour> neighbours = neighbours_of(points, first, begin, obstacles);
   double worst = std::numeric_limits<double>::infinity();
   for (Time time = begin; time < end; time += kCheckEvery) {
-    const Pose world_from_tip = model_.world_from_tip(motion::sample(trajectory, time, axes).position);
-    const bool leaving = close(world_from_tip, first);
-    const double grow_m = leaving || close(world_from_tip, last) ? kEndGrow_m : kObjectGrow_m;
+    const AxisVector q = at(time);
+    const Pose world_from_tip = model_.world_from_tip(q);
+    const bool leaving = close(world_from_tip, first), arriving = close(world_from_tip, last);
+    const double grow_m = leaving || arriving ? kEndGrow_m : kObjectGrow_m;
     for (const Vector3& point : points) {
       const Vector3 low = world_from_tip * point;
-      double floor = floor_z(low.x(), low.y(), time, begin, grow_m, obstacles);
-      if (leaving) floor = std::min(floor, (first * point).z() - kSink_m);
+      const double as_it_was = leaving ? (first * point).z() - kSink_m : std::numeric_limits<double>::infinity();
+      double floor = std::min(as_it_was, floor_z(low.x(), low.y(), time, begin, arriving ? 0 : kBeltMargin_m));
+      for (const Neighbour& other : neighbours) {
+        const double top = top_z(*other.object, low.x(), low.y(), time, grow_m) + kObjectMargin_m;
+        floor = std::max(floor, other.beside ? std::min(as_it_was, top) : top);
+      }
       worst = std::min(worst, low.z() - floor);
+    }
+    if (load != nullptr) worst = std::min(worst, own_clearance(q, world_from_tip, *load) - kOwnMargin_m);
+    const double margin_m = kObjectMargin_m + (arriving ? further_m : 0);
+    for (const Neighbour& other : neighbours) {
+      if (world_from_tip.translation().z() + tool_m_ > highest_m(*other.object) + margin_m) continue;
+      worst = std::min(worst, wrist_clearance(q, *other.object, time, grow_m) - margin_m);
     }
   }
   return worst;
+}
+
+// Of the links above the tool, which are wider than it, over one object taller than what the tool is at.
+double Router::wrist_clearance(const AxisVector& q, const ObjectBelief& object, Time time, double grow_m) {
+  model_.place_capsules(q, capsules_);
+  double worst = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < capsules_.size(); ++i) {
+    if (world_.robot.capsules[i].link == world_.robot.flange_link) continue;
+    const model::PlacedCapsule& capsule = capsules_[i];
+    for (const double share : {0.0, 0.5, 1.0}) {
+      const Vector3 point = capsule.from + share * (capsule.to - capsule.from);
+      const double top = top_z(object, point.x(), point.y(), time, capsule.radius_m + grow_m);
+      worst = std::min(worst, point.z() - capsule.radius_m - top);
+    }
+  }
+  return worst;
+}
+
+// Of the load from the links above the tool: lifted to the height of the base, the arm folds down on it.
+double Router::own_clearance(const AxisVector& q, const Pose& world_from_tip, const Load& load) {
+  model_.place_capsules(q, capsules_);
+  Pose world_from_load = world_from_tip;
+  world_from_load.translate(load.offset_in_tip_m);
+  world_from_load.rotate(Eigen::AngleAxisd(load.yaw_in_tip_rad, Vector3::UnitZ()));
+  world_from_load.translate(Vector3(0, 0, 0.5 * load.size_m.z()));
+  const Pose load_from_world = world_from_load.inverse();
+  double worst = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < capsules_.size(); ++i) {
+    if (world_.robot.capsules[i].link == world_.robot.flange_link) continue;
+    const model::PlacedCapsule& capsule = capsules_[i];
+    for (const double share : {0.0, 0.2, 0.4, 0.6, 0.8, 1.0}) {
+      const Vector3 point = load_from_world * Vector3(capsule.from + share * (capsule.to - capsule.from));
+      const double apart = (point.cwiseAbs() - 0.5 * load.size_m).cwiseMax(0).norm();
+      worst = std::min(worst, apart - capsule.radius_m);
+    }
+  }
+  return worst;
+}
+
+bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                   std::span<const ObjectBelief> obstacles) {
+  const AxisState end = motion::sample(way, until, model_.axes());
+  const auto at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
+  const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
+  return worst_clearance(at, from, until, further_m, load, obstacles) >= 0;
+}
+
+bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
+                      std::span<const ObjectBelief> obstacles) {
+  return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, load, obstacles) >= 0;
 }
 
 Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
@@ -144,7 +228,12 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   const AxisLimits limits = covering(wanted, start);
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
-  const double clearance = worst_clearance(*direct, load, obstacles);
+  const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
+  const auto clearance_of = [&](const motion::Trajectory& way) {
+    const auto on_way = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
+    return worst_clearance(on_way, way.front().start, way.back().end(), further_m, load, obstacles);
+  };
+  const double clearance = clearance_of(*direct);
   if (clearance >= 0) return direct;
 
   const AxisVector middle = 0.5 * (start.position + end.position);
@@ -177,7 +266,7 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
         continue;
       }
       if (best && candidate->back().end() >= best->back().end()) continue;
-      if (worst_clearance(*candidate, load, obstacles) < 0) continue;
+      if (clearance_of(*candidate) < 0) continue;
       best = std::move(candidate);
     }
     if (best) return best;

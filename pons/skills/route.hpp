@@ -2,7 +2,9 @@
 // high enough over everything that stands below.
 #pragma once
 
+#include <functional>
 #include <span>
+#include <vector>
 
 #include "pons/core/belief.hpp"
 #include "pons/core/error.hpp"
@@ -33,17 +35,29 @@ class Router {
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits);
 
+  // Whether an arm that rests at q is clear of what comes along.
+  [[nodiscard]] bool clear_at(const AxisVector& q, Time from, Time until, const Load* load,
+                              std::span<const ObjectBelief> obstacles);
+
+  // Whether a way that was clear when it was planned still is, between two of its moments: more is believed by now.
+  [[nodiscard]] bool clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                           std::span<const ObjectBelief> obstacles);
+
  private:
-  [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double grow_m,
-                               std::span<const ObjectBelief> obstacles) const;
-  [[nodiscard]] double worst_clearance(const motion::Trajectory& trajectory, const Load* load,
+  [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const;
+  using Positions = std::function<AxisVector(Time)>;
+  [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, const Load* load,
                                        std::span<const ObjectBelief> obstacles);
+  [[nodiscard]] double wrist_clearance(const AxisVector& q, const ObjectBelief& object, Time time, double grow_m);
+  [[nodiscard]] double own_clearance(const AxisVector& q, const Pose& world_from_tip, const Load& load);
   [[nodiscard]] Expected<AxisVector> raised(const AxisVector& q, double tip_z);
 
   const world::World& world_;
   double unseen_end_m_;  // upstream of it something may lie that no camera has seen yet
   double rims_z_m_;      // of the highest chute
+  double tool_m_;        // from flange to tip
   model::RobotModel model_;
+  std::vector<model::PlacedCapsule> capsules_;  // scratch
 };
 
 }  // namespace pons::skills

@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include "pons/skills/test_kit.hpp"
 #include "pons/world/view.hpp"
@@ -221,6 +222,91 @@ TEST_F(RouteTest, UpstreamOfWhatTheCamerasHaveSeenALoadStaysHighOverTheBelt) {
     EXPECT_LT(lowest(*way), 1) << "it must pass there";
   }
   EXPECT_GE(low, 5) << "direct ways must pass low there";
+}
+
+// Where the tool comes down beside a tall neighbour the links above it may not, on one side of it at least.
+TEST_F(RouteTest, TheWristKeepsOffATallNeighbour) {
+  const AxisVector from = over(-0.3, -0.3, 1.3), to = over(0.1, 0, 1.02);
+  AxisVector down = AxisVector::Zero(to.size());
+  down[1] = 0.1;  // not at rest: it goes on, down on the parcel
+  std::vector<model::PlacedCapsule> links;
+  const auto wrist_over = [&](const AxisVector& q, const ObjectBelief& object) {
+    double least = std::numeric_limits<double>::infinity();
+    model_.place_capsules(q, links);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      if (world_.robot.capsules[i].link == world_.robot.flange_link) continue;
+      for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+        const Vector3 at = links[i].from + share * (links[i].to - links[i].from);
+        const Vector3 off = (at - object.world_from_top.translation()).cwiseAbs();
+        const double side_m = 0.5 * object.size_m.x() + links[i].radius_m;
+        if (off.x() > side_m || off.y() > side_m) continue;
+        least = std::min(least, at.z() - links[i].radius_m - object.world_from_top.translation().z());
+      }
+    }
+    return least;
+  };
+  int blocked = 0, clear = 0;
+  for (const Vector3& side : {Vector3(1, 0, 0), Vector3(-1, 0, 0), Vector3(0, 1, 0), Vector3(0, -1, 0)}) {
+    ObjectBelief tall = parcel(0.1 + 0.28 * side.x(), {0.24, 0.24, 0.36});
+    tall.world_from_top.translation().y() = 0.28 * side.y();
+    const auto way = router_.route(rest(from), kBegin, {to, down}, nullptr, std::array{tall}, limits_);
+    if (wrist_over(to, tall) < 0.02) {
+      ++blocked;
+      EXPECT_FALSE(way) << side.transpose();
+    } else if (way) {
+      ++clear;
+      for (Time time = kBegin; time <= way->back().end(); time += std::chrono::milliseconds(4)) {
+        EXPECT_GT(wrist_over(motion::sample(*way, time, model_.axes()).position, tall), 0) << side.transpose();
+      }
+    }
+  }
+  EXPECT_GE(blocked, 1);
+  EXPECT_GE(clear, 1);
+}
+
+TEST_F(RouteTest, WhatIsBelievedLaterMayStandInTheWay) {
+  const AxisVector from = over(-0.4, 0, 1.0), to = over(0.4, 0, 1.0);
+  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  ASSERT_TRUE(way);
+  const Time end = way->back().end(), half = kBegin + (end - kBegin) / 2;
+  const ObjectBelief ahead = parcel(0.2, {0.1, 0.1, 0.2}), behind = parcel(-0.2, {0.1, 0.1, 0.2});
+  EXPECT_TRUE(router_.clear(*way, kBegin, end, nullptr, {}));
+  EXPECT_FALSE(router_.clear(*way, kBegin, end, nullptr, std::array{behind}));
+  EXPECT_TRUE(router_.clear(*way, half, end, nullptr, std::array{behind}));
+  EXPECT_FALSE(router_.clear(*way, half, end, nullptr, std::array{ahead}));
+}
+
+TEST_F(RouteTest, TheArmDoesNotFoldOntoItsLoad) {
+  const AxisVector high = over(-0.22, -0.14, 1.64);
+  const Load large{.size_m = {0.34, 0.31, 0.28}}, small{.size_m = {0.10, 0.08, 0.05}};
+  const Time end = kBegin + from_s(0.1);
+  EXPECT_TRUE(router_.clear_at(high, kBegin, end, nullptr, {}));
+  EXPECT_TRUE(router_.clear_at(high, kBegin, end, &small, {}));
+  EXPECT_FALSE(router_.clear_at(high, kBegin, end, &large, {}));
+  EXPECT_TRUE(router_.clear_at(over(-0.22, -0.14, 1.3), kBegin, end, &large, {}));
+}
+
+// As large as a load gets, it is put back as low over the belt as a small one.
+TEST_F(RouteTest, ALargeLoadReachesTheBelt) {
+  const Load load{.size_m = {0.40, 0.34, 0.18}};
+  const AxisVector from = over(0.35, 0.05, 1.28), to = over(0.2, 0, world_.belt.surface_z_m + 0.18 + 0.03);
+  expect_leads(router_.route(rest(from), kBegin, halt(to), &load, {}, limits_), from, to);
+}
+
+// Lifted no higher than it has to be, it lingers while the next one comes along; what stood close to it may stay so.
+TEST_F(RouteTest, WhatComesAlongDoesNotRideIntoALoad) {
+  const Load load{.size_m = {0.34, 0.32, 0.15}};
+  const AxisVector from = over(0.2, 0, 1.15), to = over(0.16, -0.03, 1.15);
+  AxisLimits slow = limits_;
+  slow.speed_rad_s *= 0.02;
+  const auto way = motion::move(rest(from), kBegin, halt(to), slow);
+  ASSERT_TRUE(way);
+  const Time end = way->back().end();
+  const Vector3 size_m(0.34, 0.32, 0.25);
+  const ObjectBelief next = parcel(0.2 - 0.34 - 0.12, size_m, 0.25), close = parcel(0.2 - 0.34 - 0.01, size_m, 0);
+  ASSERT_LT(clearance(*way, next, 0.32, 0.15).value_or(1), 0) << "it must ride into it";
+  EXPECT_FALSE(router_.clear(*way, kBegin, end, &load, std::array{next}));
+  EXPECT_TRUE(router_.clear(*way, kBegin, end, &load, std::array{close}));
 }
 
 TEST_F(RouteTest, OverRimsAndBeltOnTheWayToAChute) {

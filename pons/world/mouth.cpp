@@ -9,7 +9,7 @@ namespace {
 
 // Between parcel and mouth, both sides together: where it is let go is not known to the millimetre; and the taller it
 // is the farther it swings and the wider it is when it hangs askew.
-constexpr double kPlay_m = 0.008, kAskewPerHeight_m = 0.3;
+constexpr double kPlay_m = 0.008, kAskewPerHeight_m = 0.45;
 constexpr double kDegree = std::numbers::pi / 180;
 // The more it leans the more surely it slides in, but the farther the arm has to turn and the load hangs askew.
 constexpr double kLean_rad = 25 * kDegree, kLeastLean_rad = 15 * kDegree;

@@ -68,6 +68,18 @@ TEST(Sorting, ParcelsOfAnySizeAreSortedOrLetRide) {
   EXPECT_EQ(report["parcels"]["damaged"], 0) << run.out;
 }
 
+// Taller than an arm at home is over the belt: it makes room for them, and none of them goes into a mouth.
+TEST(Sorting, WhatIsTooLargePassesARestingArm) {
+  const Folder folder;
+  const Finished run = run_pons({"run", "parcel_cell", "--manifest", "tests/end_to_end/too_large.csv", "--quiet",
+                                 "--explain", "--report", folder / "report.json"});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  EXPECT_EQ(report["parcels"]["exceptions"]["deserved"], 6) << run.out;
+  EXPECT_EQ(report["parcels"]["damaged"], 0) << run.out;
+  EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
+}
+
 TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   const Folder folder;
   const Finished run =
