@@ -129,9 +129,7 @@ class Pick final : public task::Skill {
       step_aside(now);
       return {};
     }
-    for (const ObjectBelief& other : cell_.objects()) {
-      if (lies_on(other, *object)) return {Status::kFailed, "covered by " + name_of(other), {}};
-    }
+    if (const auto other = tied_to(*object)) return {Status::kFailed, *other, {}};
     if (tried_ && now - *tried_ < kTryEvery) return {};
     tried_ = now;
     const Time from = cell_.arm.splice_time(now);
@@ -155,6 +153,15 @@ class Pick final : public task::Skill {
       return {Status::kException, "would ride past the pick zone", {}};
     }
     return start(*grasp, *object, now);
+  }
+
+  // What would come along with it.
+  [[nodiscard]] std::optional<std::string> tied_to(const ObjectBelief& object) const {
+    for (const ObjectBelief& other : cell_.objects()) {
+      if (lies_on(other, object)) return "covered by " + name_of(other);
+      if (is_part(other, object)) return "may be two: " + name_of(other);
+    }
+    return std::nullopt;
   }
 
   // After a miss the parcel may have been pushed, and the arm hides it: until a camera has seen it again, its place is
@@ -307,6 +314,7 @@ class Pick final : public task::Skill {
     if (const ObjectBelief* object = cell_.find(code_)) {
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
       const double moved_m = off.head<2>().norm();
+      if (const auto other = tied_to(*object)) return give_up(now, *other);
       if (now + kNoReplanBefore >= grasp_.hover) {
         // The cups would take hold of its neighbour, too.
         if (moved_m > kElsewhere_m) return give_up(now, "it lies elsewhere than it seemed to");

@@ -1,0 +1,124 @@
+#include "pons/skills/pick.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "pons/skills/test_kit.hpp"
+
+namespace pons::skills {
+namespace {
+
+using task::Progress;
+using task::Status;
+using ::testing::HasSubstr;
+
+// The skill with an arm that does at once what it is asked to, and beliefs made by hand.
+class PickTest : public ::testing::Test {
+ protected:
+  void SetUp() override { tick_with({}); }
+
+  ObjectBelief parcel(std::uint32_t track, double x, double y, const Vector3& size_m) const {
+    ObjectBelief belief;
+    belief.track = track;
+    belief.code = fmt::format("P{}", track);
+    belief.stamp = belief.last_seen = now_;
+    belief.world_from_top.translation() = Vector3(x, y, world_.belt.surface_z_m + size_m.z());
+    belief.size_m = size_m;
+    belief.confidence = 1;
+    return belief;
+  }
+  void tick_with(std::vector<ObjectBelief> objects) {
+    now_ += std::chrono::milliseconds(10);
+    const AxisState at = asked_ ? cell_.arm.planned(now_) : rest();
+    link::State state;
+    state.stamp = now_;
+    state.safety = link::SafetyState::kOperational;
+    state.epoch = 1;
+    state.commanded = at;
+    state.position = at.position, state.speed = at.speed;
+    cerebellum_.publish(state);
+    for (ObjectBelief& object : objects) object.stamp = object.last_seen = now_;
+    cell_.refresh(now_, std::move(objects));
+    asked_ = true;
+  }
+  AxisState rest() const {
+    const AxisVector still = AxisVector::Zero(world_.robot.home.size());
+    return {world_.robot.home, still, still};
+  }
+  std::unique_ptr<task::Skill> start(const std::string& code) {
+    return type_.start(task::Json{{"object", code}}, now_);
+  }
+
+  Time now_ = Time(from_s(5));
+  bool asked_ = false;
+  const world::World world_ = parcel_cell();
+  const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
+  link::BridgeEnd bridge_{*link_};
+  link::CerebellumEnd cerebellum_{*link_};
+  Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
+  const task::SkillType type_ = pick(cell_);
+};
+
+TEST_F(PickTest, WhatMayBeTwoIsNotTaken) {
+  tick_with({parcel(1, 0, 0, {0.4, 0.11, 0.11}), parcel(2, -0.1, 0.01, {0.2, 0.11, 0.112})});
+  const Progress progress = start("P1")->tick(now_);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, HasSubstr("P2"));
+}
+
+TEST_F(PickTest, WhatTurnsOutToBeTwoOnTheWayIsLetGoOf) {
+  const ObjectBelief whole = parcel(1, 0.1, 0, {0.4, 0.11, 0.11});
+  tick_with({whole});
+  const auto skill = start("P1");
+  ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  ASSERT_GT(cell_.arm.motion_end(), now_ + from_s(0.2)) << "it must be under way";
+  Progress progress;
+  for (int i = 0; i < 200 && progress.status == Status::kRunning; ++i) {
+    tick_with({whole, parcel(2, 0, 0.01, {0.2, 0.11, 0.112})});
+    progress = skill->tick(now_);
+  }
+  EXPECT_EQ(progress.status, Status::kRetry);
+  EXPECT_THAT(progress.reason, HasSubstr("P2"));
+}
+
+// Known to lie elsewhere only when it is too late for another way there.
+TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
+  tick_with({parcel(1, 0.1, 0, {0.2, 0.11, 0.11})});
+  const auto skill = start("P1");
+  ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  const Vector3 top = parcel(1, 0.1, 0, {0.2, 0.11, 0.11}).world_from_top.translation();
+  Progress progress;
+  for (int i = 0; i < 400 && progress.status == Status::kRunning; ++i) {
+    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+    const bool late = (tip - top).norm() < 0.06;
+    tick_with({parcel(1, late ? 0.13 : 0.1, 0, {0.2, 0.11, 0.11})});
+    progress = skill->tick(now_);
+  }
+  EXPECT_EQ(progress.status, Status::kRetry);
+  EXPECT_THAT(progress.reason, HasSubstr("elsewhere"));
+}
+
+// What an earlier task could not place must not stay on the cups, however large it is.
+TEST_F(PickTest, AnythingLeftOnTheCupsIsPutOnTheBeltFirst) {
+  for (const Vector3& size_m : {Vector3(0.1, 0.1, 0.1), Vector3(0.40, 0.34, 0.18)}) {
+    cell_.held = Held{"P9", {.size_m = size_m}, 1.0};
+    tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
+    const auto skill = start("P1");
+    Vector3 lowest = Vector3::Constant(9);
+    for (int i = 0; i < 600 && cell_.held; ++i) {
+      ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+      const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+      if (tip.z() < lowest.z()) lowest = tip;
+      tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
+    }
+    EXPECT_FALSE(cell_.held) << size_m.transpose();
+    EXPECT_LT(lowest.z() - size_m.z(), world_.belt.surface_z_m + 0.05) << size_m.transpose();
+    EXPECT_NEAR(lowest.y(), world_.belt.y_center_m, 0.05);
+  }
+}
+
+}  // namespace
+}  // namespace pons::skills
