@@ -8,6 +8,7 @@ namespace {
 constexpr double kSure = 0.5;        // of the confidence: below it something hides a part of the object
 constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
 constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
+constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
 constexpr double kUpright = 0.9986;  // cosine of 3 degrees
 
@@ -45,6 +46,7 @@ bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
 
 bool is_part(const ObjectBelief& part, const ObjectBelief& whole) {
   if (part.track == whole.track) return false;
+  if (part.size_m.head<2>().prod() > kLargerPart * whole.size_m.head<2>().prod()) return false;
   const Vector3 off = whole.world_from_top.inverse() * part.world_from_top.translation();
   return std::abs(off.x()) < 0.5 * whole.size_m.x() - kOverlap_m &&
          std::abs(off.y()) < 0.5 * whole.size_m.y() - kOverlap_m && std::abs(off.z()) < kSameHeight_m;

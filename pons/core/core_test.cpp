@@ -82,6 +82,9 @@ TEST(Belief, APartIsWithinAndAsHigh) {
   EXPECT_FALSE(is_part(box(2, 0.08, 0.05, 0.25), whole)) << "lies on it";
   EXPECT_FALSE(is_part(box(2, 0.2, 0.2, 0.2), whole)) << "touches it";
   EXPECT_FALSE(is_part(whole, whole));
+  ObjectBelief larger = box(2, 0.08, 0.05, 0.21);
+  larger.size_m.head<2>() *= 1.3;
+  EXPECT_FALSE(is_part(larger, whole)) << "cut together with a neighbour";
 }
 
 TEST(Belief, WhatLeansLiesOnWhatStandsHoweverHigh) {

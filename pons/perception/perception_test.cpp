@@ -173,6 +173,36 @@ TEST(PerceptionTest, BelievesInANarrowTubeOnlyOnceItIsWhole) {
   EXPECT_GE(whole, 5);
 }
 
+// From the moment its front shows, as high as it is and as far back as it may reach.
+TEST(PerceptionTest, WhatComesIntoViewIsAnObstacleBeforeItIsAnObject) {
+  Eyes eyes;
+  const Vector3 size_m(0.30, 0.24, 0.28);
+  eyes.belt.things = {{.x_m = -1.40, .y_m = 0.02, .size_m = size_m}};
+  int half = 0, whole = 0;
+  for (int i = 0; i < 40; ++i) {
+    eyes.belt.wait(0.06);
+    eyes.belt.show(eyes.perception, "overhead");
+    const double front_m = eyes.belt.things[0].top(eyes.belt.travel_m).x() + 0.5 * size_m.x();
+    const auto coming = eyes.perception.coming(eyes.belt.now, eyes.belt.travel_m);
+    if (!eyes.beliefs().empty()) {
+      EXPECT_TRUE(coming.empty()) << "it is an object now";
+      ++whole;
+      continue;
+    }
+    if (coming.empty()) continue;
+    ++half;
+    ASSERT_EQ(coming.size(), 1U);
+    const Vector3 top = coming[0].world_from_top.translation();
+    EXPECT_NEAR(top.z(), eyes.belt.world.belt.surface_z_m + size_m.z(), 0.01);
+    EXPECT_NEAR(top.x() + 0.5 * coming[0].size_m.x(), front_m, 0.02);
+    EXPECT_LT(top.x() - 0.5 * coming[0].size_m.x(), front_m - size_m.x() + 0.01) << "all of it";
+    EXPECT_NEAR(coming[0].size_m.y(), size_m.y(), 0.03);
+    EXPECT_TRUE(coming[0].code.empty());
+  }
+  EXPECT_GE(half, 5);
+  EXPECT_GE(whole, 5);
+}
+
 TEST(PerceptionTest, MeasuresATubeOnItsRidge) {
   Eyes eyes;
   eyes.belt.things = {{.solid = Solid::kTube, .x_m = -0.8, .y_m = 0.05, .yaw_rad = 0.6, .size_m = {0.3, 0.08, 0.08}}};

@@ -1,6 +1,7 @@
 #include "pons/runner/bridge_side.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace pons::runner {
@@ -30,8 +31,10 @@ Expected<void> BridgeSide::tick(Time now, CameraCrew& crew) {
   if (*snapshot) take_in(**snapshot, now);
 
   const double belt_travel_m = skills_.state().belt_travel_m;
-  const std::vector<ObjectBelief> objects = beliefs(now, belt_travel_m);
-  skills_.refresh(now, objects);
+  const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
+  std::vector<ObjectBelief> obstacles = objects;
+  std::ranges::copy(predicted(seen_.coming, now, belt_travel_m), std::back_inserter(obstacles));
+  skills_.refresh(now, std::move(obstacles));
   look_after_arm(now);
   if (!stopping_) ask_brain(objects, now);
   if (visitors_) visitors_(now);
@@ -63,9 +66,10 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
   seen_ = snapshot;
 }
 
-std::vector<ObjectBelief> BridgeSide::beliefs(Time now, double belt_travel_m) const {
+std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
+                                                double belt_travel_m) const {
   std::vector<ObjectBelief> objects;
-  for (ObjectBelief object : seen_.objects) {
+  for (ObjectBelief object : seen) {
     if (std::find(gone_.begin(), gone_.end(), object.track) != gone_.end()) continue;
     if (object.velocity_m_s.x() != 0) {
       object.world_from_top.translation().x() += belt_travel_m - seen_.belt_travel_m;

@@ -20,11 +20,12 @@ inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
 
 // The skills as the runner sees them; it knows none by name.
 struct SkillPort {
-  std::function<void(Time, std::vector<ObjectBelief>)> refresh;  // before any skill is ticked
-  std::function<const link::State&()> state;                     // as of the last refresh
-  std::function<std::vector<std::uint32_t>()> take_forgotten;    // tracks that were taken off the belt
-  std::function<void(Time)> arm;                                 // one step out of a stop, towards operational
-  std::function<void(Time)> rest;                                // once a period while no skill runs
+  // Before any skill is ticked: the beliefs, and after them what is only an obstacle.
+  std::function<void(Time, std::vector<ObjectBelief>)> refresh;
+  std::function<const link::State&()> state;                   // as of the last refresh
+  std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
+  std::function<void(Time)> arm;                               // one step out of a stop, towards operational
+  std::function<void(Time)> rest;                              // once a period while no skill runs
 };
 
 class BridgeSide {
@@ -48,7 +49,8 @@ class BridgeSide {
 
  private:
   void take_in(const Snapshot& snapshot, Time now);
-  [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
+  [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
+                                                    double belt_travel_m) const;
   void ask_brain(const std::vector<ObjectBelief>& objects, Time now);
   void look_after_arm(Time now);
 

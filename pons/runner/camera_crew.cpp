@@ -98,6 +98,7 @@ Snapshot CameraCrew::take_in(const Shot& shot) {
                     shot.due,
                     shot.moment.belt_travel_m,
                     perception_.beliefs(shot.stamp, shot.moment.belt_travel_m),
+                    perception_.coming(shot.stamp, shot.moment.belt_travel_m),
                     {},
                     perception_.wants_labels()};
   for (const world::CameraSpec& camera : world_.cameras) {

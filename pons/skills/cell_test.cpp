@@ -118,7 +118,7 @@ TEST_F(CarryTest, AsHighOrAsHeavyAloneAlreadySlowsItDown) {
 
 TEST_F(CarryTest, AsksNoMoreOfTheMotorsThanTheyGive) {
   const Vector3 size_m{0.24, 0.18, 0.14};
-  const double mass_kg = 2.2, give = 0.92;
+  const double mass_kg = 4.5, give = 0.92;
   const auto torque = [&](const motion::Trajectory& way) {
     return torque_use(cell_.model, world_.robot, cell_.held->load, mass_kg, way);
   };

@@ -23,9 +23,9 @@ constexpr double kStill_rad_s = 1e-3;
 constexpr double kSink_m = 0.005;  // what comes from between others may leave as low as it is
 constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
-constexpr double kSwing_rad = 0.06;       // how far a load may swing out of level
-constexpr double kUnseenHeight_m = 0.20;  // of what may come along the belt
-constexpr double kUnseenFor_s = 0.3;      // from when the cameras could see it whole until it is believed
+constexpr double kSwing_rad = 0.06;      // how far a load may swing out of level
+constexpr double kUsualHeight_m = 0.20;  // of what stands on the belt: a way over it is tried first
+constexpr double kFront_m = 0.05;        // of what comes into view, so much must show
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
 // Points of tool or load that come lowest.
@@ -46,14 +46,15 @@ std::vector<Vector3> probes(const Load* load) {
   return points;
 }
 
-// Upstream of it something may lie on the belt that no camera has shown whole yet.
+// Upstream of it something may lie on the belt that no camera has shown yet.
 double unseen_end_m(const world::World& world) {
-  double end_m = world.belt.x_start_m;
+  double end_m = std::numeric_limits<double>::infinity();
   for (const world::CameraSpec& camera : world.cameras) {
     const auto seen = world::seen_of_belt(camera, world.belt);
-    if (seen) end_m = std::max(end_m, seen->from_m + world.rules.max_size_m + kUnseenFor_s * world.belt.speed_m_s);
+    const double unseen_s = camera.period_s + camera.latency_s;
+    if (seen) end_m = std::min(end_m, seen->from_m + kFront_m + unseen_s * world.belt.speed_m_s);
   }
-  return end_m;
+  return std::isfinite(end_m) ? end_m : world.belt.x_start_m;
 }
 
 // Of an object's top face over (x, y), at its own lean; nothing beside its footprint grown by `grow_m`.
@@ -127,7 +128,7 @@ double Router::floor_z(double x, double y, Time time, Time begin, double belt_ma
   const world::Belt& belt = world_.belt;
   if (std::abs(y - belt.y_center_m) > 0.5 * belt.width_m + kBeltMargin_m) return rims_z_m_;
   const bool unseen = x < unseen_end_m_ + to_s(time - begin) * belt.speed_m_s;
-  return belt.surface_z_m + belt_margin_m + (unseen ? kUnseenHeight_m : 0);
+  return belt.surface_z_m + belt_margin_m + (unseen ? world_.rules.max_size_m : 0);
 }
 
 // The smallest height over what stands below, all the time; positive is clear. At the end the tool goes `further_m`
@@ -241,12 +242,12 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   for (const Vector3& point : probes(load)) depth = std::max(depth, point.z());
   const double start_z = model_.world_from_tip(start.position).translation().z();
   const double end_z = model_.world_from_tip(end.position).translation().z();
-  double lowest = world_.belt.surface_z_m + kBeltMargin_m + kUnseenHeight_m + depth;
+  double lowest = world_.belt.surface_z_m + kBeltMargin_m + kUsualHeight_m + depth;
   for (const ObjectBelief& object : obstacles) {
     lowest = std::max(lowest, highest_m(object) + kObjectMargin_m + depth);
   }
   Error reason{"no clear way", "route", "the cell is too crowded or the end is out of reach"};
-  for (const double extra : {0.02, 0.07, 0.14}) {
+  for (const double extra : {0.02, 0.07, 0.14, 0.25}) {
     const double height =
         std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z)) + extra;
     const auto over_start = raised(start.position, height);
