@@ -25,6 +25,13 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto simulation = sim::Simulation::create(self->world, manifest, options.seed);
   if (!simulation) return std::unexpected(simulation.error());
   self->simulation = std::move(*simulation);
+  // Before the journal: a run that is refused leaves none behind.
+  std::unique_ptr<gate::LocalSocket> socket;
+  if (options.socket) {
+    auto listening = gate::LocalSocket::listen(*options.socket);
+    if (!listening) return std::unexpected(listening.error());
+    socket = std::move(*listening);
+  }
   auto journal = bridge::Journal::open(options.journal);
   if (!journal) return std::unexpected(journal.error());
   const auto counts = (*journal)->counts();
@@ -42,15 +49,12 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
       [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
   self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
                                               realtime ? kRealTimeLead : skills::kSpliceLead);
+  self->rest = std::make_unique<skills::Rest>(*self->cell);
   skills::add_skills(self->registry, *self->cell);
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);
 
-  if (options.socket) {
-    auto socket = gate::LocalSocket::listen(*options.socket);
-    if (!socket) return std::unexpected(socket.error());
-    self->desk = std::make_unique<Desk>(std::move(*socket), *self->bridge, *self->journal);
-  }
+  if (socket) self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal);
   self->crew =
       std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
   std::function<void(Time)> visitors;
@@ -65,7 +69,7 @@ runner::SkillPort Assembly::skill_port() {
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
           .arm = [this](Time now) { cell->arm.arm(now); },
-          .rest = [this](Time now) { cell->keep_clear(now); }};
+          .rest = [this](Time now) { rest->tick(now); }};
 }
 
 runner::Parts Assembly::parts() {

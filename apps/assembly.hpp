@@ -20,6 +20,7 @@
 #include "pons/runner/lockstep.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/cell.hpp"
+#include "pons/skills/set_down.hpp"
 #include "pons/skills/skills.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
@@ -52,6 +53,7 @@ class Assembly {
   runner::Helper helper;  // perception's
   std::unique_ptr<perception::Perception> perception;
   std::unique_ptr<skills::Cell> cell;
+  std::unique_ptr<skills::Rest> rest;
   task::SkillRegistry registry;
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;

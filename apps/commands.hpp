@@ -2,7 +2,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <functional>
+#include <string>
 
 #include "pons/core/error.hpp"
 
@@ -22,7 +24,10 @@ void add_task(CLI::App& app, Chosen& chosen);
 void add_doctor(CLI::App& app, Chosen& chosen);
 void add_completion(CLI::App& app, Chosen& chosen);
 
-// Prints "pons: <line>" on the error stream.
+// A line for a person, on stdout or stderr. Never throws.
+void say(std::FILE* out, const std::string& text);
+
+// Print "pons: <line>" on the error stream.
 int bad_input(const Error& error);
 int bad_run(const Error& error);
 

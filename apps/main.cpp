@@ -1,6 +1,8 @@
 // The command line: composes, parses, and runs what was chosen.
 
 #include <fmt/format.h>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -8,17 +10,27 @@
 
 namespace pons::apps {
 
+// fmt::print throws where nobody reads: what a command comes to must not depend on that.
+void say(std::FILE* out, const std::string& text) { (void)std::fputs(text.c_str(), out); }
+
 int bad_input(const Error& error) {
-  fmt::print(stderr, "pons: {}\n", error.line());
+  say(stderr, fmt::format("pons: {}\n", error.line()));
   return kExitBadInput;
 }
 
 int bad_run(const Error& error) {
-  fmt::print(stderr, "pons: {}\n", error.line());
+  say(stderr, fmt::format("pons: {}\n", error.line()));
   return kExitBadRun;
 }
 
 namespace {
+
+// Where the options of what was asked for stand.
+std::string help_of(const CLI::App& app) {
+  const auto chosen = app.get_subcommands();
+  return fmt::format("pons {}{}--help shows what there is", chosen.empty() ? "" : chosen.front()->get_name(),
+                     chosen.empty() ? "" : " ");
+}
 
 int run_command_line(int argc, char** argv) {
   CLI::App app{"Pons: the bridge between a robot's brain and its body.", "pons"};
@@ -43,21 +55,26 @@ int run_command_line(int argc, char** argv) {
     // CLI11 says only that a command is missing when it knows none of the words.
     const bool unknown = app.get_subcommands().empty() && argc > 1;
     const std::string what = unknown ? fmt::format("no command '{}'", argv[1]) : error.what();
-    fmt::print(stderr, "pons: {}; pons --help shows what there is\n", what);
-    return kExitBadInput;
+    return bad_input({what, "", help_of(app)});
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "pons: {}; pons --help shows what there is\n", error.what());
-    return kExitBadInput;
+    return bad_input({error.what(), "", help_of(app)});
   }
   return chosen();
 }
+
+// A full disk below a redirection is an error; a reader that has seen enough (head) is not.
+bool said_all() { return std::fflush(stdout) == 0 || errno == EPIPE; }
 
 }  // namespace
 }  // namespace pons::apps
 
 int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves must not stop a robot
   try {
-    return pons::apps::run_command_line(argc, argv);
+    const int code = pons::apps::run_command_line(argc, argv);
+    if (pons::apps::said_all()) return code;
+    std::fprintf(stderr, "pons: cannot write to the standard output; is the disk full?\n");
+    return code == pons::apps::kExitGood ? pons::apps::kExitBadRun : code;
   } catch (const std::exception& error) {
     // Whatever a person can cause has an error of its own: this is a fault of the program, or memory ran out.
     std::fprintf(stderr, "pons: internal error: %s\n", error.what());

@@ -1,7 +1,9 @@
 #include "apps/png.hpp"
 
 #include <png.h>
-#include <system_error>
+#include <string>
+
+#include "pons/record/file.hpp"
 
 namespace pons::apps {
 
@@ -11,17 +13,15 @@ Expected<void> write_png(const std::filesystem::path& file, int width, int heigh
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
   image.format = PNG_FORMAT_RGB;
-  const std::filesystem::path part = file.string() + ".part";
-  if (png_image_write_to_file(&image, part.c_str(), 0, rgb.data(), 0, nullptr) == 0) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    return fail(std::string("cannot write the picture: ") + image.message, file.string(),
-                "name a file in a folder that exists and that you may write to");
+  png_alloc_size_t size = 0;
+  if (png_image_write_to_memory(&image, nullptr, &size, 0, rgb.data(), 0, nullptr) == 0) {
+    return fail(std::string("cannot draw the picture: ") + image.message, file.string());
   }
-  std::error_code error;
-  std::filesystem::rename(part, file, error);
-  if (error) return fail("cannot write the picture: " + error.message(), file.string());
-  return {};
+  std::string bytes(size, '\0');
+  if (png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr) == 0) {
+    return fail(std::string("cannot draw the picture: ") + image.message, file.string());
+  }
+  return record::write_whole(file, std::string_view(bytes).substr(0, size));
 }
 
 }  // namespace pons::apps

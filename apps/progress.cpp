@@ -33,9 +33,8 @@ void Progress::show(const Figures& figures) {
   if (figures.done / every == shown_ / every && shown_ >= 0) return;
   shown_ = figures.done;
   const double wall_s = std::chrono::duration<double>(now - began_).count();
-  fmt::print(out_, "{:>6} of {} parcels, {:.0f} an hour, {} waiting, {:.0f} s simulated in {:.0f} s\n", figures.done,
-             total_, rate, figures.queue, figures.now.s(), wall_s);
-  std::fflush(out_);
+  write(fmt::format("{:>6} of {} parcels, {:.0f} an hour, {} waiting, {:.0f} s simulated in {:.0f} s\n", figures.done,
+                    total_, rate, figures.queue, figures.now.s(), wall_s));
 }
 
 void Progress::bar(const Figures& figures, double rate) {
@@ -44,14 +43,20 @@ void Progress::bar(const Figures& figures, double rate) {
   std::string text(static_cast<std::size_t>(filled), '#');
   text.append(static_cast<std::size_t>(kBarWidth - filled), '.');
   const double wall_s = std::chrono::duration<double>(drawn_ - began_).count();
-  fmt::print(out_, "\r[{}] {}/{} parcels  {:.0f}/h  queue {}  {:.0f} s simulated, {:.1f}x real time\x1b[K", text,
-             figures.done, total_, rate, figures.queue, figures.now.s(), wall_s > 0 ? figures.now.s() / wall_s : 0.0);
-  std::fflush(out_);
+  write(fmt::format("\r[{}] {}/{} parcels  {:.0f}/h  queue {}  {:.0f} s simulated, {:.1f}x real time\x1b[K", text,
+                    figures.done, total_, rate, figures.queue, figures.now.s(),
+                    wall_s > 0 ? figures.now.s() / wall_s : 0.0));
   shown_ = figures.done;
 }
 
 void Progress::finish() {
-  if (terminal_ && shown_ >= 0) fmt::print(out_, "\n");
+  if (terminal_ && shown_ >= 0) write("\n");
+}
+
+// A terminal that has gone or a full disk must not end a run: fmt would throw.
+void Progress::write(const std::string& text) {
+  (void)std::fputs(text.c_str(), out_);
+  (void)std::fflush(out_);
 }
 
 }  // namespace pons::apps

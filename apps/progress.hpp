@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <string>
 
 #include "pons/core/time.hpp"
 
@@ -27,6 +28,7 @@ class Progress {
 
  private:
   void bar(const Figures& figures, double rate);
+  void write(const std::string& text);
 
   std::FILE* out_;
   std::int64_t total_;

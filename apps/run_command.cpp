@@ -1,10 +1,14 @@
 // pons run: one run of a world, from the first parcel to the report.
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
+#include <array>
+#include <charconv>
+#include <climits>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
+#include <optional>
 
 #include "apps/assembly.hpp"
 #include "apps/commands.hpp"
@@ -12,6 +16,7 @@
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
 #include "pons/core/digest.hpp"
+#include "pons/record/file.hpp"
 #include "pons/record/report.hpp"
 #include "pons/referee/referee.hpp"
 #include "pons/runner/realtime.hpp"
@@ -33,6 +38,8 @@ constexpr int kPictureWidth = 1280, kPictureHeight = 800;
 constexpr double kSlowest_s = 12.0;  // simulated, a parcel: a run that takes longer hangs
 constexpr double kSlowestStart_s = 60.0;
 
+constexpr std::size_t kPartOfName = 24;  // a file is written under a longer name first
+
 volatile std::sig_atomic_t interrupts = 0;
 
 // The first Ctrl-C stops the robot in a controlled way; a third one ends the process at once.
@@ -47,18 +54,37 @@ void watch_interrupts() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, &action, nullptr);
 }
 
-// A file that a run will write at its end: refused now rather than after the work.
-Expected<void> writable(const fs::path& file, const char* option) {
-  if (file.empty()) return {};
-  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+fs::path absolute_of(const fs::path& file) {
   std::error_code error;
-  if (!fs::is_directory(folder, error))
-    return fail("no such folder", folder.string(), std::string("create it, or change ") + option);
-  if (fs::is_directory(file, error))
-    return fail("is a folder", file.string(), std::string("name a file for ") + option);
-  if (access(folder.c_str(), W_OK) != 0) return fail("not writable", folder.string(), std::string("change ") + option);
+  const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
+  return error ? file : whole;
+}
+
+// What a run reads and writes, by option. Refused now rather than after the work: files that cannot be written, and one
+// file for two things.
+Expected<void> check_files(const RunOptions& options) {
+  const std::array<std::pair<const char*, fs::path>, 5> files{{{"--manifest", options.manifest},
+                                                               {"--journal", options.journal},
+                                                               {"--report", options.report},
+                                                               {"--picture", options.picture},
+                                                               {"--socket", options.socket}}};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto& [option, file] = files[i];
+    if (file.empty()) continue;
+    if (file.filename().string().size() > NAME_MAX - kPartOfName) return fail("the name is too long", option);
+    for (std::size_t j = 0; j < i; ++j) {
+      if (files[j].second.empty() || absolute_of(files[j].second) != absolute_of(file)) continue;
+      return fail(fmt::format("is also named for {}", files[j].first), fmt::format("{} {}", option, file.string()),
+                  "name another file");
+    }
+  }
+  for (const fs::path& file : {options.report, options.picture}) {
+    if (file.empty()) continue;
+    if (auto possible = record::check_writable(file); !possible) return possible;
+  }
   return {};
 }
 
@@ -78,7 +104,8 @@ Expected<world::Manifest> manifest_of(const RunOptions& options, const world::Wo
 class TemporaryJournal {
  public:
   TemporaryJournal() {
-    std::string pattern = (fs::temp_directory_path() / "pons-XXXXXX").string();
+    const char* const wanted = std::getenv("TMPDIR");
+    std::string pattern = fs::path(wanted != nullptr ? wanted : "/tmp") / "pons-XXXXXX";
     if (mkdtemp(pattern.data()) != nullptr) folder_ = pattern;
   }
   ~TemporaryJournal() {
@@ -87,7 +114,10 @@ class TemporaryJournal {
   }
   TemporaryJournal(const TemporaryJournal&) = delete;
   TemporaryJournal& operator=(const TemporaryJournal&) = delete;
-  [[nodiscard]] fs::path file() const { return folder_ / "journal.db"; }
+  [[nodiscard]] Expected<fs::path> file() const {
+    if (folder_.empty()) return fail("no temporary folder for the journal", "TMPDIR", "set it, or use --journal");
+    return folder_ / "journal.db";
+  }
 
  private:
   fs::path folder_;
@@ -176,23 +206,24 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
                                       result->complete ? referee::RunEnd::kComplete : referee::RunEnd::kBrokenOff);
   if (!verdict) return bad_run(verdict.error());
   const record::Report report = report_of(options, cell, *verdict, *result, wall_s);
-  fmt::print("{}", record::summary(report));
+  say(stdout, fmt::format("{}", record::summary(report)));
   if (options.explain) {
-    for (const std::string& finding : verdict->findings) fmt::print("  {}\n", finding);
+    for (const std::string& finding : verdict->findings) say(stdout, fmt::format("  {}\n", finding));
   }
   if (!options.report.empty()) {
     if (auto written = record::write(report, options.report); !written) return bad_run(written.error());
-    fmt::print("report: {}\n", options.report.string());
+    say(stdout, fmt::format("report: {}\n", options.report.string()));
   }
   if (!options.picture.empty()) {
     if (!pictured) {
       if (auto taken = take_picture(cell, options.picture); !taken) return bad_run(taken.error());
     }
-    fmt::print("picture: {}\n", options.picture.string());
+    say(stdout, fmt::format("picture: {}\n", options.picture.string()));
   }
-  if (!result->loop.degraded.empty()) fmt::print("degraded: {}\n", result->loop.degraded);
-  if (!options.journal.empty()) fmt::print("journal: {}\n", options.journal.string());
+  if (!result->loop.degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->loop.degraded));
+  if (!options.journal.empty()) say(stdout, fmt::format("journal: {}\n", options.journal.string()));
   if (interrupts > 0) return kExitInterrupted;
+  if (!result->complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
   const bool good = result->complete && verdict->lost == 0 && verdict->missorted == 0 && verdict->duplicated == 0 &&
                     report.limits.violations == 0;
   return good ? kExitGood : kExitBadRun;
@@ -201,16 +232,17 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
 int run(const RunOptions& options) {
   // Before anything is opened: what is built is also taken down.
   watch_interrupts();
-  for (const auto& [file, name] : {std::pair{options.report, "--report"}, {options.picture, "--picture"}}) {
-    if (auto possible = writable(file, name); !possible) return bad_input(possible.error());
-  }
+  if (auto possible = check_files(options); !possible) return bad_input(possible.error());
   auto world = world::load(worlds_folder(), options.world);
   if (!world) return bad_input(world.error());
   const auto manifest = manifest_of(options, *world);
   if (!manifest) return bad_input(manifest.error());
 
-  const TemporaryJournal temporary;
-  AssemblyOptions assembly{.journal = options.journal.empty() ? temporary.file() : options.journal,
+  std::optional<TemporaryJournal> temporary;
+  Expected<fs::path> journal = options.journal;
+  if (options.journal.empty()) journal = temporary.emplace().file();
+  if (!journal) return bad_input(journal.error());
+  AssemblyOptions assembly{.journal = *journal,
                            .seed = options.seed,
                            .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep};
   if (!options.socket.empty()) {
@@ -223,15 +255,29 @@ int run(const RunOptions& options) {
   return run_cell(options, **cell, static_cast<std::int64_t>(manifest->size()));
 }
 
+const CLI::Validator not_empty([](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
+
+// The parser's own conversion clamps what does not fit.
+const CLI::Validator whole_number(
+    [](const std::string& text) {
+      std::uint64_t number = 0;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      if (error == std::errc() && end == text.data() + text.size()) return std::string();
+      return fmt::format("'{}' is not a whole number from 0 to {}", text, UINT64_MAX);
+    },
+    "");
+
 }  // namespace
 
 void add_run(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted");
   command->add_option("world", options->world, "A world's name; `pons worlds` lists them")->required();
-  auto* parcels = command->add_option("--parcels", options->parcels, "How many parcels (200)");
+  auto* parcels =
+      command->add_option("--parcels", options->parcels, "How many parcels; 1 to 1000000 (200)")->check(whole_number);
   command->add_option("--manifest", options->manifest, "CSV file of parcels, instead of drawing them from the seed");
-  command->add_option("--seed", options->seed, "What is drawn: parcels, arrivals, noise (1)");
+  command->add_option("--seed", options->seed, "What is drawn: parcels, arrivals, noise; 0 or more (1)")
+      ->check(whole_number);
   auto* lockstep =
       command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
   command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")
@@ -243,6 +289,10 @@ void add_run(CLI::App& app, Chosen& chosen) {
                       "Where `pons task` reaches this run (on by default with --realtime)");
   command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
   command->add_flag("--quiet", options->quiet, "No progress");
+  for (CLI::Option* option : command->get_options()) {
+    // Most often a variable of a script that was never set.
+    if (option->get_items_expected_max() > 0) option->check(not_empty);
+  }
   command->callback([options, parcels, &chosen] {
     options->parcels_given = parcels->count() > 0;
     chosen = [options] { return run(*options); };

@@ -22,10 +22,15 @@ namespace fs = std::filesystem;
 
 // The file that a name stands for once links are followed: replacing the link itself would cut it off from its target.
 [[nodiscard]] fs::path behind_links(const fs::path& path) {
+  constexpr int kHops = 16;  // a ring of links has no end
+  fs::path target = path;
   std::error_code error;
-  if (!fs::is_symlink(path, error)) return path;
-  fs::path target = fs::weakly_canonical(path, error);
-  return error ? path : target;
+  for (int hop = 0; hop < kHops && fs::is_symlink(target, error); ++hop) {
+    const fs::path next = fs::read_symlink(target, error);
+    if (error) return path;
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target;
 }
 
 [[nodiscard]] fs::path folder_of(const fs::path& path) {

@@ -45,6 +45,12 @@ struct Shared {
   }
 };
 
+// Ends the other threads on every way out.
+struct Leaving {
+  Shared& shared;
+  ~Leaving() { shared.running.store(false); }
+};
+
 void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
   // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
   (void)rt::make_realtime({.period = kControlPeriod, .priority = kBodyPriority});
@@ -98,6 +104,7 @@ Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
   {
     std::jthread body_thread([&] { run_body(parts, clock, exchange, shared); });
     std::jthread loop_thread([&] { result.loop = run_loop(parts, clock, exchange, shared); });
+    const Leaving leaving{shared};  // also by an exception: both threads are waited for
     (void)rt::make_realtime({.period = kBridgePeriod, .priority = kBridgePriority});
     rt::PeriodicLoop loop(clock, kBridgePeriod);
     loop.run([&](Time now) {

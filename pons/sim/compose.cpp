@@ -48,6 +48,10 @@ Expected<void> check_belt(const mjSpec* spec, const world::World& world) {
     return fail("geom 'belt' is not where world.yaml has the belt", world.scene_mjcf.string(),
                 "make x_start_m, x_end_m and surface_z_m of world.yaml agree with the geom");
   }
+  if (std::abs(geom->pos[1] - belt.y_center_m) > 1e-4 || std::abs(2 * geom->size[1] - belt.width_m) > 1e-4) {
+    return fail("geom 'belt' does not lie across as world.yaml says", world.scene_mjcf.string(),
+                "make y_center_m and width_m of world.yaml agree with the geom");
+  }
   return {};
 }
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
+#include "pons/skills/set_down.hpp"
 
 namespace pons::skills {
 namespace {
@@ -22,7 +22,6 @@ constexpr double kPressFurther_m = 0.003;
 constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
 constexpr double kPressTakes_s = 0.08;
 constexpr int kPresses = 2;
-constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kTryEvery = std::chrono::milliseconds(40);
@@ -36,13 +35,6 @@ constexpr double kLifted_m = 0.030;     // nothing below supports the load any m
 constexpr double kNearLimit = 0.15;     // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
 constexpr double kPutBack_m = 0.02;  // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
-// Over the belt, when let go: a heavy load hangs lower than its size says. Higher when that is blocked.
-constexpr std::array kSetDowns_m = {0.03, 0.10, 0.20};
-constexpr double kBeyond_m = 0.15;  // past the pick zone the arm still reaches down
-constexpr double kSpotStep_m = 0.02;
-constexpr double kRoom_m = 0.02;                                     // to the next parcel is enough
-constexpr Duration kSetDownTakes = std::chrono::milliseconds(1200);  // a first guess
-constexpr int kSetDownRounds = 3;
 constexpr double kLightest_kg = 0.01;
 constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
@@ -54,7 +46,8 @@ constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits f
 
 class Pick final : public task::Skill {
  public:
-  Pick(Cell& cell, std::string code, Time now) : cell_(cell), code_(std::move(code)), started_(now), seen_(now) {}
+  Pick(Cell& cell, std::string code, Time now)
+      : cell_(cell), code_(std::move(code)), started_(now), seen_(now), set_down_(cell) {}
 
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
@@ -201,7 +194,7 @@ class Pick final : public task::Skill {
     const auto down = skills::lift(cell_, state, from, grasp_.orientation, Vector3(0, 0, kPutBack_m - risen_m));
     if (!down || !cell_.arm.stream(down->trajectory)) return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
-    released_at_ = down->top;
+    set_down_.begin_at(down->top);
     phase_ = Phase::kSetDown;
     return {};
   }
@@ -209,70 +202,15 @@ class Pick final : public task::Skill {
   // What an earlier task left on the cups goes back on the belt where there is room.
   Progress begin_set_down(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
-    Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
-    for (const double over_belt_m : kSetDowns_m) {
-      way = way_to_belt(now, over_belt_m);
-      if (way) break;
-    }
-    if (!way) return {Status::kRetry, way.error().line(), {}};
-    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
-    released_at_ = way->back().end();
+    if (auto begun = set_down_.begin(now); !begun) return {Status::kRetry, begun.error().line(), {}};
     phase_ = Phase::kSetDown;
     return {};
   }
 
-  Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m) {
-    // Where there will be room depends on when it gets there, and that on where.
-    Time arrives = now + kSetDownTakes;
-    Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
-    for (int round = 0; round < kSetDownRounds; ++round) {
-      way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
-        const Vector3 spot = free_spot(arrives, over_belt_m);
-        const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
-        if (!down) return fail("no room on the belt", cell_.held->code);
-        Pose pose = Pose::Identity();
-        pose.translation() = spot;
-        pose.linear() = *down;
-        return cell_.model.inverse(pose, from);
-      });
-      if (!way) return way;
-      arrives = way->back().end();
-    }
-    return way;
-  }
-
-  // Tip position over the belt, from the middle of the pick zone on: the first with room enough at `time`, else the one
-  // with the most.
-  [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const {
-    const world::Belt& belt = cell_.world.belt;
-    const Vector3& size = cell_.held->load.size_m;
-    Vector3 spot{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + size.z() + over_belt_m};
-    double most_m = -1;
-    for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m;
-         x += kSpotStep_m) {
-      double room_m = kRoom_m;
-      for (const ObjectBelief& object : cell_.objects()) {
-        const double both_m = 0.5 * (size.head<2>().norm() + object.size_m.head<2>().norm());
-        room_m = std::min(room_m, std::abs(cell_.predict(object, time).x() - x) - both_m);
-      }
-      if (room_m <= most_m) continue;
-      most_m = room_m;
-      spot.x() = x;
-    }
-    return spot;
-  }
-
   Progress set_down(Time now) {
-    if (now < released_at_) {
-      if (weigh_now(cell_) > kPushedBack_kg) return {};
-      released_at_ = now;  // it stands already: its size was misjudged
-      if (!cell_.arm.stop(now)) return {Status::kRetry, "cannot stop", {}};
-    }
-    cell_.arm.vacuum(false);
-    if (!cell_.arm.all_cups_open() && now < released_at_ + std::chrono::milliseconds(250)) return {};
-    cell_.left_on_belt(cell_.held->load, cell_.model.world_from_tip(cell_.arm.state().position).translation());
-    cell_.held.reset();
-    cell_.arm.payload(0, Vector3::Zero());
+    const auto laid = set_down_.tick(now);
+    if (!laid) return {Status::kRetry, laid.error().line(), {}};
+    if (!*laid) return {};
     if (verdict_.status == Status::kRunning) {
       phase_ = Phase::kFind;
       seen_ = now;
@@ -464,12 +402,13 @@ class Pick final : public task::Skill {
 
   Cell& cell_;
   std::string code_;
-  Time started_, seen_, planned_, lift_end_, rides_until_, released_at_, retreated_at_;
+  Time started_, seen_, planned_, lift_end_, rides_until_, retreated_at_;
   Phase phase_ = Phase::kFind;
   Grasp grasp_;
   ObjectBelief target_;
   Vector3 lift_from_ = Vector3::Zero();
   Scale scale_;
+  SetDown set_down_;
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_;
   std::string last_error_;

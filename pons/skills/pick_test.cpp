@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "pons/skills/set_down.hpp"
 #include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
@@ -118,6 +119,22 @@ TEST_F(PickTest, AnythingLeftOnTheCupsIsPutOnTheBeltFirst) {
     EXPECT_LT(lowest.z() - size_m.z(), world_.belt.surface_z_m + 0.05) << size_m.transpose();
     EXPECT_NEAR(lowest.y(), world_.belt.y_center_m, 0.05);
   }
+}
+
+TEST_F(PickTest, WhatNobodyAsksForIsLaidOnTheBelt) {
+  cell_.held = Held{"P9", {.size_m = {0.2, 0.15, 0.1}}, 1.0};
+  Rest rest(cell_);
+  Vector3 lowest = Vector3::Constant(9);
+  int ticks = 0;
+  for (; ticks < 600 && cell_.held; ++ticks) {
+    tick_with({});
+    rest.tick(now_);
+    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+    if (tip.z() < lowest.z()) lowest = tip;
+  }
+  EXPECT_FALSE(cell_.held);
+  EXPECT_GT(ticks, 50) << "the next task may still want it";
+  EXPECT_LT(lowest.z() - 0.1, world_.belt.surface_z_m + 0.05);
 }
 
 }  // namespace

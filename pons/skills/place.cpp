@@ -114,7 +114,7 @@ class Place final : public task::Skill {
     std::vector<world::Entry> entries = world::ways_in(size, target);
     if (entries.empty()) entries = world::ways_in(size, target, world::kMisjudged_m);
     if (entries.empty())
-      return fail(fmt::format("too large for its mouth: {:.2f} x {:.2f} m", size.x(), size.y()), name_);
+      return fail(fmt::format("too large for its mouth: {:.2f} x {:.2f} m", size.x(), size.y()));
     // The more it leans the higher it is let go, and the deeper it falls.
     for (const world::Entry& entry : entries) {
       for (int height = 0; height < kHeights; ++height) {
@@ -127,7 +127,7 @@ class Place final : public task::Skill {
         return q;
       }
     }
-    return fail("out of reach", name_);
+    return fail("out of reach");
   }
 
   // Of the tip, at least, to let go over the rim.
@@ -149,7 +149,7 @@ class Place final : public task::Skill {
     const Vector3 tip(target.center_m.x(), target.center_m.y(), tip_z);
     const double lean_rad = tool_lean(entry.lean_rad);
     const Eigen::AngleAxisd tip_from_load(load.yaw_in_tip_rad, Vector3::UnitZ());
-    Expected<AxisVector> best = fail("out of reach", name_);
+    Expected<AxisVector> best = fail("out of reach");
     double least = 0;
     for (int turn = 0; turn < 8; ++turn) {
       const double yaw =

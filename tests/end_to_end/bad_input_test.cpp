@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <fstream>
@@ -87,6 +88,40 @@ TEST_F(BadInput, PlacesThatCannotBeWritten) {
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", folder_ / "none/r.json"}, {"none"});
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--picture", folder_.path()}, {"folder"});
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "none/j.db"}, {"none"});
+}
+
+TEST_F(BadInput, NothingGivenOrTooMuch) {
+  for (const char* option : {"--manifest", "--journal", "--report", "--picture", "--socket", "--seed"})
+    expect_refused({"run", "parcel_cell", "--parcels", "1", option, ""}, {option});
+  for (const char* seed : {"-1", "18446744073709551616", "1e3"})
+    expect_refused({"run", "parcel_cell", "--parcels", "1", "--seed", seed}, {"--seed", seed});
+  expect_refused({"run", "parcel_cell", "--parcels", "99999999999999999999"}, {"--parcels", "99999999999999999999"});
+}
+
+TEST_F(BadInput, OneFileForTwoThings) {
+  const std::string file = folder_ / "one", same = folder_ / "./one";
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", file, "--journal", same},
+                 {"--report", "--journal"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", file, "--picture", same},
+                 {"--report", "--picture"});
+  write_text(file, std::string(kHeader) + "P1,chute_1,box,0.2,0.15,0.1,1.0,50\n");
+  expect_refused({"run", "parcel_cell", "--manifest", file, "--report", same}, {"--manifest", "--report"});
+}
+
+TEST_F(BadInput, ARefusedSocketLeavesNoJournal) {
+  expect_refused(
+      {"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "j.db", "--socket", folder_ / "none/s"},
+      {"none/s"});
+}
+
+TEST_F(BadInput, APipeIsNoPicture) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--picture", folder_ / "pipe"}, {"pipe"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", folder_ / "pipe"}, {"pipe"});
+}
+
+TEST_F(BadInput, NoTemporaryFolder) {
+  expect_refused({"run", "parcel_cell", "--parcels", "1"}, {"TMPDIR", "--journal"}, {"TMPDIR=/nonexistent"});
 }
 
 TEST_F(BadInput, JournalsThatAreNotOurs) {

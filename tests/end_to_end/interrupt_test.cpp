@@ -73,11 +73,28 @@ TEST_F(Interrupt, BySigtermAtWork) {
   EXPECT_LT(offered_, 30);
 }
 
+TEST_F(Interrupt, ByATerminalThatGoesAway) {
+  interrupt(30, "4", "--realtime", 2, SIGHUP);
+  EXPECT_LT(offered_, 30);
+}
+
 // The line comes with an outcome, when what was let go a moment ago still falls into its chute: the run must see it
 // land.
 TEST_F(Interrupt, RightAfterAnOutcome) {
   interrupt(10, "16", "--lockstep", 2);
   EXPECT_GT(sorted_, 0);
+}
+
+// A run goes on, and what it is for is written, when nobody can be told.
+TEST(Unheard, ARunEndsWhole) {
+  for (const char* pace : {"--lockstep", "--realtime"}) {
+    const Folder folder;
+    const int code = run_pons_unheard({"run", "parcel_cell", "--parcels", "2", pace, "--socket", folder / "s",
+                                       "--journal", folder / "j.db", "--report", folder / "r.json"});
+    EXPECT_EQ(code, 1) << "its words are lost";
+    EXPECT_EQ(read_json(folder / "r.json")["parcels"]["sorted"], 2) << pace;
+    EXPECT_FALSE(std::filesystem::exists(folder / "j.db-wal")) << pace;
+  }
 }
 
 }  // namespace

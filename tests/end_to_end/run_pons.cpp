@@ -14,11 +14,6 @@
 namespace pons::tests {
 namespace {
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 // In the child: becomes the program, with its streams where `out` and `err` lead.
 [[noreturn]] void become_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
                               int out, int err) {
@@ -57,6 +52,14 @@ Finished run_pons(const std::vector<std::string>& arguments, const std::vector<s
   return {code, read_text(out), read_text(err)};
 }
 
+int run_pons_unheard(const std::vector<std::string>& arguments) {
+  const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
+  const pid_t child = fork();
+  if (child == 0) become_pons(arguments, {}, full, full);
+  close(full);
+  return exit_code(child);
+}
+
 Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal) {
   std::array<int, 2> err{};
   if (pipe2(err.data(), O_CLOEXEC) != 0) return {};
@@ -90,6 +93,11 @@ Folder::~Folder() {
 }
 
 nlohmann::json read_json(const std::filesystem::path& file) { return nlohmann::json::parse(read_text(file)); }
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;

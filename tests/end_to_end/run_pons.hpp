@@ -17,6 +17,9 @@ struct Finished {
 [[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments,
                                 const std::vector<std::string>& environment = {});
 
+// Where whatever it says to a person cannot be written; the exit code.
+[[nodiscard]] int run_pons_unheard(const std::vector<std::string>& arguments);
+
 // Sends it `signal` as soon as it has written `lines` lines to the error stream, and waits for its end. `out` is left
 // empty.
 [[nodiscard]] Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal);
@@ -36,6 +39,7 @@ class Folder {
 };
 
 [[nodiscard]] nlohmann::json read_json(const std::filesystem::path& file);
+[[nodiscard]] std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace pons::tests

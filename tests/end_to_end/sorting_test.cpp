@@ -80,6 +80,26 @@ TEST(Sorting, WhatIsTooLargePassesARestingArm) {
   EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
 }
 
+// What cannot be placed does not stay on the cups: it rides into the exception chute, and the journal says why.
+TEST(Sorting, APlaceOutOfReachStopsNothing) {
+  const Folder folder;
+  const auto worlds = folder / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  std::string text = read_text(worlds / "small_cell/world.yaml");
+  const std::string near = "{name: east, kind: chute, center: [0.40,";
+  ASSERT_NE(text.find(near), std::string::npos);
+  text.replace(text.find(near), near.size(), "{name: east, kind: chute, center: [5.40,");
+  write_text(worlds / "small_cell/world.yaml", text);
+  const Finished run =
+      run_pons({"run", "small_cell", "--parcels", "3", "--quiet", "--explain", "--report", folder / "report.json"},
+               {"PONS_WORLDS=" + worlds.string()});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  expect_accounted_for(report);
+  EXPECT_GE(report["parcels"]["exceptions"]["undeserved"], 1);
+  EXPECT_NE(run.out.find("east: out of reach"), std::string::npos) << run.out;
+}
+
 TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   const Folder folder;
   const Finished run =

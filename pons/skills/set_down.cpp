@@ -1,0 +1,110 @@
+#include "pons/skills/set_down.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pons/skills/grasp.hpp"
+#include "pons/skills/scale.hpp"
+
+namespace pons::skills {
+namespace {
+
+// Over the belt, when let go: a heavy load hangs lower than its size says. Higher when that is blocked.
+constexpr std::array kOverBelt_m = {0.03, 0.10, 0.20};
+constexpr double kBeyond_m = 0.15;  // past the pick zone the arm still reaches down
+constexpr double kSpotStep_m = 0.02;
+constexpr double kRoom_m = 0.02;                              // to the next parcel is enough
+constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
+constexpr int kRounds = 3;
+constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
+constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
+constexpr Duration kPeriod = std::chrono::milliseconds(100);     // called later than that: a skill ran
+constexpr Duration kLeftAlone = std::chrono::milliseconds(500);  // then nobody wants what is held
+constexpr double kLightest_kg = 0.01;
+
+}  // namespace
+
+Expected<void> SetDown::begin(Time now) {
+  Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
+  for (const double over_belt_m : kOverBelt_m) {
+    way = way_to_belt(now, over_belt_m);
+    if (way) break;
+  }
+  if (!way) return std::unexpected(way.error());
+  if (auto sent = cell_.arm.stream(*way); !sent) return sent;
+  released_at_ = way->back().end();
+  return {};
+}
+
+Expected<motion::Trajectory> SetDown::way_to_belt(Time now, double over_belt_m) {
+  // Where there will be room depends on when it gets there, and that on where.
+  Time arrives = now + kTakes;
+  Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
+  for (int round = 0; round < kRounds; ++round) {
+    way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
+      const Vector3 spot = free_spot(arrives, over_belt_m);
+      const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
+      if (!down) return fail("no room on the belt", cell_.held->code);
+      Pose pose = Pose::Identity();
+      pose.translation() = spot;
+      pose.linear() = *down;
+      return cell_.model.inverse(pose, from);
+    });
+    if (!way) return way;
+    arrives = way->back().end();
+  }
+  return way;
+}
+
+// Tip position over the belt: the first with room enough at `time`, else the one with the most.
+Vector3 SetDown::free_spot(Time time, double over_belt_m) const {
+  const world::Belt& belt = cell_.world.belt;
+  const Vector3& size = cell_.held->load.size_m;
+  Vector3 spot{belt.pick_x_max_m, belt.y_center_m, belt.surface_z_m + size.z() + over_belt_m};
+  double most_m = -1;
+  for (double x = 0.5 * (belt.pick_x_min_m + belt.pick_x_max_m); x <= belt.pick_x_max_m + kBeyond_m; x += kSpotStep_m) {
+    double room_m = kRoom_m;
+    for (const ObjectBelief& object : cell_.objects()) {
+      const double both_m = 0.5 * (size.head<2>().norm() + object.size_m.head<2>().norm());
+      room_m = std::min(room_m, std::abs(cell_.predict(object, time).x() - x) - both_m);
+    }
+    if (room_m <= most_m) continue;
+    most_m = room_m;
+    spot.x() = x;
+  }
+  return spot;
+}
+
+Expected<bool> SetDown::tick(Time now) {
+  if (now < released_at_) {
+    if (weigh_now(cell_) > kPushedBack_kg) return false;
+    released_at_ = now;  // it stands already: its size was misjudged
+    if (auto stopped = cell_.arm.stop(now); !stopped) return std::unexpected(stopped.error());
+  }
+  cell_.arm.vacuum(false);
+  if (!cell_.arm.all_cups_open() && now < released_at_ + kOpensWithin) return false;
+  cell_.left_on_belt(cell_.held->load, cell_.model.world_from_tip(cell_.arm.state().position).translation());
+  cell_.held.reset();
+  cell_.arm.payload(0, Vector3::Zero());
+  return true;
+}
+
+void Rest::tick(Time now) {
+  if (now > last_ + kPeriod) since_ = now, laying_ = false;
+  last_ = now;
+  if (!cell_.arm.operational()) return;
+  laying_ = laying_ && cell_.held;  // lost in a stop
+  if (laying_) {
+    const auto laid = set_down_.tick(now);
+    laying_ = laid && !*laid;
+    return;
+  }
+  cell_.keep_clear(now);
+  if (!cell_.held || now < since_ + kLeftAlone) return;
+  since_ = now;
+  if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
+  laying_ = set_down_.begin(now).has_value();
+}
+
+}  // namespace pons::skills

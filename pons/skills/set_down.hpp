@@ -1,0 +1,43 @@
+// Lays what the cups hold on the belt, to ride into the exception chute: what cannot be placed must not stay held.
+#pragma once
+
+#include "pons/skills/cell.hpp"
+
+namespace pons::skills {
+
+class SetDown {
+ public:
+  // `cell` must outlive it.
+  explicit SetDown(Cell& cell) : cell_(cell) {}
+
+  // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. Error: no way
+  // there now; what is in it rides on.
+  [[nodiscard]] Expected<void> begin(Time now);
+  // The way down is under way already, and ends then.
+  void begin_at(Time released_at) { released_at_ = released_at; }
+  // Once a period after that: true when the cups are empty. Error: the arm does not obey.
+  [[nodiscard]] Expected<bool> tick(Time now);
+
+ private:
+  [[nodiscard]] Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m);
+  [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const;
+
+  Cell& cell_;
+  Time released_at_;
+};
+
+// For an arm that no skill moves: keeps clear of what comes along, and lays down what was left on the cups.
+class Rest {
+ public:
+  explicit Rest(Cell& cell) : cell_(cell), set_down_(cell) {}
+  // Once a period while no skill runs.
+  void tick(Time now);
+
+ private:
+  Cell& cell_;
+  SetDown set_down_;
+  Time last_, since_;
+  bool laying_ = false;
+};
+
+}  // namespace pons::skills
