@@ -74,7 +74,7 @@ TEST_F(Interrupt, BySigtermAtWork) {
 }
 
 TEST_F(Interrupt, ByATerminalThatGoesAway) {
-  interrupt(30, "4", "--realtime", 2, SIGHUP);
+  interrupt(30, "4", "--lockstep", 2, SIGHUP);
   EXPECT_LT(offered_, 30);
 }
 
