@@ -72,7 +72,8 @@ void PeriodicLoop::run(const std::function<bool(Time)>& tick) {
     if (!go_on) return;
     scheduled += period_;
     if (end > scheduled) {  // replaying what was missed would only spread the delay
-      const auto skipped = (end - scheduled) / period_ + 1;
+      // One that is due this very moment is not missed: a clock that stands still there waits for it.
+      const auto skipped = (end - scheduled + period_ - Duration(1)) / period_;
       missed_ += static_cast<std::uint64_t>(skipped);
       scheduled += skipped * period_;
     }

@@ -32,6 +32,26 @@ TEST(PeriodicLoop, TicksAreAPeriodApartAndSkippedOnesAreCounted) {
   EXPECT_EQ(loop.lateness().count(), 50u);
 }
 
+// Its pacer waits for the loop, and the loop must not wait for a time that its clock does not reach by itself.
+TEST(PeriodicLoop, TicksOnAClockThatStandsStill) {
+  constexpr Duration kPeriod{500'000}, kLeash = 20 * kPeriod;
+  MonotonicClock clock(kLeash);
+  PeriodicLoop loop(clock, kPeriod);
+  std::vector<Time> ticks;
+  loop.run([&](Time scheduled) {
+    ticks.push_back(scheduled);
+    if (ticks.size() > 1) return false;
+    const Time bound = scheduled + 8 * kPeriod;
+    clock.reach(bound - kLeash);
+    while (clock.now() < bound) {
+    }
+    return true;
+  });
+  ASSERT_EQ(ticks.size(), 2U);
+  EXPECT_EQ(ticks[1] - ticks[0], 8 * kPeriod);
+  EXPECT_EQ(loop.missed(), 7U);
+}
+
 TEST(MakeRealtime, SaysWhatWasRefused) {
   const Grant grant = make_realtime({.priority = 0, .cpu = 100'000 % 1024});
   EXPECT_FALSE(grant.pinned);

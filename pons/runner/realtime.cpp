@@ -59,8 +59,10 @@ void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Share
   rt::PeriodicLoop loop(own, kControlPeriod);
   loop.run([&](Time) {
     const Exchange::Asked& asked = exchange.asked.read();
-    if (asked.set_points.torque_nm.size() > 0) parts.plant.body->write(asked.set_points);
-    const Time now = std::min(clock.now(), asked.at + kLeash);
+    const bool controlled = asked.set_points.torque_nm.size() > 0;
+    if (controlled) parts.plant.body->write(asked.set_points);
+    // Until the loop has begun, the clock must go on for it to begin.
+    const Time now = controlled ? std::min(clock.now(), asked.at + kLeash) : clock.now();
     parts.plant.advance(now);
     clock.reach(now);
     parts.plant.body->read(sensors);
