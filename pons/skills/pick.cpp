@@ -151,6 +151,7 @@ class Pick final : public task::Skill {
   // What would come along with it.
   [[nodiscard]] std::optional<std::string> tied_to(const ObjectBelief& object) const {
     for (const ObjectBelief& other : cell_.objects()) {
+      if (other.track == 0) continue;  // only an obstacle
       if (lies_on(other, object)) return "covered by " + name_of(other);
       if (is_part(other, object)) return "may be two: " + name_of(other);
     }
