@@ -20,7 +20,7 @@
 #include "pons/runner/lockstep.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/cell.hpp"
-#include "pons/skills/set_down.hpp"
+#include "pons/skills/rest.hpp"
 #include "pons/skills/skills.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"

@@ -74,7 +74,8 @@ Expected<void> check_files(const RunOptions& options) {
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto& [option, file] = files[i];
     if (file.empty()) continue;
-    if (file.filename().string().size() > NAME_MAX - kPartOfName) return fail("the name is too long", option);
+    if (file.filename().string().size() > NAME_MAX - kPartOfName)
+      return fail("the name is too long", option, "choose a shorter one");
     for (std::size_t j = 0; j < i; ++j) {
       if (files[j].second.empty() || absolute_of(files[j].second) != absolute_of(file)) continue;
       return fail(fmt::format("is also named for {}", files[j].first), fmt::format("{} {}", option, file.string()),

@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "pons/skills/set_down.hpp"
+#include "pons/skills/rest.hpp"
 #include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
@@ -68,6 +68,13 @@ TEST_F(PickTest, WhatMayBeTwoIsNotTaken) {
   const Progress progress = start("P1")->tick(now_);
   EXPECT_EQ(progress.status, Status::kFailed);
   EXPECT_THAT(progress.reason, HasSubstr("P2"));
+}
+
+TEST_F(PickTest, WhatIsOnlyAnObstacleTiesNothing) {
+  ObjectBelief coming = parcel(0, 0, 0.01, {0.2, 0.11, 0.112});
+  coming.code.clear();
+  tick_with({parcel(1, 0.1, 0, {0.4, 0.11, 0.11}), coming});
+  EXPECT_EQ(start("P1")->tick(now_).status, Status::kRunning);
 }
 
 TEST_F(PickTest, WhatTurnsOutToBeTwoOnTheWayIsLetGoOf) {

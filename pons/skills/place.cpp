@@ -83,19 +83,28 @@ class Place final : public task::Skill {
     }
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
-    auto way = cell_.carry(now, [&](const AxisVector& from) { return over(*target, from); });
-    if (!way) {
+    if (const auto set_out = carry_to(*target, now); !set_out) {
       // Others may be in the way, and ride on.
       if (!blocked_since_) blocked_since_ = now;
       cell_.keep_clear(now);
       return now < *blocked_since_ + kBlockedFor ? Progress{}
-                                                 : Progress{Status::kFailed, name_ + ": " + way.error().line(), {}};
+                                                 : Progress{Status::kFailed, name_ + ": " + set_out.error().line(), {}};
     }
-    if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
-    way_ = std::move(*way);
-    arrives_ = way_.back().end();
+    blocked_since_.reset();
     looked_at_ = now;
     phase_ = Phase::kCarry;
+    return {};
+  }
+
+  // Where that fails, whatever was under way stays so.
+  Expected<void> carry_to(const world::Place& target, Time now) {
+    world::Entry entry;
+    auto way = cell_.carry(now, [&](const AxisVector& from) { return over(target, from, entry); });
+    if (!way) return std::unexpected(way.error());
+    if (auto sent = cell_.arm.stream(*way); !sent) return sent;
+    way_ = std::move(*way);
+    arrives_ = way_.back().end();
+    entry_ = entry;
     return {};
   }
 
@@ -105,16 +114,15 @@ class Place final : public task::Skill {
     looked_at_ = now;
     const Time from = cell_.arm.splice_time(now);
     if (cell_.router.clear(way_, from, arrives_, &cell_.held->load, cell_.objects())) return;
-    (void)plan(now);  // if there is none, the way under way is as good as any
+    (void)carry_to(*cell_.world.place(name_), now);  // if there is no way, the one under way is as good as any
   }
 
   // Over the middle of the mouth, turned as one goes in; which of the turns, the arm decides.
-  Expected<AxisVector> over(const world::Place& target, const AxisVector& from) {
+  Expected<AxisVector> over(const world::Place& target, const AxisVector& from, world::Entry& chosen) {
     const Vector3& size = cell_.held->load.size_m;
     std::vector<world::Entry> entries = world::ways_in(size, target);
     if (entries.empty()) entries = world::ways_in(size, target, world::kMisjudged_m);
-    if (entries.empty())
-      return fail(fmt::format("too large for its mouth: {:.2f} x {:.2f} m", size.x(), size.y()));
+    if (entries.empty()) return fail(fmt::format("too large for its mouth: {:.2f} x {:.2f} m", size.x(), size.y()));
     // The more it leans the higher it is let go, and the deeper it falls.
     for (const world::Entry& entry : entries) {
       for (int height = 0; height < kHeights; ++height) {
@@ -123,7 +131,7 @@ class Place final : public task::Skill {
         if (entry.lean_rad > 0 && drop_m > cell_.world.rules.max_drop_m - kSofter_m) break;
         auto q = nearest(target, entry, tip_z, from);
         if (!q) continue;
-        entry_ = entry;
+        chosen = entry;
         return q;
       }
     }

@@ -204,12 +204,17 @@ double Router::own_clearance(const AxisVector& q, const Pose& world_from_tip, co
   return worst;
 }
 
-bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
-                   std::span<const ObjectBelief> obstacles) {
+double Router::worst_clearance(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                               std::span<const ObjectBelief> obstacles) {
   const AxisState end = motion::sample(way, until, model_.axes());
   const auto at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
   const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
-  return worst_clearance(at, from, until, further_m, load, obstacles) >= 0;
+  return worst_clearance(at, from, until, further_m, load, obstacles);
+}
+
+bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                   std::span<const ObjectBelief> obstacles) {
+  return worst_clearance(way, from, until, load, obstacles) >= 0;
 }
 
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
@@ -229,10 +234,8 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   const AxisLimits limits = covering(wanted, start);
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
-  const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
   const auto clearance_of = [&](const motion::Trajectory& way) {
-    const auto on_way = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
-    return worst_clearance(on_way, way.front().start, way.back().end(), further_m, load, obstacles);
+    return worst_clearance(way, way.front().start, way.back().end(), load, obstacles);
   };
   const double clearance = clearance_of(*direct);
   if (clearance >= 0) return direct;

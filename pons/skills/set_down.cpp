@@ -19,9 +19,6 @@ constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kRounds = 3;
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
-constexpr Duration kPeriod = std::chrono::milliseconds(100);     // called later than that: a skill ran
-constexpr Duration kLeftAlone = std::chrono::milliseconds(500);  // then nobody wants what is held
-constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 
@@ -88,23 +85,6 @@ Expected<bool> SetDown::tick(Time now) {
   cell_.held.reset();
   cell_.arm.payload(0, Vector3::Zero());
   return true;
-}
-
-void Rest::tick(Time now) {
-  if (now > last_ + kPeriod) since_ = now, laying_ = false;
-  last_ = now;
-  if (!cell_.arm.operational()) return;
-  laying_ = laying_ && cell_.held;  // lost in a stop
-  if (laying_) {
-    const auto laid = set_down_.tick(now);
-    laying_ = laid && !*laid;
-    return;
-  }
-  cell_.keep_clear(now);
-  if (!cell_.held || now < since_ + kLeftAlone) return;
-  since_ = now;
-  if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
-  laying_ = set_down_.begin(now).has_value();
 }
 
 }  // namespace pons::skills

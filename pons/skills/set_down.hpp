@@ -26,18 +26,4 @@ class SetDown {
   Time released_at_;
 };
 
-// For an arm that no skill moves: keeps clear of what comes along, and lays down what was left on the cups.
-class Rest {
- public:
-  explicit Rest(Cell& cell) : cell_(cell), set_down_(cell) {}
-  // Once a period while no skill runs.
-  void tick(Time now);
-
- private:
-  Cell& cell_;
-  SetDown set_down_;
-  Time last_, since_;
-  bool laying_ = false;
-};
-
 }  // namespace pons::skills

@@ -108,6 +108,23 @@ TEST_F(BadInput, OneFileForTwoThings) {
   expect_refused({"run", "parcel_cell", "--manifest", file, "--report", same}, {"--manifest", "--report"});
 }
 
+TEST_F(BadInput, ANameThatIsTooLong) {
+  for (const char* option : {"--report", "--picture", "--journal"})
+    expect_refused({"run", "parcel_cell", "--parcels", "1", option, folder_ / std::string(250, 'n')}, {option, "long"});
+}
+
+TEST_F(BadInput, ABeltThatLiesElsewhere) {
+  const auto worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  std::string scene = read_text(worlds / "small_cell/scene.xml");
+  const std::string where = "name=\"belt\" pos=\"-0.565 0 ";
+  ASSERT_NE(scene.find(where), std::string::npos);
+  scene.replace(scene.find(where), where.size(), "name=\"belt\" pos=\"-0.565 0.3 ");
+  write_text(worlds / "small_cell/scene.xml", scene);
+  expect_refused({"run", "small_cell", "--parcels", "1"}, {"scene.xml", "belt", "y_center_m"},
+                 {"PONS_WORLDS=" + worlds.string()});
+}
+
 TEST_F(BadInput, ARefusedSocketLeavesNoJournal) {
   expect_refused(
       {"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "j.db", "--socket", folder_ / "none/s"},
