@@ -1,5 +1,7 @@
 #include "apps/assembly.hpp"
 
+#include <fmt/format.h>
+#include <algorithm>
 #include <utility>
 
 namespace pons::apps {
@@ -10,6 +12,18 @@ brain::Orders orders_of(const world::Manifest& manifest) {
   brain::Orders orders;
   for (const world::ManifestRow& row : manifest) orders[row.parcel_id] = {row.destination, row.priority};
   return orders;
+}
+
+// What the skills hold must be there to be held; nobody could submit a task otherwise.
+Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
+  for (const auto& [name, type] : skills.all()) {
+    for (const std::string& needed : type.resources) {
+      if (std::ranges::find(world.resources, needed, &world::Resource::name) != world.resources.end()) continue;
+      return fail(fmt::format("resources: there is no '{}', which the skill '{}' holds", needed, name),
+                  (world.folder / "world.yaml").string(), "add it to resources");
+    }
+  }
+  return {};
 }
 
 // On a computer shared with others a bridge tick comes late by tens of milliseconds.
@@ -25,6 +39,17 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto simulation = sim::Simulation::create(self->world, manifest, options.seed);
   if (!simulation) return std::unexpected(simulation.error());
   self->simulation = std::move(*simulation);
+  const bool realtime = options.pace == runner::Pace::kRealTime;
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
+  self->perception = std::make_unique<perception::Perception>(
+      self->world, model->copy(),
+      [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
+  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
+                                              realtime ? kRealTimeLead : skills::kSpliceLead);
+  self->rest = std::make_unique<skills::Rest>(*self->cell);
+  skills::add_skills(self->registry, *self->cell);
+  if (auto good = check_resources(self->registry, self->world); !good) return std::unexpected(good.error());
+
   // Before the journal: a run that is refused leaves none behind.
   std::unique_ptr<gate::LocalSocket> socket;
   if (options.socket) {
@@ -41,16 +66,6 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
                 "name another file for --journal, or move this one away");
   }
   self->journal = std::move(*journal);
-
-  const bool realtime = options.pace == runner::Pace::kRealTime;
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
-  self->perception = std::make_unique<perception::Perception>(
-      self->world, model->copy(),
-      [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
-  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
-                                              realtime ? kRealTimeLead : skills::kSpliceLead);
-  self->rest = std::make_unique<skills::Rest>(*self->cell);
-  skills::add_skills(self->registry, *self->cell);
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);
 

@@ -32,12 +32,12 @@ int worlds() {
   return code;
 }
 
-// Skills are made for a cell; any world will do to ask them for their names.
-int skills(const std::string& name) {
+// Skills are made for a cell: the places that one may name are those of a world.
+int skills(const std::string& name, const std::string& world_name) {
   const auto folder = worlds_folder();
   const std::vector<std::string> names = world::list(folder);
   if (names.empty()) return bad_input({"no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds"});
-  const auto world = world::load(folder, names.front());
+  const auto world = world::load(folder, world_name.empty() ? names.front() : world_name);
   if (!world) return bad_input(world.error());
   auto model = model::RobotModel::load(world->robot);
   if (!model) return bad_input(model.error());
@@ -53,15 +53,16 @@ int skills(const std::string& name) {
   const task::SkillType* type = registry.find(name);
   if (type == nullptr)
     return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
-  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\narguments:\n{}\n", type->name, type->summary,
+  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\narguments in {}:\n{}\n", type->name, type->summary,
              type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")),
-             to_s(type->timeout), type->attempts, type->schema.dump(2));
+             to_s(type->timeout), type->attempts, world->name, type->schema.dump(2));
   return kExitGood;
 }
 
 constexpr const char* kBash = R"bash(_pons() {
   local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}
   case $before in
+    --world) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
     --manifest|--journal|--report|--picture|--socket) COMPREPLY=($(compgen -f -- "$current")); return ;;
   esac
   if [ "$COMP_CWORD" -eq 1 ]; then
@@ -71,7 +72,7 @@ constexpr const char* kBash = R"bash(_pons() {
   elif [ "$command" = run ]; then
     COMPREPLY=($(compgen -W "--parcels --manifest --seed --lockstep --realtime --journal --report --picture --socket --explain --quiet --help" -- "$current"))
   elif [ "$command" = skills ]; then
-    COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1) --help" -- "$current"))
+    COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1) --world --help" -- "$current"))
   elif [ "$command" = task ] && [ "$COMP_CWORD" -eq 2 ]; then
     COMPREPLY=($(compgen -W "submit list show --help" -- "$current"))
   elif [ "$command" = task ]; then
@@ -90,10 +91,11 @@ void add_worlds(CLI::App& app, Chosen& chosen) {
 }
 
 void add_skills(CLI::App& app, Chosen& chosen) {
-  auto name = std::make_shared<std::string>();
+  auto name = std::make_shared<std::string>(), world = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand("skills", "List the skills, or describe one");
   command->add_option("skill", *name, "Describe this one: its arguments, timeout, resources");
-  command->callback([name, &chosen] { chosen = [name] { return skills(*name); }; });
+  command->add_option("--world", *world, "Of this world, where places are concerned (the first)");
+  command->callback([name, world, &chosen] { chosen = [name, world] { return skills(*name, *world); }; });
 }
 
 void add_completion(CLI::App& app, Chosen& chosen) {

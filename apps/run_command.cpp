@@ -1,6 +1,7 @@
 // pons run: one run of a world, from the first parcel to the report.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 #include <array>
 #include <charconv>
@@ -82,6 +83,8 @@ Expected<void> check_files(const RunOptions& options) {
                   "name another file");
     }
   }
+  if (options.journal == ":memory:")
+    return fail("is no file", "--journal :memory:", "name a file, or leave --journal away");
   for (const fs::path& file : {options.report, options.picture}) {
     if (file.empty()) continue;
     if (auto possible = record::check_writable(file); !possible) return possible;
@@ -180,8 +183,9 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
       .interrupted = [] { return interrupts > 0; },
       .progress =
           [&, total](Time now) {
-            const std::int64_t done = cell.bridge_side->done();
-            if (!options.quiet) progress.show({now, done, cell.bridge_side->succeeded(), cell.bridge->queue_length()});
+            const auto& [sorted, settled] = cell.dispatcher->tally();
+            const std::int64_t done = std::min(settled, total);
+            if (!options.quiet) progress.show({now, done, sorted, cell.bridge->queue_length()});
             // With something on the cups, halfway: that is what the cell looks like.
             if (!options.realtime && !options.picture.empty() && !pictured && cell.cell->held && done * 2 >= total) {
               pictured = take_picture(cell, options.picture).has_value();
@@ -233,6 +237,10 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
 int run(const RunOptions& options) {
   // Before anything is opened: what is built is also taken down.
   watch_interrupts();
+  if (options.world.empty()) {
+    const auto names = world::list(worlds_folder());
+    return bad_input({"no world is named", "pons run", fmt::format("choose from {}", fmt::join(names, ", "))});
+  }
   if (auto possible = check_files(options); !possible) return bad_input(possible.error());
   auto world = world::load(worlds_folder(), options.world);
   if (!world) return bad_input(world.error());
@@ -273,7 +281,7 @@ const CLI::Validator whole_number(
 void add_run(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted");
-  command->add_option("world", options->world, "A world's name; `pons worlds` lists them")->required();
+  command->add_option("world", options->world, "A world's name; `pons worlds` lists them");
   auto* parcels =
       command->add_option("--parcels", options->parcels, "How many parcels; 1 to 1000000 (200)")->check(whole_number);
   command->add_option("--manifest", options->manifest, "CSV file of parcels, instead of drawing them from the seed");

@@ -11,6 +11,7 @@
 #include "apps/paths.hpp"
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/task/json_text.hpp"
 
 namespace pons::apps {
 namespace {
@@ -37,6 +38,8 @@ Expected<std::string> read_task(const std::string& file) {
   std::string text;
   std::ifstream opened;
   if (file != "-") {
+    std::error_code ignored;
+    if (fs::is_directory(file, ignored)) return fail("is a folder", file, "name a JSON file, or - for standard input");
     opened.open(file, std::ios::binary);
     if (!opened) return fail("cannot be read", file, "name a JSON file, or - for standard input");
   }
@@ -51,10 +54,12 @@ Expected<std::string> read_task(const std::string& file) {
 int submit(const TaskOptions& options) {
   const auto text = read_task(options.file);
   if (!text) return bad_input(text.error());
-  const Json task = Json::parse(*text, nullptr, false);
-  if (task.is_discarded())
-    return bad_input({"not JSON", options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
-  const auto answer = ask(options, {{"op", "submit"}, {"task", task}});
+  const auto task = task::parse_json(*text);
+  if (!task) {
+    return bad_input(
+        {task.error().line(), options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
+  }
+  const auto answer = ask(options, {{"op", "submit"}, {"task", *task}});
   if (!answer) return bad_input(answer.error());
   fmt::print("{}: {}\n", answer->value("id", std::string{}),
              answer->value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");

@@ -53,14 +53,17 @@ bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all
 Dispatcher::Dispatcher(Orders orders, const world::World& world)
     : orders_(std::move(orders)), world_(world), label_view_end_m_(brain::label_view_end_m(world)) {}
 
-void Dispatcher::heard(std::string_view id, task::Outcome outcome) {
+bool Dispatcher::heard(std::string_view id, task::Outcome outcome) {
   const auto asked = asked_.find(id);
-  if (asked == asked_.end()) return;
+  if (asked == asked_.end()) return false;
   Known& known = known_.find(asked->second)->second;
   known.asked = false;
   known.sorted = outcome == task::Outcome::kSucceeded;
   known.failed = outcome == task::Outcome::kFailed && known.tries < kMostTries;
   if (known.failed) decided_.erase(known.track);
+  ++tally_.settled;
+  if (known.sorted) ++tally_.sorted;
+  return true;
 }
 
 Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now) {
@@ -110,6 +113,7 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
   }
   if (order->second.priority >= kExpressPriority && must_wait(belief, all)) return;
   decided_.insert(belief.track);
+  if (known.tries > 0 || known.rode) --tally_.settled;
   known.track = belief.track;
   known.asked = true;
   known.failed = false;
@@ -170,7 +174,13 @@ Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tr
 
 void Dispatcher::ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions) {
   decided_.insert(belief.track);
-  if (!belief.code.empty()) known_[belief.code].rode = true;
+  if (belief.code.empty()) {
+    ++tally_.settled;
+  } else {
+    Known& known = known_[belief.code];
+    if (known.tries == 0 && !known.rode) ++tally_.settled;
+    known.rode = true;
+  }
   decisions.rides.push_back({belief.track, belief.code, std::string(reason)});
 }
 

@@ -43,6 +43,12 @@ inline constexpr std::string_view kRideTwice = "code seen twice";
 inline constexpr std::string_view kRideLate = "identified out of reach";
 inline constexpr std::string_view kRideCovered = "covered by another";
 
+// Parcels, as far as labels tell them apart.
+struct Tally {
+  std::int64_t sorted = 0;
+  std::int64_t settled = 0;  // sorted, given up, or let ride; one that failed and is asked for again is not
+};
+
 struct Decisions {
   std::vector<Json> tasks;  // to submit, in this order; an id comes once in the dispatcher's life
   std::vector<Ride> rides;
@@ -58,8 +64,9 @@ class Dispatcher {
 
   // `beliefs` are all live tracks, predicted to `now`.
   [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now);
-  // The outcome of a task that it asked for; others are ignored.
-  void heard(std::string_view id, task::Outcome outcome);
+  // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
+  bool heard(std::string_view id, task::Outcome outcome);
+  [[nodiscard]] const Tally& tally() const { return tally_; }
 
   // Orders that nothing was decided about, in their order.
   [[nodiscard]] std::vector<std::string> unseen() const;
@@ -91,6 +98,7 @@ class Dispatcher {
   std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
   std::map<std::string, std::string, std::less<>> asked_;  // code by task id
   std::set<std::uint32_t> decided_;                        // tracks
+  Tally tally_;
 };
 
 }  // namespace pons::brain

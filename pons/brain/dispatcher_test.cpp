@@ -196,6 +196,25 @@ TEST_F(DispatcherTest, AsksAgainForWhatFailedAndTurnsUp) {
   EXPECT_EQ(never.tasks[0].at("id"), "P2");
 }
 
+TEST_F(DispatcherTest, CountsEachParcelOnce) {
+  const auto tally = [&] { return std::pair(dispatcher_.tally().sorted, dispatcher_.tally().settled); };
+  using Counts = std::pair<std::int64_t, std::int64_t>;
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
+  EXPECT_EQ(tally(), Counts(0, 0));
+  EXPECT_FALSE(dispatcher_.heard("stranger", task::Outcome::kSucceeded));
+  EXPECT_TRUE(dispatcher_.heard("P1", task::Outcome::kFailed));
+  EXPECT_EQ(tally(), Counts(0, 1)) << "for all that is known it is gone";
+  (void)dispatcher_.observe({parcel(2, 0.1, "P1")}, at(2.5));
+  EXPECT_EQ(dispatcher_.observe({parcel(2, 0.2, "P1")}, at(4)).tasks.size(), 1u);
+  EXPECT_EQ(tally(), Counts(0, 0));
+  EXPECT_TRUE(dispatcher_.heard("P1.2", task::Outcome::kSucceeded));
+  EXPECT_EQ(dispatcher_.observe({parcel(3, 0, "P1")}, at(9)).rides.size(), 1u) << "a copy of its label";
+  EXPECT_EQ(tally(), Counts(1, 1));
+  EXPECT_EQ(dispatcher_.observe({parcel(4, 0, "elsewhere")}, at(9)).rides.size(), 1u);
+  EXPECT_EQ(dispatcher_.observe({parcel(5, 2, "")}, at(9)).rides.size(), 1u);
+  EXPECT_EQ(tally(), Counts(1, 3));
+}
+
 TEST_F(DispatcherTest, AsksAtMostThreeTimes) {
   std::vector<std::string> asked;
   for (int seconds = 0; seconds < 10; ++seconds) {

@@ -151,7 +151,7 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
   }
   if (!model.existFrame(robot.flange_link, pinocchio::BODY)) {
     return fail(fmt::format("no link named '{}'", robot.flange_link), where,
-                "name the flange link of this URDF in the robot file");
+                "name one of its links as robot.flange_link in world.yaml");
   }
   const auto parent = model.frames[model.getFrameId(robot.flange_link)].parentJoint;
   if (parent != static_cast<pinocchio::JointIndex>(model.njoints) - 1) {
@@ -161,7 +161,7 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
   for (const auto& capsule : robot.capsules) {
     if (!model.existFrame(capsule.link, pinocchio::BODY)) {
       return fail(fmt::format("a capsule hangs on '{}', which is no link", capsule.link), where,
-                  "correct the capsule's link");
+                  "name one of its links in robot.capsules of world.yaml");
     }
   }
   const auto& limits = robot.limits;

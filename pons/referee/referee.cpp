@@ -22,11 +22,14 @@ struct Entry {
   std::string last_reason;
 };
 
-// Tasks name their parcel as "object" in a step's arguments; a task without one speaks of the parcel of its own id.
+// The parcel that a task puts somewhere, by the code in its steps' arguments; empty for a task that looks or moves
+// only.
 std::string object_of(const task::Task& task) {
+  const auto places = [](const task::Step& step) { return step.skill == "place"; };
+  if (std::ranges::none_of(task.steps, places)) return {};
   for (const task::Step& step : task.steps)
     if (step.arguments.contains("object")) return step.arguments.at("object").get<std::string>();
-  return task.id;
+  return {};
 }
 
 Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
@@ -34,7 +37,9 @@ Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
-    Entry& entry = entries[object_of(record.task)];
+    const std::string object = object_of(record.task);
+    if (object.empty()) continue;
+    Entry& entry = entries[object];
     entry.ended = record.outcome.has_value() && (entry.tasks == 0 || entry.ended);
     ++entry.tasks;
     if (!record.outcome) continue;

@@ -30,7 +30,7 @@ class RefereeTest : public ::testing::Test {
   }
 
   void accept(const std::string& id, const std::string& object) {
-    const task::Task task{.id = id, .steps = {{"pick", {{"object", object}}}}};
+    const task::Task task{.id = id, .steps = {{"pick", {{"object", object}}}, {"place", {{"place", "chute_1"}}}}};
     ASSERT_TRUE(journal_->accept(task, Time{}));
   }
   void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
@@ -59,6 +59,18 @@ TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   EXPECT_EQ(verdict.sorted, 1);
   EXPECT_EQ(verdict.lost, 1);
   EXPECT_THAT(verdict.findings, ::testing::ElementsAre(::testing::HasSubstr("B: lost")));
+}
+
+TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {
+  ride("A");
+  ASSERT_TRUE(journal_->accept({.id = "A", .steps = {{"detect", {{"object", "A"}}}}}, Time{}));
+  end("A", Outcome::kSucceeded);
+  ASSERT_TRUE(journal_->accept({.id = "B", .steps = {{"move_to", {{"place", "home"}}}}}, Time{}));
+  end("B", Outcome::kSucceeded);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kException, "exception")});
+  EXPECT_EQ(verdict.undeserved, 1) << "let ride; that it was looked at changes nothing";
+  EXPECT_EQ(verdict.lost, 1) << "nobody ever decided about it";
 }
 
 TEST_F(RefereeTest, AnotherChuteIsMissortedWhateverTheJournalSays) {

@@ -43,10 +43,7 @@ Expected<void> BridgeSide::tick(Time now, CameraCrew& crew) {
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
   if (bridge_.running().empty()) skills_.rest(now);
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
-    dispatcher_.heard(report.id, report.outcome);
-    last_outcome_ = now;
-    ++outcomes_;
-    if (report.outcome == task::Outcome::kSucceeded) ++succeeded_;
+    if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
   for (const std::uint32_t track : skills_.take_forgotten()) {
     gone_.push_back(track);
@@ -85,12 +82,13 @@ void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   const brain::Decisions decisions = dispatcher_.observe(objects, now);
   for (const Json& task : decisions.tasks) {
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
-      const std::string code = task.value("id", std::string{});
+      const auto id = task.at("id").get<std::string>();
+      const std::string& code = task.at("steps").at(0).at("arguments").at("object").get_ref<const std::string&>();
       bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now);
+      dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
-    ++rides_;
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now);
   }

@@ -42,9 +42,7 @@ class BridgeSide {
   // Writes what became of orders that were never identified. Once, at the end of a run.
   void close(Time now);
 
-  [[nodiscard]] Time last_outcome() const { return last_outcome_; }
-  [[nodiscard]] std::int64_t done() const { return outcomes_ + rides_; }  // tasks ended and parcels let ride
-  [[nodiscard]] std::int64_t succeeded() const { return succeeded_; }
+  [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
   [[nodiscard]] std::int64_t stops() const { return stops_; }
 
  private:
@@ -63,7 +61,7 @@ class BridgeSide {
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   std::optional<Time> stopped_since_;
   Time last_outcome_;
-  std::int64_t outcomes_ = 0, succeeded_ = 0, rides_ = 0, stops_ = 0, unlabelled_ = 0;
+  std::int64_t stops_ = 0, unlabelled_ = 0;
   bool stopping_ = false, was_operational_ = false;
 };
 

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "pons/sim/check_scene.hpp"
+
 namespace pons::sim {
 namespace {
 
@@ -33,26 +35,6 @@ Expected<SpecPtr> parse(const std::filesystem::path& file) {
   SpecPtr spec(mj_parseXML(file.c_str(), nullptr, text, sizeof text));
   if (!spec) return fail(one_line(text), file.string(), "mend the XML there");
   return spec;
-}
-
-Expected<void> check_belt(const mjSpec* spec, const world::World& world) {
-  const mjsGeom* geom = nullptr;
-  if (mjsElement* element = mjs_findElement(spec, mjOBJ_GEOM, "belt")) geom = mjs_asGeom(element);
-  if (geom == nullptr || geom->type != mjGEOM_BOX) {
-    return fail("there is no box geom named 'belt'", world.scene_mjcf.string(), "add it, with a surfacevel along x");
-  }
-  const world::Belt& belt = world.belt;
-  const double top = geom->pos[2] + geom->size[2];
-  if (std::abs(top - belt.surface_z_m) > 1e-4 || std::abs(geom->pos[0] - geom->size[0] - belt.x_start_m) > 1e-4 ||
-      std::abs(geom->pos[0] + geom->size[0] - belt.x_end_m) > 1e-4) {
-    return fail("geom 'belt' is not where world.yaml has the belt", world.scene_mjcf.string(),
-                "make x_start_m, x_end_m and surface_z_m of world.yaml agree with the geom");
-  }
-  if (std::abs(geom->pos[1] - belt.y_center_m) > 1e-4 || std::abs(2 * geom->size[1] - belt.width_m) > 1e-4) {
-    return fail("geom 'belt' does not lie across as world.yaml says", world.scene_mjcf.string(),
-                "make y_center_m and width_m of world.yaml agree with the geom");
-  }
-  return {};
 }
 
 void set_options(mjSpec* spec, const world::World& world) {
@@ -286,9 +268,6 @@ Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
   auto belt = id_of(model, mjOBJ_GEOM, "belt", world.scene_mjcf);
   if (!belt) return std::unexpected(belt.error());
   cell.belt_geom = *belt;
-  if (!model->flg_surfacevel) {
-    return fail("geom 'belt' has no surfacevel", world.scene_mjcf.string(), "give it its nominal speed");
-  }
   auto picture = id_of(model, mjOBJ_CAMERA, "picture", world.scene_mjcf);
   if (!picture) return std::unexpected(picture.error());
   cell.picture_camera = *picture;
@@ -299,6 +278,7 @@ Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
   if (auto found = find_tool(cell, world); !found) return std::unexpected(found.error());
   find_slots(cell);
   classify(cell);
+  if (auto good = check_scene(cell, world); !good) return std::unexpected(good.error());
   return cell;
 }
 
@@ -313,7 +293,6 @@ Expected<Composed> compose(const world::World& world) {
     if (!arm) return std::unexpected(arm.error());
     auto tool = parse(world.robot.tool.mjcf);
     if (!tool) return std::unexpected(tool.error());
-    if (auto belt = check_belt(scene->get(), world); !belt) return std::unexpected(belt.error());
     set_options(scene->get(), world);
     if (auto added = add_robot(scene->get(), arm->get(), tool->get(), world); !added) {
       return std::unexpected(added.error());

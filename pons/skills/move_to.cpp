@@ -7,6 +7,7 @@ using task::Progress;
 using task::Status;
 
 constexpr double kAbove_m = 0.15;
+constexpr std::string_view kHome = "home";
 
 class MoveTo final : public task::Skill {
  public:
@@ -37,7 +38,7 @@ class MoveTo final : public task::Skill {
 
  private:
   Expected<AxisVector> target(const AxisVector& from) {
-    if (place_ == "home") return cell_.world.robot.home;
+    if (place_ == kHome) return cell_.world.robot.home;
     const world::Place* place = cell_.world.place(place_);
     if (place == nullptr) return fail("no place '" + place_ + "' in this world", "move_to");
     const double depth = cell_.held ? cell_.held->load.size_m.z() : 0;
@@ -62,10 +63,12 @@ class MoveTo final : public task::Skill {
 }  // namespace
 
 task::SkillType move_to(Cell& cell) {
+  std::vector<std::string> places = cell.world.place_names();
+  places.emplace_back(kHome);
   return {.name = "move_to",
           .summary = "Bring the tool over a place, or home",
           .schema = {{"type", "object"},
-                     {"properties", {{"place", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
+                     {"properties", {{"place", {{"enum", places}}}}},
                      {"required", {"place"}},
                      {"additionalProperties", false}},
           .resources = {"arm"},

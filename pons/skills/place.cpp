@@ -259,7 +259,7 @@ task::SkillType place(Cell& cell) {
           .summary = "Carry what the cups hold to a place, let go, and make sure that it left",
           .schema = {{"type", "object"},
                      {"properties",
-                      {{"place", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}},
+                      {{"place", {{"enum", cell.world.place_names()}}},
                        {"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
                      {"required", {"place"}},
                      {"additionalProperties", false}},

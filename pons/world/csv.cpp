@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <system_error>
 #include <utility>
@@ -34,6 +35,8 @@ std::size_t utf8_length(std::string_view bytes) {
   }
   return 0;
 }
+
+bool is_blank(std::string_view text) { return text.find_first_not_of(" \t") == std::string_view::npos; }
 
 }  // namespace
 
@@ -69,6 +72,9 @@ Expected<CsvReader> CsvReader::open(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return fail("cannot be read", file.string(), "check its permissions");
   CsvReader reader(file, std::move(stream));
+  if (reader.is_utf16()) {
+    return fail("the text is UTF-16", file.string(), "save the file as UTF-8 (in a spreadsheet: CSV UTF-8)");
+  }
   reader.skip_byte_order_mark();
   return reader;
 }
@@ -97,6 +103,12 @@ int CsvReader::take() {
 void CsvReader::skip_byte_order_mark() {
   // The first fill holds at least three bytes when the file does.
   if (peek() != kEnd && std::string_view(buffer_.data(), end_).starts_with("\xEF\xBB\xBF")) begin_ += 3;
+}
+
+bool CsvReader::is_utf16() {
+  if (peek() == kEnd) return false;
+  const std::string_view begin(buffer_.data(), end_);
+  return begin.starts_with("\xFF\xFE") || begin.starts_with("\xFE\xFF");
 }
 
 bool CsvReader::at_line_end() { return peek() == '\n' || peek() == '\r' || peek() == kEnd; }
@@ -160,8 +172,8 @@ Expected<void> CsvReader::read_record(std::vector<std::string>& fields) {
 Expected<bool> CsvReader::next(std::vector<std::string>& fields) {
   while (peek() != kEnd) {
     if (auto read = read_record(fields); !read) return std::unexpected(read.error());
-    const bool empty_line = fields.size() == 1 && fields[0].empty();
-    if (!empty_line) return true;
+    // Spreadsheets end a table with rows of nothing but separators.
+    if (!std::ranges::all_of(fields, is_blank)) return true;
   }
   fields.clear();
   return false;

@@ -18,12 +18,12 @@ namespace pons::world {
 // Fit for one line of an error message: at most 60 bytes, control characters and broken UTF-8 replaced by '?'.
 [[nodiscard]] std::string printable(std::string_view text);
 
-// Lines end in LF or CRLF; a byte-order mark is skipped, and so are empty lines.
+// Lines end in LF or CRLF; a byte-order mark is skipped, and so are lines without a word.
 class CsvReader {
  public:
   static constexpr std::size_t kMaxRecordBytes = std::size_t{1} << 20;
 
-  // Errors: no such file, not a plain file, not readable.
+  // Errors: no such file, not a plain file, not readable, UTF-16.
   [[nodiscard]] static Expected<CsvReader> open(const std::filesystem::path& file);
 
   // The next record; false at the end of the file. Errors name file and line: not UTF-8, a record above
@@ -47,6 +47,7 @@ class CsvReader {
   [[nodiscard]] Expected<void> read_plain(std::string& field);
   [[nodiscard]] Expected<void> grow(std::string& field, int byte);
   [[nodiscard]] bool at_line_end();
+  [[nodiscard]] bool is_utf16();
   void skip_byte_order_mark();
 
   std::filesystem::path file_;

@@ -123,6 +123,14 @@ Expected<ManifestRow> read_row(const Row& row, const World& world) {
 // Where in a record each of kColumns stands.
 Expected<std::array<std::size_t, 8>> read_header(const CsvReader& reader, const std::vector<std::string>& fields) {
   const std::string mend = fmt::format("the columns are {}, separated by commas", fmt::join(kColumns, ","));
+  if (fields.size() == 1) {
+    for (const char separator : {';', '\t', '|'}) {
+      if (fields[0].find(separator) == std::string::npos) continue;
+      return fail(
+          fmt::format("the columns are separated by {}", separator == '\t' ? "tabs" : fmt::format("'{}'", separator)),
+          reader.where(), mend);
+    }
+  }
   std::array<std::size_t, 8> order{};
   std::array<bool, 8> seen{};
   for (std::size_t i = 0; i < fields.size(); ++i) {

@@ -63,11 +63,19 @@ TEST_F(ManifestFile, TakesColumnsInAnyOrder) {
   EXPECT_EQ((*manifest)[0].priority, 7);
 }
 
+TEST_F(ManifestFile, ReadsOverRowsWithoutAWord) {
+  const auto manifest = read(std::string(kHeader) + "\n" + std::string(kRow) + ",,,,,,,\n  \n");
+  ASSERT_TRUE(manifest) << manifest.error().line();
+  EXPECT_EQ(manifest->size(), 1U);
+}
+
 TEST_F(ManifestFile, RefusesABrokenHeader) {
   EXPECT_THAT(error("parcel_id,destination,kind,length_m,width_m,height_m,priority\nA,chute_1,box,0.3,0.2,0.1,5\n"),
               HasSubstr("orders.csv:1: column 'mass_kg' is missing; the columns are parcel_id,destination,"));
   EXPECT_THAT(error("parcel_id,colour\n"), HasSubstr("orders.csv:1: unknown column 'colour'"));
-  EXPECT_THAT(error("parcel_id;destination\n"), HasSubstr("separated by commas"));
+  EXPECT_THAT(error("parcel_id;destination\n"), HasSubstr("orders.csv:1: the columns are separated by ';'; the colu"));
+  EXPECT_THAT(error("parcel_id\tdestination\n"), HasSubstr("separated by tabs"));
+  EXPECT_THAT(error(std::string("\xFF\xFEp\0a\0", 6)), HasSubstr("orders.csv: the text is UTF-16; save"));
   EXPECT_THAT(error("parcel_id,parcel_id\n"), HasSubstr("orders.csv:1: column 'parcel_id' is there twice"));
 }
 

@@ -13,7 +13,7 @@ struct Span {
 };
 
 // The stretch of the belt's surface that a camera sees over the belt's whole width, so far as the picture's corners
-// tell; nothing when it does not watch the belt.
+// tell; nothing when it does not watch the belt, or looks past it.
 [[nodiscard]] std::optional<Span> seen_of_belt(const CameraSpec& camera, const Belt& belt);
 
 }  // namespace pons::world

@@ -15,7 +15,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 class ViewTest : public ::testing::Test {
  protected:
   ViewTest() {
-    belt_.surface_z_m = 0.9;
+    belt_.surface_z_m = 0.9, belt_.x_start_m = -5, belt_.x_end_m = 5, belt_.width_m = 2;
     camera_.name = "eye", camera_.watches = "belt";
     camera_.width = 640, camera_.height = 320, camera_.fovy_rad = 2 * std::atan(0.5);
     camera_.world_from_optical.translation() = Vector3(-0.3, 0.1, 2.9);
@@ -77,6 +77,14 @@ TEST_F(ViewTest, FromBelowItSeesNone) {
   look(-Vector3::UnitZ(), Vector3::UnitX());
   camera_.world_from_optical.translation().z() = 0.5;
   EXPECT_FALSE(seen_of_belt(camera_, belt_));
+}
+
+TEST_F(ViewTest, PastTheBeltItSeesNone) {
+  look(-Vector3::UnitZ(), Vector3::UnitX());
+  belt_.y_center_m = 3;
+  EXPECT_FALSE(seen_of_belt(camera_, belt_)) << "beside it";
+  belt_.y_center_m = 0, belt_.x_start_m = 2;
+  EXPECT_FALSE(seen_of_belt(camera_, belt_)) << "before it begins";
 }
 
 TEST_F(ViewTest, WhatWatchesSomethingElseDoesNotCount) {

@@ -11,6 +11,7 @@
 
 #include "pons/world/csv.hpp"
 #include "pons/world/sections.hpp"
+#include "pons/world/view.hpp"
 #include "pons/world/yaml.hpp"
 
 namespace pons::world {
@@ -67,7 +68,7 @@ bool mouths_overlap(const Place& a, const Place& b) {
 
 std::vector<Place> read_places(const YamlValue& value) {
   std::vector<Place> places;
-  std::set<std::string> taken{"belt"};
+  std::set<std::string> taken{"belt", "home"};  // each means something already
   for (const YamlValue& entry : value.list(1, 256)) {
     const YamlMap map(entry, {"name", "kind", "center", "size"});
     Place place;
@@ -96,7 +97,7 @@ std::vector<Place> read_places(const YamlValue& value) {
   return places;
 }
 
-CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places) {
+CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places, const Belt& belt) {
   CameraSpec camera;
   camera.watches = map["watches"].name();
   if (camera.watches != "belt" && std::ranges::find(places, camera.watches, &Place::name) == places.end()) {
@@ -115,17 +116,21 @@ CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places) {
   camera.depth_noise_m = map["depth_noise_m"].number(0, 1);
   camera.depth_dropout = map["depth_dropout"].number(0, 1);
   camera.reads_labels = map["reads_labels"].boolean();
+  if (camera.watches == "belt" && !seen_of_belt(camera, belt)) {
+    map["world_from_optical"].refuse("sees nothing of the belt",
+                                     "+z looks out of the camera, +x to the picture's right");
+  }
   return camera;
 }
 
-std::vector<CameraSpec> read_cameras(const YamlValue& value, const std::vector<Place>& places) {
+std::vector<CameraSpec> read_cameras(const YamlValue& value, const std::vector<Place>& places, const Belt& belt) {
   std::vector<CameraSpec> cameras;
   std::set<std::string> taken;
   for (const YamlValue& entry : value.list(1, 16)) {
     const YamlMap map(entry, {"name", "watches", "world_from_optical", "width", "height", "fovy_deg", "period_s",
                               "phase_s", "latency_s", "depth_noise_m", "depth_dropout", "reads_labels"});
     std::string name = new_name(map["name"], taken);
-    cameras.push_back(read_camera(map, places));
+    cameras.push_back(read_camera(map, places, belt));
     cameras.back().name = std::move(name);
   }
   const auto reads_belt = [](const CameraSpec& camera) { return camera.watches == "belt" && camera.reads_labels; };
@@ -204,7 +209,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.robot = read_robot(map["robot"], folder);
   world.belt = read_belt(map["belt"]);
   world.places = read_places(map["places"]);
-  world.cameras = read_cameras(map["cameras"], world.places);
+  world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   world.resources = read_resources(map["resources"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
@@ -216,6 +221,12 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
 const Place* World::place(std::string_view place_name) const {
   const auto found = std::ranges::find(places, place_name, &Place::name);
   return found == places.end() ? nullptr : &*found;
+}
+
+std::vector<std::string> World::place_names() const {
+  std::vector<std::string> names;
+  for (const Place& known : places) names.push_back(known.name);
+  return names;
 }
 
 std::vector<std::string> list(const std::filesystem::path& root) {

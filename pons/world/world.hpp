@@ -127,6 +127,7 @@ struct World {
 
   // nullptr when there is none of that name.
   [[nodiscard]] const Place* place(std::string_view place_name) const;
+  [[nodiscard]] std::vector<std::string> place_names() const;
 };
 
 // Worlds live in folders under `root`, each with a world.yaml.

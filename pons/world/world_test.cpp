@@ -225,6 +225,7 @@ TEST_F(BrokenWorld, RefusesWhatDoesNotFitTogether) {
 TEST_F(BrokenWorld, RefusesImpossiblePlaces) {
   EXPECT_THAT(changed("name: chute_2", "name: chute_1"), HasSubstr("places[1].name: 'chute_1' is there twice"));
   EXPECT_THAT(changed("name: chute_2", "name: belt"), HasSubstr("places[1].name: 'belt' is there twice"));
+  EXPECT_THAT(changed("name: chute_2", "name: home"), HasSubstr("places[1].name: 'home' is there twice"));
   EXPECT_THAT(changed("chute_2, kind: chute", "chute_2, kind: hole"),
               HasSubstr("places[1].kind: 'hole' is no kind of place; write chute"));
   EXPECT_THAT(changed("[-0.20, 0.46, 0.87]", "[-0.10, 0.46, 0.87]"),

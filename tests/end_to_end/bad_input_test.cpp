@@ -75,6 +75,9 @@ TEST_F(BadInput, AHundredMegabyteLine) {
 
 TEST_F(BadInput, NamesAndNumbers) {
   expect_refused({"run", "no_such_world"}, {"no_such_world", "parcel_cell"});
+  expect_refused({"run"}, {"parcel_cell", "small_cell"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--journal", ":memory:"}, {"--journal :memory:"});
+  expect_refused({"skills", "place", "--world", "no_such_world"}, {"no_such_world", "parcel_cell"});
   expect_refused({"run", "parcel_cell", "--parcels", "0"}, {"0"});
   expect_refused({"run", "parcel_cell", "--parcels", "1000000000"}, {"1000000000"});
   expect_refused({"run", "parcel_cell", "--parcels", "many"}, {"--parcels"});
@@ -113,22 +116,34 @@ TEST_F(BadInput, ANameThatIsTooLong) {
     expect_refused({"run", "parcel_cell", "--parcels", "1", option, folder_ / std::string(250, 'n')}, {option, "long"});
 }
 
-TEST_F(BadInput, ABeltThatLiesElsewhere) {
+TEST_F(BadInput, WorldsWhoseFilesDisagree) {
   const auto worlds = folder_ / "worlds";
   std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
-  std::string scene = read_text(worlds / "small_cell/scene.xml");
-  const std::string where = "name=\"belt\" pos=\"-0.565 0 ";
-  ASSERT_NE(scene.find(where), std::string::npos);
-  scene.replace(scene.find(where), where.size(), "name=\"belt\" pos=\"-0.565 0.3 ");
-  write_text(worlds / "small_cell/scene.xml", scene);
-  expect_refused({"run", "small_cell", "--parcels", "1"}, {"scene.xml", "belt", "y_center_m"},
-                 {"PONS_WORLDS=" + worlds.string()});
+  const auto expect_refused_with = [&](const std::string& file, const std::string& old_text,
+                                       const std::string& new_text, const std::vector<std::string>& says) {
+    const std::string text = read_text(worlds / "small_cell" / file);
+    ASSERT_NE(text.find(old_text), std::string::npos) << old_text;
+    std::string changed = text;
+    write_text(worlds / "small_cell" / file, changed.replace(text.find(old_text), old_text.size(), new_text));
+    expect_refused({"run", "small_cell", "--parcels", "1"}, says, {"PONS_WORLDS=" + worlds.string()});
+    write_text(worlds / "small_cell" / file, text);
+  };
+  expect_refused_with("scene.xml", "pos=\"-0.565 0 ", "pos=\"-0.565 0.3 ", {"scene.xml", "belt", "y_center_m"});
+  expect_refused_with("scene.xml", "surfacevel=\"0.15 0", "surfacevel=\"0 0.15", {"scene.xml", "belt", "surfacevel"});
+  expect_refused_with("world.yaml", "center: [1.03, ", "center: [1.33, ", {"scene.xml", "mouth of 'exception'"});
+  expect_refused_with("world.yaml", "resources: [arm]", "resources: [leg]", {"world.yaml", "resources", "'arm'"});
 }
 
 TEST_F(BadInput, ARefusedSocketLeavesNoJournal) {
   expect_refused(
       {"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "j.db", "--socket", folder_ / "none/s"},
       {"none/s"});
+}
+
+TEST_F(BadInput, TasksThatAreNone) {
+  expect_refused({"task", "submit", folder_.path()}, {folder_.path(), "is a folder"});
+  write_text(folder_ / "twice.json", R"({"id":"a","id":"b","steps":[]})");
+  expect_refused({"task", "submit", folder_ / "twice.json"}, {"twice.json", "id"});
 }
 
 TEST_F(BadInput, APipeIsNoPicture) {

@@ -19,9 +19,9 @@ class Interrupt : public ::testing::Test {
   // Up to ten parcels, each outcome is a line of progress; the first line comes before anything moves.
   void interrupt(int parcels, const std::string& seed, const std::string& pace, int lines, int signal = SIGINT) {
     const Finished run =
-        interrupt_pons({"run", "parcel_cell", "--parcels", std::to_string(parcels), "--seed", seed, pace, "--socket",
-                        folder_ / "pons.sock", "--journal", folder_ / "j.db", "--report", folder_ / "report.json"},
-                       lines, signal);
+        run_pons_and({"run", "parcel_cell", "--parcels", std::to_string(parcels), "--seed", seed, pace, "--socket",
+                      folder_ / "pons.sock", "--journal", folder_ / "j.db", "--report", folder_ / "report.json"},
+                     lines, [&](pid_t child) { kill(child, signal); });
     EXPECT_EQ(run.code, kExitInterrupted) << run.err;
     EXPECT_FALSE(std::filesystem::exists(folder_ / "pons.sock"));
     EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db-wal")) << "the journal was not closed";

@@ -60,7 +60,8 @@ int run_pons_unheard(const std::vector<std::string>& arguments) {
   return exit_code(child);
 }
 
-Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal) {
+Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
+                      const std::function<void(pid_t)>& meanwhile) {
   std::array<int, 2> err{};
   if (pipe2(err.data(), O_CLOEXEC) != 0) return {};
   const pid_t child = fork();
@@ -73,7 +74,7 @@ Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, in
     const auto begin = chunk.begin(), end = begin + got;
     const int before = wanted;
     wanted -= static_cast<int>(std::count(begin, end, '\n'));
-    if (before > 0 && wanted <= 0) kill(child, signal);
+    if (before > 0 && wanted <= 0) meanwhile(child);
     finished.err.append(begin, end);
   }
   close(err[0]);

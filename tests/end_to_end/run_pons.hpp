@@ -1,7 +1,9 @@
 // Runs the program as a person would, and reads what it left.
 #pragma once
 
+#include <sys/types.h>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -20,9 +22,10 @@ struct Finished {
 // Where whatever it says to a person cannot be written; the exit code.
 [[nodiscard]] int run_pons_unheard(const std::vector<std::string>& arguments);
 
-// Sends it `signal` as soon as it has written `lines` lines to the error stream, and waits for its end. `out` is left
+// Calls `meanwhile` as soon as it has written `lines` lines to the error stream, and waits for its end. `out` is left
 // empty.
-[[nodiscard]] Finished interrupt_pons(const std::vector<std::string>& arguments, int lines, int signal);
+[[nodiscard]] Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
+                                    const std::function<void(pid_t)>& meanwhile);
 
 // A folder of its own for one test, gone with it.
 class Folder {

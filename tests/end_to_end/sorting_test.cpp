@@ -2,43 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-#include <set>
-
-#include "pons/bridge/journal/journal.hpp"
+#include "tests/end_to_end/outcomes.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::tests {
 namespace {
 
 using nlohmann::json;
-
-// What no run may do, whatever happens to parcels on the way.
-void expect_accounted_for(const json& report) {
-  EXPECT_EQ(report["parcels"]["lost"], 0) << report.dump(2);
-  EXPECT_EQ(report["parcels"]["duplicated"], 0) << report.dump(2);
-}
-
-// Parcel to its last task's outcome, as the journal holds it; and the codes that were let ride, with the reason.
-std::map<std::string, std::string> outcomes(const std::filesystem::path& file) {
-  std::map<std::string, std::string> found;
-  const auto journal = bridge::Journal::open_to_read(file);
-  EXPECT_TRUE(journal) << (journal ? "" : journal.error().line());
-  if (!journal) return found;
-  const auto tasks = (*journal)->tasks();
-  EXPECT_TRUE(tasks);
-  for (const bridge::TaskRecord& record : *tasks) {
-    const std::string parcel = record.task.id.substr(0, record.task.id.find('.'));
-    found[parcel] = record.outcome ? std::string(task::name(record.outcome->outcome)) : "none";
-  }
-  const auto events = (*journal)->events("");
-  EXPECT_TRUE(events);
-  for (const bridge::Event& event : *events) {
-    if (event.kind != "ride") continue;
-    found.try_emplace(event.detail.value("code", ""), "ride: " + event.detail.value("reason", ""));
-  }
-  return found;
-}
 
 TEST(Sorting, ThirtyParcelsAreSortedOrExceptedAndAccountedFor) {
   const Folder folder;
@@ -108,24 +78,6 @@ TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   const json report = read_json(folder / "report.json");
   expect_accounted_for(report);
   EXPECT_GE(report["parcels"]["sorted"], 8) << run.out;
-}
-
-// Contact is chaotic and real time never quite repeats, so the bytes differ; what becomes of each parcel does not.
-TEST(Sorting, RealTimeAndLockstepAgreeOnEachOfThirtyParcels) {
-  const Folder folder;
-  const auto run = [&](const std::string& how) {
-    const Finished finished = run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "4", "--quiet", "--explain",
-                                        "--" + how, "--socket", folder / (how + ".sock"), "--report",
-                                        folder / (how + ".json"), "--journal", folder / (how + ".db")});
-    EXPECT_EQ(finished.code, 0) << how << "\n" << finished.out << finished.err;
-    expect_accounted_for(read_json(folder / (how + ".json")));
-    EXPECT_FALSE(std::filesystem::exists(folder / (how + ".sock")));
-    return outcomes(folder / (how + ".db"));
-  };
-  const auto lockstep = run("lockstep"), realtime = run("realtime");
-  EXPECT_EQ(lockstep, realtime);
-  EXPECT_GE(lockstep.size(), 29U);
-  EXPECT_GT(read_json(folder / "realtime.json")["loop"]["ticks"], 60'000);
 }
 
 TEST(Sorting, OneSeedGivesOneResult) {

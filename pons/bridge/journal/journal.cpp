@@ -303,6 +303,7 @@ Expected<void> Journal::commit() { return impl_->make_durable(); }
 
 Expected<TaskRecord> Journal::Impl::read_task(const Statement& row) const {
   const Json json = Json::parse(row.text(0), nullptr, false);
+  if (json.is_discarded()) return broken("a task is not JSON");
   auto task = task::task_from(json);
   if (!task) return broken(task.error().line());
   TaskRecord record{std::move(*task), row.integer(1), Time(Duration(row.integer(2))), row.integer(8) != 0,

@@ -242,6 +242,25 @@ TEST_F(JournalTest, CanBeOpenedToReadOnly) {
   EXPECT_FALSE((*reader)->event("", at(1), "odd"));
 }
 
+TEST_F(JournalTest, ReadingLeavesNothingBehindWhateverItIsCalled) {
+  const fs::path odd = folder_ / "day #1? 100%.db";
+  ASSERT_TRUE(Journal::open(odd).value()->accept(sample("a"), at(1)));
+  for (int times = 0; times < 2; ++times) {
+    const auto reader = Journal::open_to_read(odd);
+    ASSERT_TRUE(reader) << reader.error().line();
+    EXPECT_EQ((*reader)->tasks().value().size(), 1u);
+    EXPECT_EQ(std::distance(fs::directory_iterator(odd.parent_path()), fs::directory_iterator{}), 1);
+  }
+}
+
+TEST_F(JournalTest, ARecordThatIsNoJsonIsNamed) {
+  ASSERT_TRUE(open()->accept(sample("a"), at(1)));
+  execute(file_, "UPDATE task SET body='{'");
+  const auto reader = Journal::open_to_read(file_);
+  ASSERT_TRUE(reader) << reader.error().line();
+  EXPECT_NE((*reader)->tasks().error().line().find("a task is not JSON"), std::string::npos);
+}
+
 TEST_F(JournalTest, WorksInMemory) {
   const auto journal = Journal::open(":memory:");
   ASSERT_TRUE(journal) << journal.error().line();

@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <cassert>
+#include <filesystem>
 #include <utility>
 
 namespace pons::bridge {
@@ -22,7 +23,7 @@ std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
     case SQLITE_AUTH:
-      return fail("the journal cannot be opened", file, "check that the folder exists and may be written");
+      return fail("the journal cannot be opened", file, "check the permissions of file and folder");
     case SQLITE_READONLY:
       return fail("the journal cannot be written", file, "check the permissions of file and folder");
     case SQLITE_FULL:
@@ -32,6 +33,22 @@ std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
     default:
       return fail(fmt::format("the journal failed: {}", sqlite3_errmsg(database)), file, "check the disk");
   }
+}
+
+// A journal without a write-ahead log beside it is at rest. Said so, reading it needs no right to write in its folder
+// and leaves nothing there.
+std::string reading_uri(const std::string& file) {
+  std::string uri = "file:";
+  std::error_code ignored;
+  for (const char letter : std::filesystem::absolute(file, ignored).lexically_normal().string()) {
+    if (letter == '?' || letter == '#' || letter == '%') {
+      uri += fmt::format("%{:02x}", letter);
+    } else {
+      uri += letter;
+    }
+  }
+  const bool at_rest = !std::filesystem::exists(file + "-wal", ignored);
+  return uri + (at_rest ? "?immutable=1" : "?mode=ro");
 }
 
 }  // namespace
@@ -105,8 +122,11 @@ Database::~Database() { sqlite3_close(database_); }
 
 Expected<void> Database::open(const std::string& file, Mode mode) {
   file_ = file;
-  const int flags = mode == Mode::kCreate ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
-  if (sqlite3_open_v2(file.c_str(), &database_, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK) {
+  const bool create = mode == Mode::kCreate;
+  const int flags = SQLITE_OPEN_NOMUTEX |
+                    (create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+  const std::string name = create ? file : reading_uri(file);
+  if (sqlite3_open_v2(name.c_str(), &database_, flags, nullptr) != SQLITE_OK) {
     return failure(database_, file_);
   }
   return {};

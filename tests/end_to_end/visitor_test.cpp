@@ -1,0 +1,74 @@
+// What a visitor with a socket may ask of a run, and what it must not do to the run's own work.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Visitor : public ::testing::Test {
+ protected:
+  // While it sorts: the first line of progress comes as it begins.
+  void during_a_run(const std::function<void()>& visit) {
+    const Finished run = run_pons_and({"run", "small_cell", "--parcels", "8", "--seed", "3", "--lockstep", "--socket",
+                                       folder_ / "s", "--journal", folder_ / "j.db", "--report", folder_ / "r.json"},
+                                      1, [&](pid_t) { visit(); });
+    EXPECT_EQ(run.code, 0) << run.err;
+    progress_ = run.err;
+    report_ = read_json(folder_ / "r.json");
+  }
+  Finished submit(const std::string& task) {
+    write_text(folder_ / "task.json", task);
+    return run_pons({"task", "submit", folder_ / "task.json", "--socket", folder_ / "s"});
+  }
+  Finished show(const std::string& id) { return run_pons({"task", "show", id, "--journal", folder_ / "j.db"}); }
+
+  Folder folder_;
+  std::string progress_;
+  nlohmann::json report_;
+};
+
+TEST_F(Visitor, SubmitsAndReadsWhatBecameOfIt) {
+  const std::string home =
+      R"({"id":"home-1","priority":90,"steps":[{"skill":"move_to","arguments":{"place":"home"}}]})";
+  during_a_run([&] {
+    EXPECT_EQ(submit(home).out, "home-1: accepted\n");
+    EXPECT_EQ(submit(home).out, "home-1: already accepted\n");
+    EXPECT_THAT(run_pons({"task", "list", "--socket", folder_ / "s"}).out, HasSubstr("home-1"));
+  });
+  EXPECT_THAT(show("home-1").out, HasSubstr("SUCCEEDED"));
+  EXPECT_EQ(report_["parcels"]["lost"], 0);
+  EXPECT_THAT(progress_, Not(HasSubstr("9 of 8"))) << "what it asked for is no parcel";
+}
+
+TEST_F(Visitor, HearsOfANameThatIsNotThere) {
+  during_a_run([&] {
+    const Finished nowhere = submit(R"({"id":"x","steps":[{"skill":"move_to","arguments":{"place":"atlantis"}}]})");
+    EXPECT_EQ(nowhere.code, 2);
+    EXPECT_THAT(nowhere.err, HasSubstr("/steps/0/arguments/place"));
+    EXPECT_THAT(nowhere.err, HasSubstr("\"home\""));
+  });
+}
+
+// The brain asks for its parcels under their own names. One that is taken costs it a try, not the parcel.
+TEST_F(Visitor, MayTakeAnIdThatTheBrainWantedItself) {
+  during_a_run([&] {
+    for (int parcel = 1; parcel <= 8; ++parcel) {
+      const std::string id = "P00000" + std::to_string(parcel);
+      const Finished taken = submit(R"({"id":")" + id +
+                                    R"(","steps":[{"skill":"detect","arguments":{"object":"nothing","within_s":1}}]})");
+      EXPECT_TRUE(taken.code == 0 || taken.code == 2) << taken.err;  // the brain may have been there first
+    }
+  });
+  EXPECT_EQ(report_["parcels"]["lost"], 0) << report_.dump(2);
+  EXPECT_EQ(report_["parcels"]["missorted"], 0);
+  EXPECT_GE(report_["parcels"]["sorted"], 7);
+  EXPECT_THAT(show("P000008.2").out, HasSubstr("SUCCEEDED"));
+}
+
+}  // namespace
+}  // namespace pons::tests
