@@ -83,7 +83,7 @@ TEST_F(Csv, RefusesWhatIsNotUtf8) {
   EXPECT_THAT(error(std::string_view("\xFF\xFE"
                                      "a\0,\0",
                                      6)),
-              HasSubstr("not UTF-8"));
+              HasSubstr("is UTF-16"));
   EXPECT_THAT(error(std::string_view("a\0b", 3)), HasSubstr("not UTF-8"));
 }
 
