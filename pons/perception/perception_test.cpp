@@ -216,6 +216,28 @@ TEST(PerceptionTest, MeasuresATubeOnItsRidge) {
   EXPECT_GT(beliefs[0].flatness_m, 0.0022);
 }
 
+// Its label is stiff and stands off where the tube falls away: what is flat of it has a ragged outline.
+TEST(PerceptionTest, KeepsAShortTubeWhole) {
+  for (int degrees = -40; degrees <= 40; degrees += 10) {
+    Eyes eyes;
+    const double yaw_rad = degrees * kDegree, off_m = 0.04;
+    const Thing tube{.solid = Solid::kTube, .x_m = -0.9, .yaw_rad = yaw_rad, .size_m = {0.16, 0.095, 0.095}};
+    const Thing label{.x_m = tube.x_m + off_m * std::cos(yaw_rad),
+                      .y_m = off_m * std::sin(yaw_rad),
+                      .yaw_rad = yaw_rad,
+                      .size_m = {0.064, 0.064, 0.001},
+                      .colour = {235, 235, 235},
+                      .base_m = 0.095};
+    eyes.belt.things = {tube, label};
+    for (int frame = 0; frame < 8; ++frame) {
+      eyes.belt.watch(eyes.perception, 1);
+      const auto beliefs = eyes.beliefs();
+      ASSERT_EQ(beliefs.size(), 1u) << degrees;
+      EXPECT_FALSE(beliefs[0].crowded) << degrees;
+    }
+  }
+}
+
 TEST(PerceptionTest, MeasuresABagAtItsMiddle) {
   Eyes eyes;
   eyes.belt.things = {{.solid = Solid::kBag, .x_m = -0.8, .yaw_rad = 0.4, .size_m = {0.28, 0.2, 0.12}}};

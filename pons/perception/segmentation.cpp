@@ -184,12 +184,13 @@ void Segmenter::split(const TopView& view) {
     while (cuts < kMostCuts) {
       Region& region = segments_.regions[i];
       if (region.core.size() < 20) break;
-      // A curve is shaded: its colours say nothing.
+      // A curve is shaded: its colours say nothing. Its core ends where it gets steep, with a ragged outline.
+      const bool curved = fit_plane(view, region.core).curved();
       std::optional<Line> line;
-      if (!fit_plane(view, region.core).curved()) line = splitter_.by_colour(view, region.core);
+      if (!curved) line = splitter_.by_colour(view, region.core);
       const bool whole =
           !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
-      if (!line && whole) line = splitter_.by_outline(region.core);
+      if (!line && whole) line = splitter_.by_outline(curved ? region.cells : region.core);
       if (!line) break;
       ++cuts;
       cut(i, *line);
@@ -207,8 +208,8 @@ void Segmenter::split_by_labels(const TopView& view, const std::vector<LabelMark
       const int label = region_of(marks[i]);
       if (label == 0 || region_of(marks[j]) != label) continue;
       const auto index = static_cast<std::size_t>(label - 1);
-      const auto line = splitter_.between(view, segments_.regions[index].cells, marks[i].middle, marks[j].middle,
-                                          kHalfLabel_m / view.cell_m);
+      const auto line = splitter_.between(view, segments_.regions[index].cells,
+                                          {marks[i].middle, marks[j].middle, kHalfLabel_m / view.cell_m});
       if (line) cut(index, *line);
     }
   }

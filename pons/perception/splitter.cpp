@@ -21,6 +21,8 @@ constexpr double kCornerDepth = 4;   // cells
 constexpr double kGain = 0.045;
 constexpr double kLengthCost = 0.05;  // of a cut as long as the patch is wide
 constexpr double kPrintCost = 0.5;    // likewise, of one through print
+constexpr double kTold = 0.2;         // less of the variance is shade along an edge
+constexpr double kLeastGain = 0.02;   // where it is known that there are two
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
 
@@ -180,8 +182,14 @@ std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<c
   return Line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
 }
 
-std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, cv::Point2d one,
-                                      cv::Point2d other, double clear) {
+std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, const Labels& labels) {
+  if (auto line = between_colours(view, cells, labels)) return line;
+  if (auto line = between_corners(cells, labels)) return line;
+  return halfway(cells, labels);
+}
+
+std::optional<Line> Splitter::between_colours(const TopView& view, const std::vector<cv::Point>& cells,
+                                              const Labels& labels) {
   constexpr float kGreyPerMillimetre = 5;
   const double variance = take_samples(cells, [&](const cv::Point& cell) {
     const cv::Vec3b& colour = view.colour(cell);
@@ -194,12 +202,39 @@ std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv:
   for (int degrees = 0; degrees < 180; degrees += 3) {
     const double angle = degrees * std::numbers::pi / 180;
     const cv::Point2d normal(std::cos(angle), std::sin(angle));
-    const double a = normal.dot(one), b = normal.dot(other);
-    const Cut cut = best_cut(angle, 1, std::max(1.0, variance), std::min(a, b) + clear, std::max(a, b) - clear);
+    const double a = normal.dot(labels.one), b = normal.dot(labels.other);
+    const Cut cut =
+        best_cut(angle, 1, std::max(1.0, variance), std::min(a, b) + labels.clear, std::max(a, b) - labels.clear);
     if (cut.explained > best.explained) best = cut;
   }
-  if (best.explained <= 0) return std::nullopt;
+  if (best.explained < kTold) return std::nullopt;
   return Line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
+}
+
+std::optional<Line> Splitter::between_corners(const std::vector<cv::Point>& cells, const Labels& labels) {
+  const std::vector<cv::Point> contour = outline(cells);
+  if (contour.size() < 20) return std::nullopt;
+  std::optional<Line> best;
+  double best_fill = rectangle_fill(cells) + kLeastGain;
+  std::vector<cv::Point> near, far;
+  for (const Line& line : candidates(contour)) {
+    const double a = line.normal.dot(labels.one) - line.offset, b = line.normal.dot(labels.other) - line.offset;
+    if (a * b > 0 || std::min(std::abs(a), std::abs(b)) < labels.clear) continue;
+    near.clear(), far.clear();
+    for (const cv::Point& point : contour) (line.beyond(point) ? far : near).push_back(point);
+    const double fill = static_cast<double>(cells.size()) / (rectangle_area(near) + rectangle_area(far));
+    if (fill > best_fill) best_fill = fill, best = line;
+  }
+  return best;
+}
+
+// Square to the patch.
+std::optional<Line> Splitter::halfway(const std::vector<cv::Point>& cells, const Labels& labels) {
+  const double angle = cv::minAreaRect(cells).angle * std::numbers::pi / 180;
+  const cv::Point2d along(std::cos(angle), std::sin(angle)), across(-along.y, along.x), way = labels.other - labels.one;
+  const cv::Point2d normal = std::abs(along.dot(way)) > std::abs(across.dot(way)) ? along : across;
+  if (std::abs(normal.dot(way)) < 2 * labels.clear) return std::nullopt;
+  return Line{normal, normal.dot(labels.one + labels.other) / 2};
 }
 
 std::optional<Line> Splitter::by_outline(const std::vector<cv::Point>& cells) const {

@@ -25,10 +25,15 @@ class Splitter {
 
   // A line between two plain colours with a sharp edge. Maximises the variance between both sides (Otsu 1979).
   [[nodiscard]] std::optional<Line> by_colour(const TopView& view, const std::vector<cv::Point>& cells);
-  // The line between the middles of two labels (in cells, each `clear` cells from the line at least) that tells colour
-  // and height of the two sides apart best.
-  [[nodiscard]] std::optional<Line> between(const TopView& view, const std::vector<cv::Point>& cells, cv::Point2d one,
-                                            cv::Point2d other, double clear);
+  // The middles of two labels, in cells; no line between them comes nearer to either than `clear` cells.
+  struct Labels {
+    cv::Point2d one, other;
+    double clear = 0;
+  };
+  // The line between two labels that tells colour and height of the two sides apart; where they are alike, one through
+  // an inward corner that leaves better rectangles; where there is none, the one halfway.
+  [[nodiscard]] std::optional<Line> between(const TopView& view, const std::vector<cv::Point>& cells,
+                                            const Labels& labels);
   // A line through an inward corner of the outline that leaves two better rectangles and cuts no print; the shortest of
   // nearly equal ones.
   [[nodiscard]] std::optional<Line> by_outline(const std::vector<cv::Point>& cells) const;
@@ -49,6 +54,10 @@ class Splitter {
   [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance, double from = -1e9,
                              double to = 1e9) const;
   [[nodiscard]] bool sharp(const Cut& cut) const;
+  [[nodiscard]] std::optional<Line> between_colours(const TopView& view, const std::vector<cv::Point>& cells,
+                                                    const Labels& labels);
+  [[nodiscard]] static std::optional<Line> between_corners(const std::vector<cv::Point>& cells, const Labels& labels);
+  [[nodiscard]] static std::optional<Line> halfway(const std::vector<cv::Point>& cells, const Labels& labels);
 
   cv::Mat1b texture_, grey_, brightest_, darkest_;
   std::vector<Sample> samples_;

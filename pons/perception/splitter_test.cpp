@@ -70,6 +70,32 @@ TEST(SplitterTest, CutsAnAngleIntoItsTwoRectangles) {
   EXPECT_NE(line->beyond({145, 55}), line->beyond({55, 145}));
 }
 
+// Lit from one side, a box is brighter along one edge: no reason to cut along it.
+TEST(SplitterTest, CutsBetweenTheLabelsOfTwoAlikeWhereTheirCornersAre) {
+  Patch patch;
+  patch.fill({50, 50, 100, 50}, {150, 120, 90});
+  patch.fill({150, 55, 60, 50}, {150, 120, 90});
+  for (int column = 50; column < 150; ++column) patch.view.colour(51, column) = {190, 160, 120};
+  Splitter splitter;
+  splitter.prepare(patch.view);
+  const auto line = splitter.between(patch.view, patch.cells, {{70, 64}, {195, 90}, 10});
+  ASSERT_TRUE(line);
+  EXPECT_NE(line->beyond({145, 75}), line->beyond({155, 75}));
+  EXPECT_EQ(line->beyond({52, 52}), line->beyond({145, 97}));
+}
+
+TEST(SplitterTest, CutsFlushOnesHalfwayBetweenTheirLabels) {
+  Patch patch;
+  patch.fill({50, 50, 100, 50}, {150, 120, 90});
+  Splitter splitter;
+  splitter.prepare(patch.view);
+  const auto line = splitter.between(patch.view, patch.cells, {{70, 70}, {130, 80}, 10});
+  ASSERT_TRUE(line);
+  EXPECT_NE(line->beyond({97, 52}), line->beyond({103, 52}));
+  EXPECT_NE(line->beyond({97, 97}), line->beyond({103, 97}));
+  EXPECT_FALSE(splitter.between(patch.view, patch.cells, {{95, 70}, {105, 70}, 10})) << "too near to one another";
+}
+
 TEST(SplitterTest, LeavesRectanglesAndEllipsesWhole) {
   Patch rectangle;
   rectangle.fill({50, 50, 100, 40}, {150, 120, 90});
