@@ -71,18 +71,20 @@ double top_z(const ObjectBelief& object, double x, double y, Time time, double g
 
 struct Neighbour {
   const ObjectBelief* object;
-  bool beside;  // tool or load begins lower than its top, close to it: it must not sink, and may leave
+  // The points of tool or load that begin over it, by what is believed, and lower than they may: such a one may leave
+  // as low as it is. No other swings in below its top.
+  std::vector<bool> too_low;
 };
 
 std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const Pose& world_from_tip, Time time,
                                      std::span<const ObjectBelief> objects) {
   std::vector<Neighbour> neighbours;
   for (const ObjectBelief& object : objects) {
-    const bool beside = std::any_of(points.begin(), points.end(), [&](const Vector3& point) {
+    Neighbour& neighbour = neighbours.emplace_back(&object);
+    for (const Vector3& point : points) {
       const Vector3 low = world_from_tip * point;
-      return low.z() < top_z(object, low.x(), low.y(), time, kObjectGrow_m) + kObjectMargin_m;
-    });
-    neighbours.push_back({&object, beside});
+      neighbour.too_low.push_back(low.z() < top_z(object, low.x(), low.y(), time, kEndGrow_m) + kObjectMargin_m);
+    }
   }
   return neighbours;
 }
@@ -147,13 +149,13 @@ double Router::worst_clearance(const Positions& at, Time begin, Time end, double
     const Pose world_from_tip = model_.world_from_tip(q);
     const bool leaving = close(world_from_tip, first), arriving = close(world_from_tip, last);
     const double grow_m = leaving || arriving ? kEndGrow_m : kObjectGrow_m;
-    for (const Vector3& point : points) {
-      const Vector3 low = world_from_tip * point;
-      const double as_it_was = leaving ? (first * point).z() - kSink_m : std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vector3 low = world_from_tip * points[i];
+      const double as_it_was = leaving ? (first * points[i]).z() - kSink_m : std::numeric_limits<double>::infinity();
       double floor = std::min(as_it_was, floor_z(low.x(), low.y(), time, begin, arriving ? 0 : kBeltMargin_m));
       for (const Neighbour& other : neighbours) {
         const double top = top_z(*other.object, low.x(), low.y(), time, grow_m) + kObjectMargin_m;
-        floor = std::max(floor, other.beside ? std::min(as_it_was, top) : top);
+        floor = std::max(floor, other.too_low[i] ? std::min(as_it_was, top) : top);
       }
       worst = std::min(worst, low.z() - floor);
     }

@@ -183,6 +183,24 @@ TEST_F(RouteTest, AWayIsFoundOverTheHighEdgeOfWhatLeansSteeply) {
   EXPECT_GT(rise_over(*way, steep), 0.01);
 }
 
+// Lifted out from beside something tall, a load goes up before its corners swing.
+TEST_F(RouteTest, ALoadDoesNotTurnIntoWhatStandsBesideIt) {
+  const Load load{.size_m = {0.3, 0.12, 0.13}};
+  const ObjectBelief tall = parcel(0.0, {0.3, 0.12, 0.2});  // a centimetre beside it
+  const auto clear = [&](const AxisVector& from, double turn_rad, double rise_m) {
+    const Vector3 tip = model_.world_from_tip(from).translation();
+    AxisVector to = over(tip.x(), tip.y(), tip.z() + rise_m);
+    to[5] += turn_rad;
+    const auto way = motion::move(rest(from), kBegin, halt(to), limits_);
+    EXPECT_TRUE(way);
+    return way && router_.clear(*way, kBegin, way->back().end(), &load, std::array{tall});
+  };
+  const AxisVector low = over(0, 0.13, 1.05);
+  EXPECT_TRUE(clear(low, 0, 0.2)) << "straight up";
+  EXPECT_FALSE(clear(low, 0.6, 0));
+  EXPECT_TRUE(clear(over(0, 0.13, 1.27), 0.6, 0)) << "above it";
+}
+
 // What comes along the belt where no camera has shown it yet may be as high as any parcel.
 TEST_F(RouteTest, UpstreamOfWhatTheCamerasSeeALoadStaysHighOverTheBelt) {
   const Load load{.size_m = {0.4, 0.15, 0.1}};
@@ -269,7 +287,7 @@ TEST_F(RouteTest, ALargeLoadReachesTheBelt) {
 // Lifted no higher than it has to be, it lingers while the next one comes along; what stood close to it may stay so.
 TEST_F(RouteTest, WhatComesAlongDoesNotRideIntoALoad) {
   const Load load{.size_m = {0.34, 0.32, 0.15}};
-  const AxisVector from = over(0.2, 0, 1.15), to = over(0.16, -0.03, 1.15);
+  const AxisVector from = over(0.2, 0, 1.15), to = over(0.24, 0.03, 1.15);
   AxisLimits slow = limits_;
   slow.speed_rad_s *= 0.02;
   const auto way = motion::move(rest(from), kBegin, halt(to), slow);
