@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace pons::perception {
 namespace {
@@ -222,7 +223,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<
                       double travel_m) {
   track.last_seen = stamp;
   track.missing = 0;
-  track.crowded = sighting.crowded || sighting.covered;
+  const bool was_crowded = std::exchange(track.crowded, sighting.crowded || sighting.covered);
   track.covered = sighting.covered;
   track.whole = sighting.complete;
   ++track.frames_seen;
@@ -262,6 +263,8 @@ void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<
     return;
   }
   track.odd_sizes = 0;
+  // A cut between neighbours is not quite where one of them ends: alone, it is measured afresh.
+  if (was_crowded && !track.crowded) track.observations.clear();
   track.observations.push_back(o);
   if (track.observations.size() > kMemory) track.observations.pop_front();
   if (track.observations.size() >= 3) track.restarts = 0;

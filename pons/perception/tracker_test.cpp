@@ -87,6 +87,17 @@ TEST(TrackerTest, CutsThatAllDifferChangeNothing) {
   }
 }
 
+TEST(TrackerTest, WhatStandsAloneAtLastIsMeasuredAfresh) {
+  Bench bench;
+  Sighting cut = Bench::sighting(-0.5, 0, 0, {0.208, 0.15, 0.1});
+  cut.crowded = true;
+  for (int i = 0; i < 12; ++i) bench.update({cut});
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.208, 1e-9);
+  for (int i = 0; i < 2; ++i) bench.update({Bench::sighting(-0.504, 0)});
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.2, 1e-9);
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).world_from_top.translation().x(), -0.504, 1e-9);
+}
+
 // As a load carried over it hides more and more of it, and then less.
 TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   Bench bench;
