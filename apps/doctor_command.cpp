@@ -1,6 +1,7 @@
 // pons doctor: tries what a run needs, instead of asking whether it is there.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <pthread.h>
 #include <sys/mman.h>
 
@@ -8,6 +9,7 @@
 #include "apps/paths.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/sim/simulation.hpp"
+#include "pons/skills/cell.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
 
@@ -44,11 +46,31 @@ Finding try_locked_memory() {
   return say(Finding::kDegraded, "locked memory", "refused: sudo setcap cap_sys_nice,cap_ipc_lock+ep $(which pons)");
 }
 
+// Where the tool must get: over each mouth, and to the belt at both ends of the pick zone. Empty, or what it does not
+// reach.
+std::string out_of_reach(const world::World& world, model::RobotModel& model) {
+  constexpr double kOverMouth_m = 0.15, kOverBelt_m = 0.02;
+  std::vector<std::pair<std::string, Vector3>> points;
+  for (const world::Place& place : world.places) {
+    if (place.kind == world::PlaceKind::kChute)
+      points.emplace_back(place.name, place.center_m + Vector3(0, 0, kOverMouth_m));
+  }
+  const world::Belt& belt = world.belt;
+  for (const double x : {belt.pick_x_min_m, belt.pick_x_max_m})
+    points.emplace_back(fmt::format("the belt at x = {} m", x),
+                        Vector3(x, belt.y_center_m, belt.surface_z_m + kOverBelt_m));
+  std::vector<std::string> names;
+  for (const auto& [name, point] : points)
+    if (!model.inverse(skills::Cell::tip_down(point, 0), world.robot.home)) names.push_back(name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 Finding try_world(const std::string& name) {
   const std::string what = "world " + name;
   const auto world = world::load(worlds_folder(), name);
   if (!world) return say(Finding::kBad, what, world.error().line());
-  if (auto model = model::RobotModel::load(world->robot); !model) return say(Finding::kBad, what, model.error().line());
+  auto model = model::RobotModel::load(world->robot);
+  if (!model) return say(Finding::kBad, what, model.error().line());
   const auto manifest = world::draw_manifest(*world, 1, 1);
   if (!manifest) return say(Finding::kBad, what, manifest.error().line());
   const auto simulation = sim::Simulation::create(*world, *manifest, 1);
@@ -58,7 +80,10 @@ Finding try_world(const std::string& name) {
     camera->begin(Time{});
     if (auto taken = camera->finish(frame); !taken) return say(Finding::kBad, what, taken.error().line());
   }
-  return say(Finding::kGood, what, fmt::format("composes, and its {} cameras render", world->cameras.size()));
+  if (const std::string far = out_of_reach(*world, *model); !far.empty())
+    return say(Finding::kBad, what, fmt::format("the tool does not reach {}; move it, or the robot", far));
+  return say(Finding::kGood, what,
+             fmt::format("composes, the arm reaches, and {} cameras render", world->cameras.size()));
 }
 
 int doctor() {

@@ -55,11 +55,19 @@ TEST(Sorting, APlaceOutOfReachStopsNothing) {
   const Folder folder;
   const auto worlds = folder / "worlds";
   std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
-  std::string text = read_text(worlds / "small_cell/world.yaml");
-  const std::string near = "{name: east, kind: chute, center: [0.40,";
-  ASSERT_NE(text.find(near), std::string::npos);
-  text.replace(text.find(near), near.size(), "{name: east, kind: chute, center: [5.40,");
-  write_text(worlds / "small_cell/world.yaml", text);
+  // The chute named east, two metres farther from the arm in both of its files.
+  const auto move = [&](const std::string& file, const std::string& near, const std::string& far) {
+    std::string text = read_text(worlds / "small_cell" / file);
+    ASSERT_NE(text.find(near), std::string::npos) << near;
+    for (auto at = text.find(near); at != std::string::npos; at = text.find(near)) text.replace(at, near.size(), far);
+    write_text(worlds / "small_cell" / file, text);
+  };
+  move("world.yaml", "center: [0.40, -0.82,", "center: [0.40, -2.82,");
+  move("scene.xml", " -0.82 0.", " -2.82 0.");
+  move("scene.xml", "0.4 -1.015 ", "0.4 -3.015 ");
+  move("scene.xml", "0.4 -0.625 ", "0.4 -2.625 ");
+  const Finished doctor = run_pons({"doctor"}, {"PONS_WORLDS=" + worlds.string()});
+  EXPECT_NE(doctor.out.find("the tool does not reach east"), std::string::npos) << doctor.out;
   const Finished run =
       run_pons({"run", "small_cell", "--parcels", "3", "--quiet", "--explain", "--report", folder / "report.json"},
                {"PONS_WORLDS=" + worlds.string()});
