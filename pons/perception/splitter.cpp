@@ -26,12 +26,19 @@ constexpr double kLeastGain = 0.02;   // where it is known that there are two
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
 
-double rectangle_area(const std::vector<cv::Point>& points) {
-  if (points.size() < 3) return 1;
+cv::Size2d rectangle_size(const std::vector<cv::Point>& points) {
+  if (points.size() < 3) return {1, 1};
   std::vector<cv::Point> hull;
   cv::convexHull(points, hull);
-  const cv::RotatedRect rectangle = cv::minAreaRect(hull);
-  return (static_cast<double>(rectangle.size.width) + 1) * (static_cast<double>(rectangle.size.height) + 1);
+  const cv::Size2f size = cv::minAreaRect(hull).size;
+  return {static_cast<double>(size.width) + 1, static_cast<double>(size.height) + 1};
+}
+
+double rectangle_area(const std::vector<cv::Point>& points) { return rectangle_size(points).area(); }
+
+double narrow_side(const std::vector<cv::Point>& points) {
+  const cv::Size2d size = rectangle_size(points);
+  return std::min(size.width, size.height);
 }
 
 std::vector<cv::Point> outline(const std::vector<cv::Point>& cells) {
@@ -237,7 +244,7 @@ std::optional<Line> Splitter::halfway(const std::vector<cv::Point>& cells, const
   return Line{normal, normal.dot(labels.one + labels.other) / 2};
 }
 
-std::optional<Line> Splitter::by_outline(const std::vector<cv::Point>& cells) const {
+std::optional<Line> Splitter::by_outline(const std::vector<cv::Point>& cells, double narrowest) const {
   if (cells.size() < 300) return std::nullopt;
   const std::vector<cv::Point> contour = outline(cells);
   if (contour.size() < 20) return std::nullopt;
@@ -266,6 +273,7 @@ std::optional<Line> Splitter::by_outline(const std::vector<cv::Point>& cells) co
     const double fill_near = count_near / rectangle_area(near), fill_far = count_far / rectangle_area(far);
     const double fill = total / (rectangle_area(near) + rectangle_area(far));
     if (fill < whole + kGain || std::max(fill_near, fill_far) < 0.9 || std::min(fill_near, fill_far) < whole) continue;
+    if (std::min(narrow_side(near), narrow_side(far)) < narrowest) continue;
     const double score = fill - kLengthCost * length / std::sqrt(total) - kPrintCost * print / std::sqrt(total);
     if (score > best_score) best_score = score, best = line;
   }

@@ -34,9 +34,9 @@ class Splitter {
   // an inward corner that leaves better rectangles; where there is none, the one halfway.
   [[nodiscard]] std::optional<Line> between(const TopView& view, const std::vector<cv::Point>& cells,
                                             const Labels& labels);
-  // A line through an inward corner of the outline that leaves two better rectangles and cuts no print; the shortest of
-  // nearly equal ones.
-  [[nodiscard]] std::optional<Line> by_outline(const std::vector<cv::Point>& cells) const;
+  // A line through an inward corner of the outline that leaves two better rectangles, none of them narrower than
+  // `narrowest` cells, and cuts no print; the shortest of nearly equal ones.
+  [[nodiscard]] std::optional<Line> by_outline(const std::vector<cv::Point>& cells, double narrowest = 0) const;
 
  private:
   struct Sample {

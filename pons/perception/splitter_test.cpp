@@ -68,6 +68,8 @@ TEST(SplitterTest, CutsAnAngleIntoItsTwoRectangles) {
   const auto line = splitter.by_outline(patch.cells);
   ASSERT_TRUE(line);
   EXPECT_NE(line->beyond({145, 55}), line->beyond({55, 145}));
+  EXPECT_TRUE(splitter.by_outline(patch.cells, 35));
+  EXPECT_FALSE(splitter.by_outline(patch.cells, 45));
 }
 
 // Lit from one side, a box is brighter along one edge: no reason to cut along it.

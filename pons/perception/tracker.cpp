@@ -21,6 +21,7 @@ constexpr std::size_t kMemory = 16;  // observations averaged
 constexpr std::size_t kMotionMemory = 4;
 constexpr double kMoved_m = 0.009;  // over the motion memory: more than noise
 constexpr int kDoubts = 4;
+constexpr int kPieces = 3;           // frames in a row that show them until what was whole is two
 constexpr int kReads = 2;            // of one code until it is sure
 constexpr int kEnoughAttempts = 10;  // whose label shows none of them will show none
 constexpr double kDoubtful = 0.3;    // confidence of what is partly hidden
@@ -208,19 +209,34 @@ void Tracker::restart(Track& track, const Observation& observation, bool pushed)
   if (pushed) ++track.restarts;
 }
 
-// Where the track should be, another lies beside this sighting: what was taken for one is two.
-bool Tracker::parted(const Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
-                     double travel_m) {
-  const Sighting whole = expected(track, stamp, travel_m);
-  return std::ranges::any_of(sightings, [&](const Sighting& other) {
-    const Vector3 middle = other.world_from_top.translation();
-    return &other != &sighting && std::abs(middle.z() - track.estimate.z_m) < kAsHigh_m &&
-           whole.covers(middle.x(), middle.y(), 0);
+// Whether a sighting lies where the track should be.
+bool Tracker::lies_in(const Track& track, const Sighting& sighting, Time stamp, double travel_m) {
+  const Vector3 middle = sighting.world_from_top.translation();
+  return std::abs(middle.z() - track.estimate.z_m) < kAsHigh_m &&
+         expected(track, stamp, travel_m).covers(middle.x(), middle.y(), 0);
+}
+
+// Where a track should be lies something that is not it: what was taken for one may be two, or a shadow or the arm cuts
+// it in two for a moment.
+void Tracker::count_parted(const std::vector<Sighting>& sightings, const std::vector<int>& track_of, Time stamp,
+                           double travel_m) {
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    bool parted = false;
+    for (std::size_t s = 0; s < sightings.size() && !parted; ++s)
+      parted = track_of[s] != static_cast<int>(t) && lies_in(tracks_[t], sightings[s], stamp, travel_m);
+    tracks_[t].parted = parted ? tracks_[t].parted + 1 : 0;
+  }
+}
+
+// Of one that has been seen whole for long.
+bool Tracker::perhaps_a_piece(const Sighting& sighting, Time stamp, double travel_m) const {
+  return std::ranges::any_of(tracks_, [&](const Track& track) {
+    return !track.forgotten && track.well_known() && track.parted < kPieces &&
+           lies_in(track, sighting, stamp, travel_m);
   });
 }
 
-void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
-                      double travel_m) {
+void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
   track.last_seen = stamp;
   track.missing = 0;
   const bool was_crowded = std::exchange(track.crowded, sighting.crowded || sighting.covered);
@@ -242,14 +258,14 @@ void Tracker::take_in(Track& track, const Sighting& sighting, const std::vector<
   const bool resized = size_difference(o.size_m, track.estimate.size_m) > 0.02;
   const bool now_whole = was_doubtful && !o.doubtful;
   // Once may be a bad cut between neighbours; a shorter one in the same place, something that hangs over it.
-  const bool hidden =
-      within(expected(track, stamp, travel_m), sighting) && !parted(track, sighting, sightings, stamp, travel_m);
+  const bool hidden = track.parted == 0 && within(expected(track, stamp, travel_m), sighting);
+  const int enough = hidden ? kDoubts : (track.parted > 0 && track.well_known() ? kPieces : 2);
   if (hidden != track.odd_hidden) track.odd_sizes = 0;
   track.odd_hidden = hidden;
   // Cuts that differ from one another say nothing.
   if (resized && size_difference(o.size_m, track.odd_size_m) > kOtherSize_m) track.odd_sizes = 0;
   if (resized) track.odd_size_m = o.size_m;
-  if (resized && !now_whole && ++track.odd_sizes < (hidden ? kDoubts : 2)) return;
+  if (resized && !now_whole && ++track.odd_sizes < enough) return;
   track.last = sighting;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
     // Another object lies here now, on this one or in its place: whose label it was is no longer known.
@@ -306,6 +322,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
 
   std::vector<int> track_of = associate(sightings, stamp, belt_travel_m);
   rescue(sightings, stamp, belt_travel_m, track_of);
+  count_parted(sightings, track_of, stamp, belt_travel_m);
   std::vector<bool> seen(tracks_.size(), false), known(sightings.size(), false);
   std::vector<std::uint32_t> ids(sightings.size(), 0);
   for (std::size_t s = 0; s < sightings.size(); ++s) {
@@ -314,7 +331,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
     seen[t] = true;
     known[s] = usable(sightings[s]) && sightings[s].complete;
     if (tracks_[t].forgotten) continue;
-    take_in(tracks_[t], sightings[s], sightings, stamp, belt_travel_m);
+    take_in(tracks_[t], sightings[s], stamp, belt_travel_m);
     ids[s] = tracks_[t].id;
   }
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
@@ -323,7 +340,7 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
   }
   std::erase_if(tracks_, [](const Track& track) { return track.missing >= (track.frames_seen < 3 ? 2 : 3); });
   for (std::size_t s = 0; s < sightings.size(); ++s) {
-    if (track_of[s] >= 0 || !usable(sightings[s])) continue;
+    if (track_of[s] >= 0 || !usable(sightings[s]) || perhaps_a_piece(sightings[s], stamp, belt_travel_m)) continue;
     if (std::abs(sightings[s].world_from_top.translation().y() - belt_.y_center_m) > 0.5 * belt_.width_m) continue;
     Track track;
     track.id = next_id_++;

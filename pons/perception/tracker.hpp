@@ -58,12 +58,15 @@ class Tracker {
     Estimate estimate;
     Sighting last;  // the last one that counted
     int frames_seen = 0, missing = 0, odd_sizes = 0, restarts = 0, doubts = 0;
+    int parted = 0;  // frames in a row in which more than one thing lay where it should be
     Time last_seen;
     Vector3 odd_size_m = Vector3::Zero();
     bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
     std::string code, other_code;
     int reads = 0, other_reads = 0, label_attempts = 0;
+    // Seen whole for a while: a bad cut does not come this often.
+    [[nodiscard]] bool well_known() const { return observations.size() >= 4 && !observations.back().doubtful; }
     bool forgotten = false;  // only kept to swallow frames from before it was taken
     Time forgotten_until;
   };
@@ -78,10 +81,11 @@ class Tracker {
   [[nodiscard]] double cost(const Track& track, const Sighting& sighting, Time stamp, double travel_m) const;
   std::vector<int> associate(const std::vector<Sighting>& sightings, Time stamp, double travel_m) const;
   void rescue(const std::vector<Sighting>& sightings, Time stamp, double travel_m, std::vector<int>& track_of) const;
-  [[nodiscard]] static bool parted(const Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings,
-                                   Time stamp, double travel_m);
-  void take_in(Track& track, const Sighting& sighting, const std::vector<Sighting>& sightings, Time stamp,
-               double travel_m);
+  [[nodiscard]] static bool lies_in(const Track& track, const Sighting& sighting, Time stamp, double travel_m);
+  void count_parted(const std::vector<Sighting>& sightings, const std::vector<int>& track_of, Time stamp,
+                    double travel_m);
+  [[nodiscard]] bool perhaps_a_piece(const Sighting& sighting, Time stamp, double travel_m) const;
+  void take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m);
   void restart(Track& track, const Observation& observation, bool pushed);
   [[nodiscard]] bool visibly_gone(const Track& track, const TopView& view, const Segments& segments,
                                   const std::vector<bool>& known, Time stamp, double travel_m) const;

@@ -74,6 +74,23 @@ TEST(TrackerTest, OneBadCutChangesNothingTwoDo) {
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1u);
 }
 
+// A shadow, or a load that is carried over it.
+TEST(TrackerTest, OneThatComesApartForAMomentStaysOne) {
+  Bench bench;
+  const std::vector<Sighting> pieces{Bench::sighting(-0.53, 0, 0, {0.14, 0.15, 0.1}),
+                                     Bench::sighting(-0.43, 0, 0, {0.06, 0.15, 0.1})};
+  for (int i = 0; i < 5; ++i) bench.update({Bench::sighting(-0.5, 0)});
+  for (int times = 0; times < 3; ++times) {
+    for (int i = 0; i < 2; ++i) bench.update(pieces);
+    ASSERT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1u);
+    EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.2, 1e-9);
+    bench.update({Bench::sighting(-0.5, 0)});
+  }
+  for (int i = 0; i < 3; ++i) bench.update(pieces);
+  ASSERT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 2u) << "it was two all the time";
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.14, 1e-9);
+}
+
 TEST(TrackerTest, CutsThatAllDifferChangeNothing) {
   Bench bench;
   std::uint32_t id = 0;

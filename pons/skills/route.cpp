@@ -71,19 +71,19 @@ double top_z(const ObjectBelief& object, double x, double y, Time time, double g
 
 struct Neighbour {
   const ObjectBelief* object;
-  // The points of tool or load that begin over it, by what is believed, and lower than they may: such a one may leave
-  // as low as it is. No other swings in below its top.
+  // The points of tool or load that begin over it or close, and lower than they may: such a one may leave as low as it
+  // is. No other swings in below its top.
   std::vector<bool> too_low;
 };
 
 std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const Pose& world_from_tip, Time time,
-                                     std::span<const ObjectBelief> objects) {
+                                     double close_m, std::span<const ObjectBelief> objects) {
   std::vector<Neighbour> neighbours;
   for (const ObjectBelief& object : objects) {
     Neighbour& neighbour = neighbours.emplace_back(&object);
     for (const Vector3& point : points) {
       const Vector3 low = world_from_tip * point;
-      neighbour.too_low.push_back(low.z() < top_z(object, low.x(), low.y(), time, kEndGrow_m) + kObjectMargin_m);
+      neighbour.too_low.push_back(low.z() < top_z(object, low.x(), low.y(), time, close_m) + kObjectMargin_m);
     }
   }
   return neighbours;
@@ -134,15 +134,15 @@ double Router::floor_z(double x, double y, Time time, Time begin, double belt_ma
 }
 
 // The smallest height over what stands below, all the time; positive is clear. At the end the tool goes `further_m`
-// down.
-double Router::worst_clearance(const Positions& at, Time begin, Time end, double further_m, const Load* load,
-                               std::span<const ObjectBelief> obstacles) {
+// down. What begins within `close_m` of a neighbour may leave beside it.
+double Router::worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
+                               const Load* load, std::span<const ObjectBelief> obstacles) {
   const Pose first = model_.world_from_tip(at(begin)), last = model_.world_from_tip(at(end));
   const auto close = [](const Pose& a, const Pose& b) {
     return (a.translation() - b.translation()).head<2>().norm() < kEndRadius_m;
   };
   const std::vector<Vector3> points = probes(load);
-  const std::vector<Neighbour> neighbours = neighbours_of(points, first, begin, obstacles);
+  const std::vector<Neighbour> neighbours = neighbours_of(points, first, begin, close_m, obstacles);
   double worst = std::numeric_limits<double>::infinity();
   for (Time time = begin; time < end; time += kCheckEvery) {
     const AxisVector q = at(time);
@@ -206,22 +206,22 @@ double Router::own_clearance(const AxisVector& q, const Pose& world_from_tip, co
   return worst;
 }
 
-double Router::worst_clearance(const motion::Trajectory& way, Time from, Time until, const Load* load,
+double Router::worst_clearance(const motion::Trajectory& way, Time from, Time until, double close_m, const Load* load,
                                std::span<const ObjectBelief> obstacles) {
   const AxisState end = motion::sample(way, until, model_.axes());
   const auto at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
   const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
-  return worst_clearance(at, from, until, further_m, load, obstacles);
+  return worst_clearance(at, from, until, further_m, close_m, load, obstacles);
 }
 
 bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
                    std::span<const ObjectBelief> obstacles) {
-  return worst_clearance(way, from, until, load, obstacles) >= 0;
+  return worst_clearance(way, from, until, kEndGrow_m, load, obstacles) >= 0;
 }
 
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
                       std::span<const ObjectBelief> obstacles) {
-  return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, load, obstacles) >= 0;
+  return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, kEndGrow_m, load, obstacles) >= 0;
 }
 
 Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
@@ -232,12 +232,21 @@ Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
 
 Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
                                            const Load* load, std::span<const ObjectBelief> obstacles,
-                                           const AxisLimits& wanted) {
+                                           const AxisLimits& limits) {
+  auto way = route(start, at, end, load, obstacles, limits, kEndGrow_m);
+  // Packed in as it is, it leaves as it can: to stay would be worse.
+  if (!way) way = route(start, at, end, load, obstacles, limits, kObjectGrow_m);
+  return way;
+}
+
+Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
+                                           const Load* load, std::span<const ObjectBelief> obstacles,
+                                           const AxisLimits& wanted, double close_m) {
   const AxisLimits limits = covering(wanted, start);
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
   const auto clearance_of = [&](const motion::Trajectory& way) {
-    return worst_clearance(way, way.front().start, way.back().end(), load, obstacles);
+    return worst_clearance(way, way.front().start, way.back().end(), close_m, load, obstacles);
   };
   const double clearance = clearance_of(*direct);
   if (clearance >= 0) return direct;

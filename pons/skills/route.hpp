@@ -46,10 +46,13 @@ class Router {
  private:
   [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const;
   using Positions = std::function<AxisVector(Time)>;
-  [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, const Load* load,
-                                       std::span<const ObjectBelief> obstacles);
-  [[nodiscard]] double worst_clearance(const motion::Trajectory& way, Time from, Time until, const Load* load,
-                                       std::span<const ObjectBelief> obstacles);
+  [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
+                                                   const Load* load, std::span<const ObjectBelief> obstacles,
+                                                   const AxisLimits& wanted, double close_m);
+  [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
+                                       const Load* load, std::span<const ObjectBelief> obstacles);
+  [[nodiscard]] double worst_clearance(const motion::Trajectory& way, Time from, Time until, double close_m,
+                                       const Load* load, std::span<const ObjectBelief> obstacles);
   [[nodiscard]] double wrist_clearance(const AxisVector& q, const ObjectBelief& object, Time time, double grow_m);
   [[nodiscard]] double own_clearance(const AxisVector& q, const Pose& world_from_tip, const Load& load);
   [[nodiscard]] Expected<AxisVector> raised(const AxisVector& q, double tip_z);
