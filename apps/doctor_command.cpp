@@ -4,6 +4,9 @@
 #include <fmt/ranges.h>
 #include <pthread.h>
 #include <sys/mman.h>
+#include <algorithm>
+#include <array>
+#include <numbers>
 
 #include "apps/commands.hpp"
 #include "apps/paths.hpp"
@@ -60,8 +63,12 @@ std::string out_of_reach(const world::World& world, model::RobotModel& model) {
     points.emplace_back(fmt::format("the belt at x = {} m", x),
                         Vector3(x, belt.y_center_m, belt.surface_z_m + kOverBelt_m));
   std::vector<std::string> names;
-  for (const auto& [name, point] : points)
-    if (!model.inverse(skills::Cell::tip_down(point, 0), world.robot.home)) names.push_back(name);
+  for (const auto& [name, point] : points) {
+    const bool reached = std::ranges::any_of(std::array{0.0, 0.5, 1.0, 1.5}, [&](double half_turns) {
+      return model.inverse(skills::Cell::tip_down(point, half_turns * std::numbers::pi), world.robot.home).has_value();
+    });
+    if (!reached) names.push_back(name);
+  }
   return fmt::format("{}", fmt::join(names, ", "));
 }
 

@@ -57,6 +57,7 @@ bool Dispatcher::heard(std::string_view id, task::Outcome outcome) {
   const auto asked = asked_.find(id);
   if (asked == asked_.end()) return false;
   Known& known = known_.find(asked->second)->second;
+  asked_.erase(asked);  // one outcome each: a refused id is somebody else's, and so is what becomes of it
   known.asked = false;
   known.sorted = outcome == task::Outcome::kSucceeded;
   known.failed = outcome == task::Outcome::kFailed && known.tries < kMostTries;

@@ -215,6 +215,16 @@ TEST_F(DispatcherTest, CountsEachParcelOnce) {
   EXPECT_EQ(tally(), Counts(1, 3));
 }
 
+// Refused, because somebody has a task of that id; which ends later.
+TEST_F(DispatcherTest, HearsOneOutcomeOfEachTask) {
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
+  EXPECT_TRUE(dispatcher_.heard("P1", task::Outcome::kFailed));
+  EXPECT_FALSE(dispatcher_.heard("P1", task::Outcome::kSucceeded));
+  EXPECT_EQ(dispatcher_.tally().sorted, 0);
+  (void)dispatcher_.observe({parcel(1, 0.1, "P1")}, at(1));
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.2, "P1")}, at(2)).tasks.size(), 1u);
+}
+
 TEST_F(DispatcherTest, AsksAtMostThreeTimes) {
   std::vector<std::string> asked;
   for (int seconds = 0; seconds < 10; ++seconds) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace pons::perception {
 namespace {
@@ -108,7 +107,8 @@ Tracker::Observation Tracker::observe(const Track* track, const Sighting& sighti
                 sighting.yaw_rad,
                 sighting.size_m,
                 sighting.flatness_m,
-                sighting.covered || !sighting.complete};
+                sighting.covered || !sighting.complete,
+                sighting.crowded || sighting.covered};
   if (track == nullptr) return o;
   // Which of two nearly equal sides is the longer one is a matter of noise: keep the track's choice.
   const double reference = track->estimate.yaw_rad;
@@ -239,7 +239,7 @@ bool Tracker::perhaps_a_piece(const Sighting& sighting, Time stamp, double trave
 void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
   track.last_seen = stamp;
   track.missing = 0;
-  const bool was_crowded = std::exchange(track.crowded, sighting.crowded || sighting.covered);
+  track.crowded = sighting.crowded || sighting.covered;
   track.covered = sighting.covered;
   track.whole = sighting.complete;
   ++track.frames_seen;
@@ -280,7 +280,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   }
   track.odd_sizes = 0;
   // A cut between neighbours is not quite where one of them ends: alone, it is measured afresh.
-  if (was_crowded && !track.crowded) track.observations.clear();
+  if (!o.crowded) std::erase_if(track.observations, [](const Observation& earlier) { return earlier.crowded; });
   track.observations.push_back(o);
   if (track.observations.size() > kMemory) track.observations.pop_front();
   if (track.observations.size() >= 3) track.restarts = 0;

@@ -43,6 +43,7 @@ class Tracker {
     Vector3 size_m = Vector3::Zero();
     double flatness_m = 0;
     bool doubtful = false;  // partly hidden or covered
+    bool crowded = false;   // a neighbour may have had a say in its size
   };
   struct Estimate {
     Eigen::Vector2d position = Eigen::Vector2d::Zero();  // at `stamp`, relative to the belt

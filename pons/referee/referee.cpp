@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <map>
+#include <optional>
+#include <set>
+#include <string>
 
 namespace pons::referee {
 namespace {
@@ -22,14 +25,29 @@ struct Entry {
   std::string last_reason;
 };
 
-// The parcel that a task puts somewhere, by the code in its steps' arguments; empty for a task that looks or moves
-// only.
-std::string object_of(const task::Task& task) {
-  const auto places = [](const task::Step& step) { return step.skill == "place"; };
-  if (std::ranges::none_of(task.steps, places)) return {};
-  for (const task::Step& step : task.steps)
-    if (step.arguments.contains("object")) return step.arguments.at("object").get<std::string>();
-  return {};
+// The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
+// for a task that looks or moves only.
+std::set<std::string> objects_of(const task::Task& task) {
+  std::set<std::string> objects;
+  std::string picked;
+  for (const task::Step& step : task.steps) {
+    if (step.skill == "pick") picked = step.arguments.value("object", std::string{});
+    if (step.skill != "place") continue;
+    const std::string placed = step.arguments.value("object", picked);
+    if (!placed.empty()) objects.insert(placed);
+  }
+  return objects;
+}
+
+void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) {
+  entry.ended = outcome.has_value() && (entry.tasks == 0 || entry.ended);
+  ++entry.tasks;
+  if (!outcome) return;
+  if (outcome->outcome == Outcome::kSucceeded) {
+    entry.succeeded = true;
+    ++entry.successes;
+  }
+  entry.last_reason = outcome->reason;
 }
 
 Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
@@ -37,17 +55,7 @@ Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
-    const std::string object = object_of(record.task);
-    if (object.empty()) continue;
-    Entry& entry = entries[object];
-    entry.ended = record.outcome.has_value() && (entry.tasks == 0 || entry.ended);
-    ++entry.tasks;
-    if (!record.outcome) continue;
-    if (record.outcome->outcome == Outcome::kSucceeded) {
-      entry.succeeded = true;
-      ++entry.successes;
-    }
-    entry.last_reason = record.outcome->reason;
+    for (const std::string& object : objects_of(record.task)) take_in(entries[object], record.outcome);
   }
   const auto events = journal.events("");
   if (!events) return std::unexpected(events.error());

@@ -67,8 +67,18 @@ TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {
   end("A", Outcome::kSucceeded);
   ASSERT_TRUE(journal_->accept({.id = "B", .steps = {{"move_to", {{"place", "home"}}}}}, Time{}));
   end("B", Outcome::kSucceeded);
+  ASSERT_TRUE(journal_->accept({.id = "two",
+                                .steps = {{"detect", {{"object", "A"}}},
+                                          {"pick", {{"object", "C"}}},
+                                          {"place", {{"place", "chute_1"}}},
+                                          {"pick", {{"object", "D"}}},
+                                          {"place", {{"place", "chute_1"}}}}},
+                               Time{}));
+  end("two", Outcome::kSucceeded);
   const Verdict verdict =
-      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kException, "exception")});
+      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kException, "exception"),
+             parcel("C", Whereabouts::kChute, "chute_1"), parcel("D", Whereabouts::kChute, "chute_1")});
+  EXPECT_EQ(verdict.sorted, 2) << "by one task";
   EXPECT_EQ(verdict.undeserved, 1) << "let ride; that it was looked at changes nothing";
   EXPECT_EQ(verdict.lost, 1) << "nobody ever decided about it";
 }

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
 
 namespace pons::sim {
 namespace {
@@ -49,9 +52,11 @@ Expected<void> check_mouth(const mjModel* model, const mjData* data, const world
     const double found = mj_ray(model, data, from.data(), down.data(), kAllGroups.data(), 1, -1, &geom, nullptr);
     const double below = found - kAbove_m;
     if (found >= 0 && below >= kShallowest * depth && below <= kDeepest * depth) continue;
-    const std::string what = found < 0 ? std::string("there is nothing")
-                                       : fmt::format("'{}' is {:.2f} m below its rim, not {:.2f}",
-                                                     model->names + model->name_geomadr[geom], below, depth);
+    const std::string name = geom < 0 ? "" : model->names + model->name_geomadr[geom];
+    const std::string what =
+        found < 0 ? "there is nothing"
+                  : fmt::format("{} is {:.2f} m below its rim, not {:.2f}",
+                                name.empty() ? "something without a name" : "'" + name + "'", below, depth);
     return fail(fmt::format("the mouth of '{}' is not in the scene: at ({:.2f}, {:.2f}) {}", place.name, from.x(),
                             from.y(), what),
                 world.scene_mjcf.string(), "make center and size of the place agree with the geoms there");

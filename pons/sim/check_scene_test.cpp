@@ -27,6 +27,8 @@ TEST(CheckScene, TheWorldsAgreeWithTheirScenes) {
 TEST(CheckScene, AChuteThatWasMovedInOneFileOnly) {
   EXPECT_THAT(said("parcel_cell", [](world::World& world) { world.places[0].center_m.x() += 0.05; }),
               AllOf(HasSubstr("scene.xml"), HasSubstr("the mouth of 'chute_1' is not in the scene")));
+  EXPECT_THAT(said("parcel_cell", [](world::World& world) { world.places[0].center_m.x() += 0.025; }),
+              HasSubstr("something without a name is 0.00 m below its rim"));
   EXPECT_THAT(said("parcel_cell", [](world::World& world) { world.places[0].size_m.z() *= 3; }),
               HasSubstr("'chute_1_floor' is 0.45 m below its rim, not 1.35"));
   EXPECT_THAT(said("parcel_cell", [](world::World& world) { world.places[0].center_m.x() += 30; }),

@@ -216,7 +216,7 @@ double Router::worst_clearance(const motion::Trajectory& way, Time from, Time un
 
 bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
                    std::span<const ObjectBelief> obstacles) {
-  return worst_clearance(way, from, until, kEndGrow_m, load, obstacles) >= 0;
+  return worst_clearance(way, from, until, kObjectGrow_m, load, obstacles) >= 0;
 }
 
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,

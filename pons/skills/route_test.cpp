@@ -187,18 +187,18 @@ TEST_F(RouteTest, AWayIsFoundOverTheHighEdgeOfWhatLeansSteeply) {
 TEST_F(RouteTest, ALoadDoesNotTurnIntoWhatStandsBesideIt) {
   const Load load{.size_m = {0.3, 0.12, 0.13}};
   const ObjectBelief tall = parcel(0.0, {0.3, 0.12, 0.2});  // a centimetre beside it
-  const auto clear = [&](const AxisVector& from, double turn_rad, double rise_m) {
-    const Vector3 tip = model_.world_from_tip(from).translation();
-    AxisVector to = over(tip.x(), tip.y(), tip.z() + rise_m);
+  const auto longer_s = [&](double z, double turn_rad) {
+    const AxisVector from = over(0, 0.13, z);
+    AxisVector to = over(0, 0.13, 1.3);
     to[5] += turn_rad;
-    const auto way = motion::move(rest(from), kBegin, halt(to), limits_);
-    EXPECT_TRUE(way);
-    return way && router_.clear(*way, kBegin, way->back().end(), &load, std::array{tall});
+    const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+    const auto way = router_.route(rest(from), kBegin, halt(to), &load, std::array{tall}, limits_);
+    EXPECT_TRUE(direct && way);
+    return direct && way ? to_s(way->back().end() - direct->back().end()) : 0;
   };
-  const AxisVector low = over(0, 0.13, 1.05);
-  EXPECT_TRUE(clear(low, 0, 0.2)) << "straight up";
-  EXPECT_FALSE(clear(low, 0.6, 0));
-  EXPECT_TRUE(clear(over(0, 0.13, 1.27), 0.6, 0)) << "above it";
+  EXPECT_EQ(longer_s(1.05, 0), 0) << "straight up";
+  EXPECT_GT(longer_s(1.05, 1.2), 0) << "up first";
+  EXPECT_EQ(longer_s(1.27, 1.2), 0) << "above it";
 }
 
 // What comes along the belt where no camera has shown it yet may be as high as any parcel.

@@ -117,7 +117,7 @@ CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places, con
   camera.depth_dropout = map["depth_dropout"].number(0, 1);
   camera.reads_labels = map["reads_labels"].boolean();
   if (camera.watches == "belt" && !seen_of_belt(camera, belt)) {
-    map["world_from_optical"].refuse("sees nothing of the belt",
+    map["world_from_optical"].refuse("sees nothing of the belt, or looks over the horizon",
                                      "+z looks out of the camera, +x to the picture's right");
   }
   return camera;

@@ -229,6 +229,8 @@ TEST_F(JournalTest, HasOneOwnerAtATime) {
     return !second && second.error().what == "the journal is in use by another process";
   });
   EXPECT_FALSE(Journal::open_to_read(file_));
+  fs::create_symlink(file_, folder_ / "latest.db");
+  EXPECT_FALSE(Journal::open_to_read(folder_ / "latest.db"));
   EXPECT_TRUE(journal->accept(sample("a"), at(1)));
 }
 

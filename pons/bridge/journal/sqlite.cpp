@@ -40,14 +40,15 @@ std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
 std::string reading_uri(const std::string& file) {
   std::string uri = "file:";
   std::error_code ignored;
-  for (const char letter : std::filesystem::absolute(file, ignored).lexically_normal().string()) {
+  const std::string real = std::filesystem::canonical(file, ignored).string();  // where the log lies, too
+  for (const char letter : real) {
     if (letter == '?' || letter == '#' || letter == '%') {
       uri += fmt::format("%{:02x}", letter);
     } else {
       uri += letter;
     }
   }
-  const bool at_rest = !std::filesystem::exists(file + "-wal", ignored);
+  const bool at_rest = !std::filesystem::exists(real + "-wal", ignored);
   return uri + (at_rest ? "?immutable=1" : "?mode=ro");
 }
 
