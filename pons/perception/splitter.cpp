@@ -21,7 +21,8 @@ constexpr double kCornerDepth = 4;   // cells
 constexpr double kGain = 0.045;
 constexpr double kLengthCost = 0.05;  // of a cut as long as the patch is wide
 constexpr double kPrintCost = 0.5;    // likewise, of one through print
-constexpr double kTold = 0.2;         // less of the variance is shade along an edge
+constexpr double kTold = 0.2;         // of the variance; what explains less may be shade along an edge,
+constexpr double kHinted = 0.03;      // and still less, noise
 constexpr double kLeastGain = 0.02;   // where it is known that there are two
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
@@ -190,13 +191,15 @@ std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<c
 }
 
 std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, const Labels& labels) {
-  if (auto line = between_colours(view, cells, labels)) return line;
+  const auto told = between_colours(view, cells, labels);
+  if (told && told->explained >= kTold) return told->line;
   if (auto line = between_corners(cells, labels)) return line;
+  if (told && told->explained >= kHinted) return told->line;
   return halfway(cells, labels);
 }
 
-std::optional<Line> Splitter::between_colours(const TopView& view, const std::vector<cv::Point>& cells,
-                                              const Labels& labels) {
+std::optional<Splitter::Told> Splitter::between_colours(const TopView& view, const std::vector<cv::Point>& cells,
+                                                        const Labels& labels) {
   constexpr float kGreyPerMillimetre = 5;
   const double variance = take_samples(cells, [&](const cv::Point& cell) {
     const cv::Vec3b& colour = view.colour(cell);
@@ -214,8 +217,8 @@ std::optional<Line> Splitter::between_colours(const TopView& view, const std::ve
         best_cut(angle, 1, std::max(1.0, variance), std::min(a, b) + labels.clear, std::max(a, b) - labels.clear);
     if (cut.explained > best.explained) best = cut;
   }
-  if (best.explained < kTold) return std::nullopt;
-  return Line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
+  if (best.explained <= 0) return std::nullopt;
+  return Told{{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset}, best.explained};
 }
 
 std::optional<Line> Splitter::between_corners(const std::vector<cv::Point>& cells, const Labels& labels) {

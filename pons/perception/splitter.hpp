@@ -54,7 +54,11 @@ class Splitter {
   [[nodiscard]] Cut best_cut(double angle_rad, double bin, double total_variance, double from = -1e9,
                              double to = 1e9) const;
   [[nodiscard]] bool sharp(const Cut& cut) const;
-  [[nodiscard]] std::optional<Line> between_colours(const TopView& view, const std::vector<cv::Point>& cells,
+  struct Told {
+    Line line;
+    double explained = 0;  // share of the variance
+  };
+  [[nodiscard]] std::optional<Told> between_colours(const TopView& view, const std::vector<cv::Point>& cells,
                                                     const Labels& labels);
   [[nodiscard]] static std::optional<Line> between_corners(const std::vector<cv::Point>& cells, const Labels& labels);
   [[nodiscard]] static std::optional<Line> halfway(const std::vector<cv::Point>& cells, const Labels& labels);

@@ -86,6 +86,22 @@ TEST(SplitterTest, CutsBetweenTheLabelsOfTwoAlikeWhereTheirCornersAre) {
   EXPECT_EQ(line->beyond({52, 52}), line->beyond({145, 97}));
 }
 
+// Speckled, so that the little that one is higher explains little of the variance.
+TEST(SplitterTest, CutsFlushOnesWhereOneIsALittleHigher) {
+  Patch patch;
+  patch.fill({50, 50, 136, 40}, {});
+  for (const cv::Point& cell : patch.cells) {
+    const auto shade = static_cast<std::uint8_t>((cell.x + cell.y) % 2 == 0 ? 100 : 156);
+    patch.view.colour(cell) = {shade, shade, shade};
+    if (cell.x >= 90) patch.view.height(cell) = TopView::steps(0.108);
+  }
+  Splitter splitter;
+  splitter.prepare(patch.view);
+  const auto line = splitter.between(patch.view, patch.cells, {{70, 70}, {150, 70}, 10});
+  ASSERT_TRUE(line);
+  EXPECT_NE(line->beyond({86, 70}), line->beyond({94, 70}));
+}
+
 TEST(SplitterTest, CutsFlushOnesHalfwayBetweenTheirLabels) {
   Patch patch;
   patch.fill({50, 50, 100, 50}, {150, 120, 90});
