@@ -18,8 +18,8 @@ constexpr int kLook = 3;       // cells to look beyond an outline
 constexpr int kCrowdedLook = 4;
 constexpr int kHigher = 60;  // 6 mm
 constexpr int kMostCuts = 24;
-constexpr double kNarrowest_m = 0.05;   // what an outline alone shows to be narrower is a ragged edge
-constexpr double kHalfLabel_m = 0.025;  // a label's middle is at least so far from its object's edge
+constexpr double kNarrowestPiece_m = 0.05;  // what an outline alone shows to be narrower is a ragged edge
+constexpr double kHalfLabel_m = 0.025;      // a label's middle is at least so far from its object's edge
 const std::array<cv::Point, 4> kAround = {cv::Point{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 const std::array<cv::Point, 8> kAround8 = {cv::Point{1, 0}, {1, 1},   {0, 1},  {-1, 1},
                                            {-1, 0},         {-1, -1}, {0, -1}, {1, -1}};
@@ -191,7 +191,8 @@ void Segmenter::split(const TopView& view) {
       if (!curved) line = splitter_.by_colour(view, region.core);
       const bool whole =
           !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
-      if (!line && whole) line = splitter_.by_outline(curved ? region.cells : region.core, kNarrowest_m / view.cell_m);
+      if (!line && whole)
+        line = splitter_.by_outline(curved ? region.cells : region.core, kNarrowestPiece_m / view.cell_m);
       if (!line) break;
       ++cuts;
       cut(i, *line);
