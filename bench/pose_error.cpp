@@ -79,6 +79,7 @@ class Bench {
   void print() const {
     alone_.print("alone");
     crowded_.print("crowded");
+    for (const auto& [kind, errors] : of_kind_) errors.print(world::name(kind).data());
     std::size_t readable = 0, read = 0, wrong = 0;
     for (std::size_t i = 0; i < truth_.parcels().size(); ++i) {
       const auto& parcel = truth_.parcels()[i];
@@ -111,15 +112,17 @@ class Bench {
       }
       const sim::ParcelTruth& parcel = truth_.parcels()[*nearest];
       const Pose top = *truth_.top(*nearest);
-      Errors& errors = parcel.touching ? crowded_ : alone_;
       const Vector3 off = belief.world_from_top.translation() - top.translation();
-      errors.xy_m.push_back(off.head<2>().norm());
-      errors.z_m.push_back(std::abs(off.z()));
       const double aspect = parcel.size_m.x() / parcel.size_m.y();
       const double turn = aspect > 1.15 ? M_PI : M_PI / 2;
-      errors.yaw_rad.push_back(std::abs(std::remainder(yaw_of(belief.world_from_top) - yaw_of(top), turn)));
-      errors.size_m.push_back(std::max(std::abs(belief.size_m.x() - std::max(parcel.size_m.x(), parcel.size_m.y())),
-                                       std::abs(belief.size_m.y() - std::min(parcel.size_m.x(), parcel.size_m.y()))));
+      const double longer_off = belief.size_m.x() - std::max(parcel.size_m.x(), parcel.size_m.y());
+      const double shorter_off = belief.size_m.y() - std::min(parcel.size_m.x(), parcel.size_m.y());
+      for (Errors* errors : {parcel.touching ? &crowded_ : &alone_, &of_kind_[manifest_[*nearest].kind]}) {
+        errors->xy_m.push_back(off.head<2>().norm());
+        errors->z_m.push_back(std::abs(off.z()));
+        errors->yaw_rad.push_back(std::abs(std::remainder(yaw_of(belief.world_from_top) - yaw_of(top), turn)));
+        errors->size_m.push_back(std::max(std::abs(longer_off), std::abs(shorter_off)));
+      }
     }
   }
 
@@ -143,6 +146,7 @@ class Bench {
   perception::Perception& perception_;
   sim::Truth truth_;
   Errors alone_, crowded_;
+  std::map<world::ParcelKind, Errors> of_kind_;
   std::set<std::string> codes_;
   std::size_t ghosts_ = 0, beliefs_ = 0;
 };

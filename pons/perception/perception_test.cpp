@@ -248,6 +248,24 @@ TEST(PerceptionTest, MeasuresABagAtItsMiddle) {
   EXPECT_GT(beliefs[0].flatness_m, 0.0022);
 }
 
+// A bag's edge lies lower than its top; what stands out on one side only belongs to something else.
+TEST(PerceptionTest, AThingIsAsLargeAsItsEdge) {
+  for (const double aside_m : {0.0, 0.008}) {
+    Eyes eyes;
+    eyes.belt.things = {{.x_m = -0.8, .yaw_rad = 0.4, .size_m = {0.3, 0.2, 0.1}},
+                        {.x_m = -0.8 + aside_m * std::cos(0.4),
+                         .y_m = aside_m * std::sin(0.4),
+                         .yaw_rad = 0.4,
+                         .size_m = {0.316, aside_m > 0 ? 0.2 : 0.216, 0.092}}};
+    eyes.belt.watch(eyes.perception, 5);
+    const auto beliefs = eyes.beliefs();
+    ASSERT_EQ(beliefs.size(), 1u);
+    EXPECT_NEAR(beliefs[0].size_m.x(), aside_m > 0 ? 0.3 : 0.316, 0.005) << aside_m;
+    EXPECT_NEAR(beliefs[0].size_m.y(), aside_m > 0 ? 0.2 : 0.216, 0.005) << aside_m;
+    EXPECT_NEAR(beliefs[0].size_m.z(), 0.1, 0.003);
+  }
+}
+
 TEST(PerceptionTest, ReportsTheLeanOfAThingThatLeans) {
   Eyes eyes;
   eyes.belt.things = {{.x_m = -0.7, .size_m = {0.2, 0.15, 0.05}, .base_m = 0.03, .tilt_rad = 10 * kDegree}};

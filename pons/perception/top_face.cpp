@@ -22,6 +22,8 @@ constexpr double kWhole = 0.90;
 constexpr double kNearlyWhole = 0.95;
 constexpr double kLostCorner = 0.10;  // of the outline
 constexpr double kAcross = 0.5;       // of the width
+// A soft edge lies a little lower than the top, and about as wide on every side.
+constexpr double kRimDepth_m = 0.016, kRimLeast_m = 0.005, kRimMost_m = 0.014, kRimUneven_m = 0.005;
 
 struct Rectangle {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // cells
@@ -232,6 +234,27 @@ void place(const TopView& view, const Rectangle& rectangle, double height_m, con
   sighting.size_m.y() *= std::hypot(1.0, slope.dot(across));
 }
 
+// A pillow's top is flat, its edge is not: the parcel is as large as its edge. What stands out on one side only is a
+// neighbour or a shadow's noise.
+Rectangle with_rim(const TopView& view, const Region& region, const Plane& plane, const Rectangle& top) {
+  std::vector<cv::Point> cells;
+  for (const cv::Point& cell : region.cells) {
+    const double above_m = TopView::metres(view.height(cell)) - plane.at(cell.x, cell.y);
+    if (above_m < kOnPlane_m && above_m > -kRimDepth_m) cells.push_back(cell);
+  }
+  const Rectangle whole = fit_rectangle(cells, Shape::kFlat);
+  const double turn = std::remainder(whole.yaw - top.yaw, 0.5 * std::numbers::pi);
+  const bool swapped = std::abs(std::remainder(whole.yaw - top.yaw, std::numbers::pi)) > 0.25 * std::numbers::pi;
+  const double length = swapped ? whole.width : whole.length, width = swapped ? whole.length : whole.width;
+  const auto is_rim = [&](double wide, double narrow) {
+    const double rim_m = 0.5 * (wide - narrow) * view.cell_m;
+    return rim_m > kRimLeast_m && rim_m < kRimMost_m;
+  };
+  const bool around = is_rim(length, top.length) && is_rim(width, top.width) &&
+                      (whole.middle - top.middle).norm() * view.cell_m < kRimUneven_m;
+  return around && std::abs(turn) < 0.05 ? whole : top;
+}
+
 Sighting measure_flat(const TopView& view, const Region& region, const Plane& plane) {
   Sighting sighting;
   std::vector<cv::Point> top;
@@ -239,8 +262,9 @@ Sighting measure_flat(const TopView& view, const Region& region, const Plane& pl
     if (std::abs(TopView::metres(view.height(cell)) - plane.at(cell.x, cell.y)) < kOnPlane_m) top.push_back(cell);
   }
   if (top.size() < 20) top = region.cells;
-  const Rectangle rectangle = fit_rectangle(top, Shape::kFlat);
+  Rectangle rectangle = fit_rectangle(top, Shape::kFlat);
   sighting.fill = static_cast<double>(top.size()) / std::max(1.0, rectangle.length * rectangle.width);
+  rectangle = with_rim(view, region, plane, rectangle);
   place(view, rectangle, plane.at(rectangle.middle.x(), rectangle.middle.y()), plane, sighting);
   return sighting;
 }
