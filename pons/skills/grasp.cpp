@@ -21,12 +21,10 @@ constexpr int kMostBlocked = 1;  // a look for a way takes time, and the motion 
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.80;  // cosines of 3 and 37 degrees
 constexpr double kLeastLift_m = 0.10, kHighestLift_m = 0.25;
-constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
-constexpr double kClear_m = 0.02;  // by this much
-constexpr double kAway_m = 0.02;   // from them, during the lift
-constexpr double kOneSided = 0.3;  // of the sum of unit vectors
-// A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
-constexpr double kLift_m_s2 = 5.0;
+constexpr double kClose_m = 0.05;      // neighbours within this of the footprint are lifted over
+constexpr double kClear_m = 0.02;      // by this much
+constexpr double kAway_m = 0.02;       // from them, during the lift
+constexpr double kOneSided = 0.3;      // of the sum of unit vectors
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
 constexpr double kThinnest_m = 0.005;  // of what is carried
 constexpr double kSlower = 1.25;
@@ -158,12 +156,12 @@ Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation) {
 }
 
 Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
-                    const Vector3& offset) {
+                    const Vector3& offset, double peak_m_s2) {
   // Seen from the belt the way is straight: what touches the load is neither pushed nor left to push.
   const Vector3 belt = belt_velocity(cell);
   std::array<Vector3, 3> from = tip_motion(cell, start);
   from[1] -= belt;
-  double takes_s = std::sqrt(kLeastJerk * offset.norm() / kLift_m_s2), rides_s = kRideLifted_s;
+  double takes_s = std::sqrt(kLeastJerk * offset.norm() / peak_m_s2), rides_s = kRideLifted_s;
   Expected<motion::Trajectory> way = fail("out of reach", "lift");
   for (int round = 0; round < kRounds && !way; ++round) {
     // An axis may come to its limit: sooner or later it would have to turn back all the way.

@@ -50,15 +50,15 @@ struct Meeting {
 // that. What touches a load would be dragged up by its flank.
 [[nodiscard]] Vector3 lift_offset(const Cell& cell, const ObjectBelief& target);
 
-// With a load on the cups: straight, by `offset` as seen from the belt, and on with the belt there. Soft enough for the
-// load not to bounce.
+// With a load on the cups: straight, by `offset` as seen from the belt, and on with the belt there; `peak_m_s2` is the
+// largest acceleration beside what the start needs.
 struct Lift {
   motion::Trajectory trajectory;  // ends at rest; whoever takes over does so before
   Time top;                       // when the offset is reached
   Time rides_until;               // the arm stays behind the belt from then on
 };
 [[nodiscard]] Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
-                                  const Vector3& offset);
+                                  const Vector3& offset, double peak_m_s2);
 
 // What hangs on the cups that took the object so. One that leans stands on its lower edge, and is so much thinner than
 // its middle is high.

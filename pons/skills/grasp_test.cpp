@@ -10,7 +10,7 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kStep_s = 0.005;
+constexpr double kStep_s = 0.005, kPeak_m_s2 = 5.0;
 
 class LiftTest : public ::testing::Test {
  protected:
@@ -33,7 +33,7 @@ class LiftTest : public ::testing::Test {
   }
   Lift lift(const AxisState& start, const Vector3& offset) {
     const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
-    auto up = skills::lift(cell_, start, kBegin, orientation, offset);
+    auto up = skills::lift(cell_, start, kBegin, orientation, offset, kPeak_m_s2);
     EXPECT_TRUE(up) << up.error().line();
     return std::move(*up);
   }
@@ -53,6 +53,15 @@ class LiftTest : public ::testing::Test {
   Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
   const Vector3 belt_{0.22, 0, 0}, place_{-0.2, 0.05, 0.97};
 };
+
+TEST_F(LiftTest, TakesLongerWhenItIsToBeSofter) {
+  const AxisState start = touching(place_, true);
+  const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
+  const auto hard = skills::lift(cell_, start, kBegin, orientation, {0, 0, 0.1}, kPeak_m_s2 / 4);
+  const auto soft = skills::lift(cell_, start, kBegin, orientation, {0, 0, 0.1}, kPeak_m_s2 / 16);
+  ASSERT_TRUE(hard && soft);
+  EXPECT_NEAR(top_s(*soft), 2 * top_s(*hard), 1e-6);
+}
 
 TEST_F(LiftTest, GoesStraightUpOverTheBeltThatMovesOn) {
   for (const double height_m : {0.10, 0.25}) {
@@ -89,7 +98,7 @@ TEST_F(LiftTest, LeavesToTheSideAndAlsoStartsAtRest) {
 TEST_F(LiftTest, OutOfReachIsAnError) {
   const AxisState start = touching(place_, true);
   const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();
-  EXPECT_FALSE(skills::lift(cell_, start, kBegin, orientation, {0, 0, 3.0}));
+  EXPECT_FALSE(skills::lift(cell_, start, kBegin, orientation, {0, 0, 3.0}, kPeak_m_s2));
 }
 
 class GraspTest : public LiftTest {

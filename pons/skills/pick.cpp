@@ -31,10 +31,14 @@ constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan,
 constexpr double kElsewhere_m = 0.015;  // and by so much, when it is too late for one, another try
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
-constexpr double kLifted_m = 0.030;     // nothing below supports the load any more
-constexpr double kNearLimit = 0.15;     // of the mass limit: so near to it only a reading at rest decides
+// A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
+constexpr double kLifted_m_s2 = 5.0;
+constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
+constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kPutBack_m = 0.02;  // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
+constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
+constexpr double kPutAside = 1.5;      // times as far again from its neighbours as it was lifted: what is heavy swings
+constexpr double kLowered_m_s2 = 2.5;  // and the less, the softer it is lowered
 constexpr double kLightest_kg = 0.01;
 constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
@@ -54,9 +58,11 @@ class Pick final : public task::Skill {
       stopped_ = true;
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
-    if (stopped_) {
+    if (stopped_ && phase_ != Phase::kRetreat) {
       cell_.missed = Miss{code_, now};
-      return {Status::kRetry, "the arm was stopped", {}};
+      const Progress verdict{Status::kRetry, "the arm was stopped", {}};
+      if (cell_.held) return verdict;
+      begin_retreat(now, verdict);
     }
     switch (phase_) {
       case Phase::kFind:
@@ -192,7 +198,9 @@ class Pick final : public task::Skill {
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     const AxisState state = cell_.arm.planned(from);
     const double risen_m = cell_.model.world_from_tip(state.position).translation().z() - lift_from_.z();
-    const auto down = skills::lift(cell_, state, from, grasp_.orientation, Vector3(0, 0, kPutBack_m - risen_m));
+    Vector3 offset = kPutAside * lift_offset(cell_, target_);
+    offset.z() = kPutBack_m - risen_m;
+    const auto down = skills::lift(cell_, state, from, grasp_.orientation, offset, kLowered_m_s2);
     if (!down || !cell_.arm.stream(down->trajectory)) return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
     set_down_.begin_at(down->top);
@@ -322,7 +330,7 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_));
+    const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_), kLifted_m_s2);
     if (!up || !cell_.arm.stream(up->trajectory)) {
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
     }
@@ -365,14 +373,16 @@ class Pick final : public task::Skill {
     return success(now);
   }
 
+  // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along.
   void begin_retreat(Time now, Progress verdict) {
     verdict_ = std::move(verdict);
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     const bool over_it = phase_ != Phase::kFind && now + kNoReplanBefore >= grasp_.hover;
-    auto up = !over_it ? motion::stop(state, from, cell_.limits_empty())
-                       : nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
-                               {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
+    auto up = !over_it && !stopped_
+                  ? motion::stop(state, from, cell_.limits_empty())
+                  : nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
+                          {0.05 * cell_.belt_speed_m_s(), 0, kRetreat_m}, Vector3::Zero(), cell_.limits_empty());
     if (!up) up = motion::stop(state, from, cell_.limits_empty());
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();

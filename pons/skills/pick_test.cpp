@@ -36,7 +36,7 @@ class PickTest : public ::testing::Test {
     const AxisState at = asked_ ? cell_.arm.planned(now_) : rest();
     link::State state;
     state.stamp = now_;
-    state.safety = link::SafetyState::kOperational;
+    state.safety = safety_;
     state.epoch = 1;
     state.commanded = at;
     state.position = at.position, state.speed = at.speed;
@@ -55,6 +55,7 @@ class PickTest : public ::testing::Test {
 
   Time now_ = Time(from_s(5));
   bool asked_ = false;
+  link::SafetyState safety_ = link::SafetyState::kOperational;
   const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
@@ -107,6 +108,34 @@ TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
   }
   EXPECT_EQ(progress.status, Status::kRetry);
   EXPECT_THAT(progress.reason, HasSubstr("elsewhere"));
+}
+
+// What stopped the arm may lean on it, and nobody knows where it is.
+TEST_F(PickTest, AfterAStopTheArmFirstGoesStraightUp) {
+  const std::vector<ObjectBelief> all = {parcel(1, 0.1, 0, {0.2, 0.11, 0.11})};
+  const auto tip = [&]() -> Vector3 { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); };
+  tick_with(all);
+  const auto skill = start("P1");
+  const double low = all[0].world_from_top.translation().z() + 0.1;
+  for (int i = 0; i < 400 && tip().z() > low; ++i) {
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+    tick_with(all);
+  }
+  safety_ = link::SafetyState::kProtectiveStop;
+  tick_with(all);
+  ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  safety_ = link::SafetyState::kOperational;
+  tick_with(all);
+  const Vector3 stopped = tip();
+  Progress progress = skill->tick(now_);
+  for (int i = 0; i < 200 && progress.status == Status::kRunning; ++i) {
+    tick_with(all);
+    EXPECT_LT((tip() - stopped).head<2>().norm(), 0.02);
+    progress = skill->tick(now_);
+  }
+  EXPECT_EQ(progress.status, Status::kRetry);
+  EXPECT_THAT(progress.reason, HasSubstr("stopped"));
+  EXPECT_GT(tip().z(), stopped.z() + 0.07);
 }
 
 // What an earlier task could not place must not stay on the cups, however large it is.
