@@ -44,6 +44,7 @@ class Cell {
   // Where that belief will be at `time`, carried on by the belt as it runs and changes speed now.
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
   [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
+  [[nodiscard]] double belt_acceleration_m_s2() const { return belt_acceleration_m_s2_; }
 
   // Whether a camera could see it on the belt there.
   [[nodiscard]] bool in_view(double x_m) const { return x_m < view_end_m_; }

@@ -157,10 +157,12 @@ Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation) {
 
 Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                     const Vector3& offset, double peak_m_s2) {
-  // Seen from the belt the way is straight: what touches the load is neither pushed nor left to push.
-  const Vector3 belt = belt_velocity(cell);
+  // Seen from the belt, as it runs and changes speed now, the way is straight: what touches the load is neither pushed
+  // nor left to push.
+  const Vector3 belt = belt_velocity(cell), gains = Vector3(cell.belt_acceleration_m_s2(), 0, 0);
   std::array<Vector3, 3> from = tip_motion(cell, start);
   from[1] -= belt;
+  from[2] -= gains;
   double takes_s = std::sqrt(kLeastJerk * offset.norm() / peak_m_s2), rides_s = kRideLifted_s;
   Expected<motion::Trajectory> way = fail("out of reach", "lift");
   for (int round = 0; round < kRounds && !way; ++round) {
@@ -169,7 +171,9 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
     const auto above_belt = least_jerk(from, from[0] + offset, takes_s);
     AxisVector seed = start.position;
     const auto path = [&](double t) -> Expected<AxisVector> {
-      auto q = cell.model.inverse(posed(above_belt(std::min(t, takes_s)) + t * belt, orientation), seed);
+      const double gaining_s = std::min(t, takes_s);
+      const Vector3 belt_moved = t * belt + gaining_s * (t - 0.5 * gaining_s) * gains;
+      auto q = cell.model.inverse(posed(above_belt(gaining_s) + belt_moved, orientation), seed);
       if (q) seed = *q;
       return q;
     };

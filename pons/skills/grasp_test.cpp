@@ -95,6 +95,22 @@ TEST_F(LiftTest, LeavesToTheSideAndAlsoStartsAtRest) {
   }
 }
 
+// Else what is put back beside its neighbours comes down on one of them.
+TEST_F(LiftTest, KeepsItsPlaceOnABeltThatGainsSpeed) {
+  constexpr double kGains_m_s2 = 0.15;
+  link::State state;
+  state.commanded.position = state.position = world_.robot.home;
+  for (int i = 0; i <= 100; ++i) {
+    state.belt_speed_m_s = belt_.x() + 0.01 * (i - 100) * kGains_m_s2;
+    cerebellum_.publish(state);
+    cell_.refresh(kBegin + from_s(0.01 * (i - 100)), {});
+  }
+  const Lift up = lift(touching(place_, true), {0, 0, 0.1});
+  const double takes_s = top_s(up), belt_m = takes_s * belt_.x() + 0.5 * kGains_m_s2 * takes_s * takes_s;
+  EXPECT_NEAR(tip(up, takes_s).x() - place_.x(), belt_m, 0.001);
+  EXPECT_NEAR(tip(up, takes_s + 0.2).x() - place_.x(), belt_m + 0.2 * (belt_.x() + takes_s * kGains_m_s2), 0.001);
+}
+
 TEST_F(LiftTest, OutOfReachIsAnError) {
   const AxisState start = touching(place_, true);
   const Eigen::Matrix3d orientation = cell_.model.world_from_tip(start.position).linear();

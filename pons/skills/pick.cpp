@@ -37,8 +37,8 @@ constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
-constexpr double kPutAside = 1.5;      // times as far again from its neighbours as it was lifted: what is heavy swings
-constexpr double kLowered_m_s2 = 2.5;  // and the less, the softer it is lowered
+constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
+constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
 constexpr double kLightest_kg = 0.01;
 constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
@@ -197,9 +197,10 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     const AxisState state = cell_.arm.planned(from);
-    const double risen_m = cell_.model.world_from_tip(state.position).translation().z() - lift_from_.z();
-    Vector3 offset = kPutAside * lift_offset(cell_, target_);
-    offset.z() = kPutBack_m - risen_m;
+    Vector3 to = kPutAside * lift_offset(cell_, target_) + lift_from_;
+    to.x() += belt_travel_m(from) - lift_travel_m_;
+    to.z() = lift_from_.z() + kPutBack_m;
+    const Vector3 offset = to - cell_.model.world_from_tip(state.position).translation();
     const auto down = skills::lift(cell_, state, from, grasp_.orientation, offset, kLowered_m_s2);
     if (!down || !cell_.arm.stream(down->trajectory)) return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
@@ -330,6 +331,7 @@ class Pick final : public task::Skill {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
+    lift_travel_m_ = belt_travel_m(from);
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_), kLifted_m_s2);
     if (!up || !cell_.arm.stream(up->trajectory)) {
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
@@ -389,6 +391,11 @@ class Pick final : public task::Skill {
     phase_ = Phase::kRetreat;
   }
 
+  [[nodiscard]] double belt_travel_m(Time time) const {
+    const link::State& state = cell_.arm.state();
+    return state.belt_travel_m + to_s(time - state.stamp) * state.belt_speed_m_s;
+  }
+
   Progress retreat(Time now) { return now < retreated_at_ ? Progress{} : verdict_; }
 
   static Progress overweight(double mass_kg) {
@@ -418,6 +425,7 @@ class Pick final : public task::Skill {
   Grasp grasp_;
   ObjectBelief target_;
   Vector3 lift_from_ = Vector3::Zero();
+  double lift_travel_m_ = 0;  // of the belt then
   Scale scale_;
   SetDown set_down_;
   Progress verdict_;

@@ -28,6 +28,7 @@ class PickTest : public ::testing::Test {
     belief.stamp = belief.last_seen = now_;
     belief.world_from_top.translation() = Vector3(x, y, world_.belt.surface_z_m + size_m.z());
     belief.size_m = size_m;
+    belief.velocity_m_s.x() = belt_m_s_;
     belief.confidence = 1;
     return belief;
   }
@@ -40,6 +41,15 @@ class PickTest : public ::testing::Test {
     state.epoch = 1;
     state.commanded = at;
     state.position = at.position, state.speed = at.speed;
+    state.belt_speed_m_s = belt_m_s_;
+    state.belt_travel_m = belt_travel_m_ += 0.01 * belt_m_s_;
+    if (grips_kg_) {
+      std::ranges::fill(state.cup_vacuum_kpa, world_.robot.tool.sealed_kpa);
+      const Pose flange = cell_.model.world_from_tip(at.position) * world_.robot.tool.flange_from_tip.inverse();
+      const Vector3 pull =
+          flange.linear().transpose() * Vector3(0, 0, -9.81 * (*grips_kg_ + world_.robot.tool.mass_kg));
+      std::ranges::copy(pull, state.wrist_force_n.begin());
+    }
     cerebellum_.publish(state);
     for (ObjectBelief& object : objects) object.stamp = object.last_seen = now_;
     cell_.refresh(now_, std::move(objects));
@@ -55,6 +65,8 @@ class PickTest : public ::testing::Test {
 
   Time now_ = Time(from_s(5));
   bool asked_ = false;
+  double belt_m_s_ = 0, belt_travel_m_ = 0;
+  std::optional<double> grips_kg_;
   link::SafetyState safety_ = link::SafetyState::kOperational;
   const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
@@ -136,6 +148,33 @@ TEST_F(PickTest, AfterAStopTheArmFirstGoesStraightUp) {
   EXPECT_EQ(progress.status, Status::kRetry);
   EXPECT_THAT(progress.reason, HasSubstr("stopped"));
   EXPECT_GT(tip().z(), stopped.z() + 0.07);
+}
+
+// Weighed too heavy, it goes back beside the neighbour that it lay close to, on a belt that gains speed.
+TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
+  belt_m_s_ = 0.15;
+  const Vector3 size_m{0.2, 0.15, 0.1};
+  const auto all = [&] {
+    return std::vector{parcel(1, -0.2 + belt_travel_m_, 0, size_m), parcel(2, -0.38 + belt_travel_m_, 0, size_m)};
+  };
+  const auto tip = [&]() -> Vector3 { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); };
+  for (int i = 0; i < 50; ++i) belt_m_s_ += 0.001, tick_with(all());
+  const auto skill = start("P1");
+  Progress progress;
+  Vector3 let_go = Vector3::Zero();
+  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+    belt_m_s_ += 0.001;
+    const bool held = cell_.held.has_value();
+    tick_with(all());
+    progress = skill->tick(now_);
+    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 6;
+    if (held && !cell_.held) let_go = tip() - all()[0].world_from_top.translation(), grips_kg_.reset();
+  }
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_THAT(progress.reason, HasSubstr("overweight"));
+  EXPECT_NEAR(let_go.x(), 0.05, 0.012);
+  EXPECT_NEAR(let_go.y(), 0, 0.005);
+  EXPECT_LT(let_go.z(), 0.03);
 }
 
 // What an earlier task could not place must not stay on the cups, however large it is.
