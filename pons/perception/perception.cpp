@@ -101,11 +101,12 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
   }
   const std::vector<LabelRead> reads = label_reader.read(frame, view, segmenter.texture(), segments, sightings, wanted);
   for (const LabelRead& read : reads) {
+    const Vector3 middle_m = read.middle_m - Vector3(belt_travel_m, 0, 0);
     // Two on one are two objects taken for one: with the next frame they are told apart.
     if (std::ranges::count(reads, read.sighting, &LabelRead::sighting) == 1) {
-      tracker.label_read(tracks[read.sighting], read.code);
+      tracker.label_read(tracks[read.sighting], read.code, middle_m.head<2>());
     } else {
-      shared[read.code] = read.middle_m - Vector3(belt_travel_m, 0, 0);
+      shared[read.code] = middle_m;
     }
   }
 }

@@ -20,7 +20,8 @@ constexpr std::size_t kMemory = 16;  // observations averaged
 constexpr std::size_t kMotionMemory = 4;
 constexpr double kMoved_m = 0.009;  // over the motion memory: more than noise
 constexpr int kDoubts = 4;
-constexpr int kPieces = 3;           // frames in a row that show them until what was whole is two
+constexpr int kPieces = 3;  // frames in a row that show them until what was whole is two
+constexpr double kBesideLabel_m = 0.005;
 constexpr int kReads = 2;            // of one code until it is sure
 constexpr int kEnoughAttempts = 10;  // whose label shows none of them will show none
 constexpr double kDoubtful = 0.3;    // confidence of what is partly hidden
@@ -237,19 +238,38 @@ bool Tracker::perhaps_a_piece(const Sighting& sighting, Time stamp, double trave
 }
 
 void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
+  const Estimate before = track.estimate;
+  const bool same = observed(track, sighting, stamp, travel_m);
+  if (track.code.empty()) return;
+  // The label moves with its parcel. What was taken for one and is two may have shown the other's.
+  track.label_m += before.velocity * to_s(stamp - track.label_stamp);
+  track.label_stamp = stamp;
+  if (same) {
+    const Eigen::Rotation2Dd turned(turn(before.yaw_rad, track.estimate.yaw_rad));
+    track.label_m = track.estimate.at(stamp) + turned * (track.label_m - before.at(stamp));
+  }
+  const Eigen::Vector2d label_m = track.label_m + Eigen::Vector2d(travel_m, 0);
+  if (!expected(track, stamp, travel_m).covers(label_m.x(), label_m.y(), kBesideLabel_m)) {
+    track.code.clear();
+    track.reads = track.label_attempts = 0;
+  }
+}
+
+// False when what was seen is not what it was taken for so far: of another size.
+bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
   track.last_seen = stamp;
   track.missing = 0;
   track.crowded = sighting.crowded || sighting.covered;
   track.covered = sighting.covered;
   track.whole = sighting.complete;
   ++track.frames_seen;
-  if (!usable(sighting)) return;
+  if (!usable(sighting)) return true;
   const Observation o = observe(&track, sighting, stamp, travel_m);
   const bool was_doubtful = track.observations.back().doubtful;
   // A good look outlives glimpses of a part, unless the part lies where the whole cannot.
   if (o.doubtful && !was_doubtful) {
     track.doubts = within(expected(track, stamp, travel_m), sighting) ? 0 : track.doubts + 1;
-    if (track.doubts < kDoubts) return;
+    if (track.doubts < kDoubts) return true;
   }
   track.doubts = 0;
   const double moved = (Eigen::Vector2d(o.x_m, o.y_m) - track.estimate.at(stamp)).norm();
@@ -265,7 +285,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   // Cuts that differ from one another say nothing.
   if (resized && size_difference(o.size_m, track.odd_size_m) > kOtherSize_m) track.odd_sizes = 0;
   if (resized) track.odd_size_m = o.size_m;
-  if (resized && !now_whole && ++track.odd_sizes < enough) return;
+  if (resized && !now_whole && ++track.odd_sizes < enough) return true;
   track.last = sighting;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
     // Another object lies here now, on this one or in its place: whose label it was is no longer known.
@@ -276,7 +296,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
     // What is seen of it changed: that its middle moved says nothing of its speed.
     const bool same_whole = !resized && !o.doubtful && !was_doubtful;
     restart(track, o, same_whole);
-    return;
+    return same_whole;
   }
   track.odd_sizes = 0;
   // A cut between neighbours is not quite where one of them ends: alone, it is measured afresh.
@@ -287,6 +307,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   const Eigen::Vector2d velocity = track.estimate.velocity;
   track.estimate = estimate(track.observations);
   if (track.observations.size() < 3) track.estimate.velocity = velocity;
+  return true;
 }
 
 // True when a camera looked at the place where it should be and saw the belt, or something known to be another.
@@ -378,11 +399,14 @@ bool Tracker::wants_labels() const {
   });
 }
 
-void Tracker::label_read(std::uint32_t track, std::string_view code) {
+void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m) {
   Track* const found = find(track);
   if (found == nullptr || code.empty()) return;
+  const auto& [stamp, travel_m] = passages_.back();
+  if (!expected(*found, stamp, travel_m).covers(middle_m.x() + travel_m, middle_m.y(), kBesideLabel_m)) return;
   if (found->code.empty() || found->code == code) {
     found->code = code;
+    found->label_m = middle_m, found->label_stamp = stamp;
     ++found->reads;
     found->other_reads = 0;
   } else {
@@ -390,6 +414,7 @@ void Tracker::label_read(std::uint32_t track, std::string_view code) {
     found->other_code = code;
     if (found->other_reads < 2) return;
     std::swap(found->code, found->other_code);
+    found->label_m = middle_m, found->label_stamp = stamp;
     found->reads = found->other_reads;
     found->other_reads = 0;
   }

@@ -25,8 +25,10 @@ class Tracker {
 
   // A frame good enough to read this one's label.
   void label_attempt(std::uint32_t track);
-  // A code was read on it. The first sticks; another one replaces it when read twice. No two tracks keep one code.
-  void label_read(std::uint32_t track, std::string_view code);
+  // A code was read on it in the newest frame, with the label's middle there, relative to the belt. The first sticks;
+  // another one replaces it when read twice. No two tracks keep one code, and none keeps the code of a label that turns
+  // out to lie beside it.
+  void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
   // False once its code has been read twice; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
   // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
@@ -65,6 +67,8 @@ class Tracker {
     bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
     std::string code, other_code;
+    Eigen::Vector2d label_m = Eigen::Vector2d::Zero();  // its middle at `label_stamp`, relative to the belt
+    Time label_stamp;
     int reads = 0, other_reads = 0, label_attempts = 0;
     // Seen whole for a while: a bad cut does not come this often.
     [[nodiscard]] bool well_known() const { return observations.size() >= 4 && !observations.back().doubtful; }
@@ -87,6 +91,7 @@ class Tracker {
                     double travel_m);
   [[nodiscard]] bool perhaps_a_piece(const Sighting& sighting, Time stamp, double travel_m) const;
   void take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m);
+  bool observed(Track& track, const Sighting& sighting, Time stamp, double travel_m);
   void restart(Track& track, const Observation& observation, bool pushed);
   [[nodiscard]] bool visibly_gone(const Track& track, const TopView& view, const Segments& segments,
                                   const std::vector<bool>& known, Time stamp, double travel_m) const;
