@@ -1,7 +1,9 @@
 #include "pons/perception/perception.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <string>
@@ -16,6 +18,11 @@
 #include "pons/perception/tray_watch.hpp"
 
 namespace pons::perception {
+namespace {
+
+constexpr double kSeenWell = 0.8;  // confidence: three frames that agree
+
+}  // namespace
 
 struct Perception::Impl {
   const world::World& world;
@@ -38,6 +45,7 @@ struct Perception::Impl {
   }
 
   [[nodiscard]] std::vector<LabelMark> marks(const TopView& view, double belt_travel_m);
+  [[nodiscard]] std::vector<cv::RotatedRect> known(const TopView& view, Time now, double belt_travel_m) const;
   [[nodiscard]] ObjectBelief half_seen(const Sighting& sighting, double belt_travel_m) const;
   void see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment);
   void read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
@@ -56,6 +64,21 @@ std::vector<LabelMark> Perception::Impl::marks(const TopView& view, double belt_
   return seen;
 }
 
+// The outlines of what has been seen well and named.
+std::vector<cv::RotatedRect> Perception::Impl::known(const TopView& view, Time now, double belt_travel_m) const {
+  std::vector<cv::RotatedRect> outlines;
+  for (const ObjectBelief& belief : tracker.beliefs(now, belt_travel_m)) {
+    if (belief.code.empty() || belief.confidence < kSeenWell) continue;
+    const Vector3 middle = belief.world_from_top.translation();
+    const Eigen::Matrix3d& axes = belief.world_from_top.linear();
+    const auto cells = [&](double m) { return static_cast<float>(m / view.cell_m); };
+    outlines.emplace_back(cv::Point2f(cells(middle.x() - view.x0_m) - 0.5F, cells(middle.y() - view.y0_m) - 0.5F),
+                          cv::Size2f(cells(belief.size_m.x()), cells(belief.size_m.y())),
+                          static_cast<float>(std::atan2(axes(1, 0), axes(0, 0)) * 180 / std::numbers::pi));
+  }
+  return outlines;
+}
+
 void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment) {
   auto viewer = viewers.find(frame.camera);
   if (viewer == viewers.end() || !viewer->second.fits(frame)) {
@@ -63,7 +86,8 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   }
   const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
   const TopView& view = viewer->second.build(frame, robot);
-  const Segments& segments = segmenter.segment(view, marks(view, moment.belt_travel_m));
+  const Segments& segments =
+      segmenter.segment(view, marks(view, moment.belt_travel_m), known(view, frame.stamp, moment.belt_travel_m));
   const std::vector<Sighting> sightings = measure(view, segments);
   const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
   coming.clear();

@@ -9,7 +9,6 @@
 
 #include "pons/core/digest.hpp"
 #include "pons/perception/synthetic_camera.hpp"
-#include "pons/perception/tray_watch.hpp"
 
 namespace pons::perception {
 namespace {
@@ -266,6 +265,28 @@ TEST(PerceptionTest, AThingIsAsLargeAsItsEdge) {
   }
 }
 
+// Nothing tells them apart once they touch, but that they were apart.
+TEST(PerceptionTest, WhatWasSeenApartStaysApartWhenItRidesUp) {
+  Eyes eyes;
+  eyes.belt.things = {{.x_m = -0.5, .size_m = {0.2, 0.15, 0.1}, .code = "P1"},
+                      {.x_m = -0.74, .size_m = {0.16, 0.15, 0.1}}};
+  eyes.belt.watch(eyes.perception, 4);
+  eyes.belt.show(eyes.perception, "label");
+  ASSERT_EQ(eyes.beliefs().size(), 2u);
+  for (const double closer_m : {0.03, 0.03, 0.0, 0.0, 0.0}) {
+    eyes.belt.things[1].x_m += closer_m;
+    eyes.belt.watch(eyes.perception, 1);
+  }
+  const auto beliefs = eyes.beliefs();
+  EXPECT_EQ(beliefs.size(), 2u);
+  for (const Thing& thing : eyes.belt.things) {
+    const ObjectBelief* const belief = eyes.at(thing, beliefs);
+    ASSERT_NE(belief, nullptr);
+    EXPECT_EQ(belief->code, thing.code);
+    EXPECT_NEAR(belief->size_m.x(), thing.size_m.x(), 0.005);
+  }
+}
+
 TEST(PerceptionTest, ReportsTheLeanOfAThingThatLeans) {
   Eyes eyes;
   eyes.belt.things = {{.x_m = -0.7, .size_m = {0.2, 0.15, 0.05}, .base_m = 0.03, .tilt_rad = 10 * kDegree}};
@@ -411,59 +432,6 @@ TEST_F(WithArm, DoesNotTakeAHeldParcelForOneOnTheBelt) {
   const Thing held{.x_m = -0.3, .y_m = 0.05, .size_m = {0.3, 0.25, 0.1}, .base_m = 0.2, .fixed = true};
   show({held}, 5);
   EXPECT_TRUE(eyes_.beliefs().empty());
-}
-
-TEST(PerceptionTest, CountsWhatFellIntoTheTray) {
-  Eyes eyes;
-  for (int i = 0; i < 4; ++i) eyes.belt.show(eyes.perception, "tray");
-  EXPECT_EQ(eyes.perception.occupancy("tray"), 0);
-  eyes.belt.things = {{.x_m = -0.4, .size_m = {0.1, 0.08, 0.04}}, {.x_m = 0.1, .size_m = {0.2, 0.2, 0.1}}};
-  eyes.belt.show(eyes.perception, "tray");
-  EXPECT_EQ(eyes.perception.occupancy("tray"), 2);
-  EXPECT_EQ(eyes.perception.occupancy("nowhere"), 0);
-}
-
-// A tray close below belt and chute, as in a low cell: what is on its ordinary way above it has not fallen.
-TEST(PerceptionTest, OnlyWhatFellCountsAsFallen) {
-  SyntheticBelt belt;
-  belt.world.places = {
-      {"tray", world::PlaceKind::kTray, Vector3(0, 0, 0.35), Vector3(2.6, 1.4, 0.1)},
-      {"chute", world::PlaceKind::kChute, Vector3(-0.3, 0.47, 0.87), Vector3(0.38, 0.38, 0.4)},
-  };
-  Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
-  for (int i = 0; i < TrayWatch::kLearn; ++i) belt.show(perception, "tray");
-  const Thing rides{.x_m = -0.7, .size_m = {0.2, 0.15, 0.06}};
-  const Thing sorted{.x_m = -0.3, .y_m = 0.47, .size_m = {0.2, 0.2, 0.1}, .base_m = -0.4};
-  belt.things = {rides, sorted};
-  belt.show(perception, "tray");
-  EXPECT_EQ(perception.occupancy("tray"), 0);
-
-  const Thing fell{.x_m = -0.9, .y_m = 0.5, .size_m = {0.2, 0.2, 0.1}, .base_m = -0.55};
-  const Thing falls{.x_m = -0.5, .y_m = -0.5, .size_m = {0.2, 0.2, 0.1}, .base_m = -0.3};
-  belt.things = {rides, sorted, fell, falls};
-  belt.show(perception, "tray");
-  EXPECT_EQ(perception.occupancy("tray"), 2);
-}
-
-// Seen at a flat angle a row of pixels lies centimetres behind the next one, and a quarter of the readings is missing.
-TEST(PerceptionTest, NothingFellWhereTheCameraLooksAlongTheTray) {
-  SyntheticBelt belt;
-  belt.dropout = 0.25;
-  belt.world.places = {{"tray", world::PlaceKind::kTray, Vector3(0, 2.2, 0.05), Vector3(3.0, 2.0, 0.1)}};
-  world::CameraSpec& camera = belt.world.cameras.back();
-  const Vector3 eye(0, 0.8, 0.6), forward = (Vector3(0, 2.4, 0) - eye).normalized();
-  const Vector3 right = forward.cross(Vector3::UnitZ()).normalized();
-  camera.world_from_optical.translation() = eye;
-  camera.world_from_optical.linear() << right, forward.cross(right), forward;
-  camera.width = 160, camera.height = 120, camera.fovy_rad = 30 * kDegree;
-  Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
-  for (int i = 0; i < 60; ++i) {
-    belt.show(perception, "tray");
-    ASSERT_EQ(perception.occupancy("tray"), 0) << i;
-  }
-  belt.things = {{.x_m = 0.2, .y_m = 2.2, .size_m = {0.2, 0.2, 0.1}, .base_m = -0.9}};
-  belt.show(perception, "tray");
-  EXPECT_EQ(perception.occupancy("tray"), 1);
 }
 
 TEST(PerceptionTest, StandsFiveTimesTheDropouts) {

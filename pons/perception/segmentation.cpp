@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "pons/perception/plane.hpp"
@@ -19,7 +20,9 @@ constexpr int kCrowdedLook = 4;
 constexpr int kHigher = 60;  // 6 mm
 constexpr int kMostCuts = 24;
 constexpr double kNarrowestPiece_m = 0.05;  // what an outline alone shows to be narrower is a ragged edge
-constexpr double kHalfLabel_m = 0.025;      // a label's middle is at least so far from its object's edge
+constexpr double kEdgeCells = 0.5;
+constexpr double kStillThere = 0.85;    // of what was seen, and no more beside what is cut off
+constexpr double kHalfLabel_m = 0.025;  // a label's middle is at least so far from its object's edge
 const std::array<cv::Point, 4> kAround = {cv::Point{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
 const std::array<cv::Point, 8> kAround8 = {cv::Point{1, 0}, {1, 1},   {0, 1},  {-1, 1},
                                            {-1, 0},         {-1, -1}, {0, -1}, {1, -1}};
@@ -217,13 +220,37 @@ void Segmenter::split_by_labels(const TopView& view, const std::vector<LabelMark
   }
 }
 
-const Segments& Segmenter::segment(const TopView& view, const std::vector<LabelMark>& marks) {
+// Two that ride flush melt into one when noise hides the step between them.
+void Segmenter::split_by_memory(const TopView& view, const std::vector<cv::RotatedRect>& known) {
+  const double narrowest = kNarrowestPiece_m / view.cell_m;
+  for (const cv::RotatedRect& one : known) {
+    const double angle = one.angle * std::numbers::pi / 180;
+    const cv::Point2d middle = one.center, along(std::cos(angle), std::sin(angle)), across(-along.y, along.x);
+    const cv::Point cell = middle;
+    const int label = view.contains(cell) ? segments_.labels(cell) : 0;
+    if (label == 0) continue;
+    const std::vector<cv::Point>& cells = segments_.regions[static_cast<std::size_t>(label - 1)].cells;
+    for (const cv::Point2d& side : {along, -along, across, -across}) {
+      const double half = 0.5 * (std::abs(side.dot(along)) > 0.5 ? one.size.width : one.size.height);
+      const Line line{side, side.dot(middle) + half + kEdgeCells};
+      const auto beyond = static_cast<double>(std::ranges::count_if(cells, [&](auto& c) { return line.beyond(c); }));
+      const double inside = static_cast<double>(cells.size()) - beyond, area = one.size.area();
+      if (beyond < narrowest * narrowest || inside < kStillThere * area || inside > area / kStillThere) continue;
+      cut(static_cast<std::size_t>(label - 1), line);
+      break;
+    }
+  }
+}
+
+const Segments& Segmenter::segment(const TopView& view, const std::vector<LabelMark>& marks,
+                                   const std::vector<cv::RotatedRect>& known) {
   find_cores(view);
   grow(view);
   collect();
   for (Region& region : segments_.regions) describe(view, region);
   const std::size_t before = segments_.regions.size();
   split(view);
+  split_by_memory(view, known);
   split_by_labels(view, marks);
   // What a hand holds stays one thing: pieces of it keep the mark of the whole.
   for (Region& region : segments_.regions) {

@@ -37,8 +37,10 @@ struct LabelMark {
 
 class Segmenter {
  public:
-  // No region keeps two of `marks`: every object has one code. The result is good until the next call.
-  const Segments& segment(const TopView& view, const std::vector<LabelMark>& marks = {});
+  // No region keeps two of `marks`: every object has one code. What was seen to end where one of `known` does (in
+  // cells) still ends there. The result is good until the next call.
+  const Segments& segment(const TopView& view, const std::vector<LabelMark>& marks = {},
+                          const std::vector<cv::RotatedRect>& known = {});
   // Cells with fine print (a label's modules), of the last call.
   [[nodiscard]] const cv::Mat1b& texture() const { return splitter_.texture(); }
 
@@ -48,6 +50,7 @@ class Segmenter {
   void collect();
   void split(const TopView& view);
   void split_by_labels(const TopView& view, const std::vector<LabelMark>& marks);
+  void split_by_memory(const TopView& view, const std::vector<cv::RotatedRect>& known);
   void describe(const TopView& view, Region& region) const;
   void cut(std::size_t region, const Line& line);
   void drop_small(const TopView& view);
