@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <vector>
 
 #include "apps/paths.hpp"
@@ -31,7 +32,7 @@ struct Errors {
     std::sort(values.begin(), values.end());
     return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
   }
-  void print(const char* name) const {
+  void print(std::string_view name) const {
     fmt::print(
         "{:<10} {:>6} poses   xy {:.2f} / {:.2f} mm   z {:.2f} / {:.2f} mm   yaw {:.2f} / {:.2f} deg   size {:.1f} / "
         "{:.1f} mm"
@@ -79,7 +80,7 @@ class Bench {
   void print() const {
     alone_.print("alone");
     crowded_.print("crowded");
-    for (const auto& [kind, errors] : of_kind_) errors.print(world::name(kind).data());
+    for (const auto& [kind, errors] : of_kind_) errors.print(world::name(kind));
     std::size_t readable = 0, read = 0, wrong = 0;
     for (std::size_t i = 0; i < truth_.parcels().size(); ++i) {
       const auto& parcel = truth_.parcels()[i];

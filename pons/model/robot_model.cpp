@@ -16,6 +16,7 @@
 #include <string>
 #include <utility>
 
+#include "pons/core/gravity.hpp"
 #include "pons/model/inverse.hpp"
 
 namespace pons::model {
@@ -23,8 +24,6 @@ namespace {
 
 using AxisMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, static_cast<int>(kMaxAxes),
                                  static_cast<int>(kMaxAxes)>;
-
-constexpr double kGravityMS2 = 9.81;
 
 Pose pose_of(const pinocchio::SE3& m) {
   Pose pose = Pose::Identity();
@@ -71,7 +70,7 @@ struct RobotModel::Impl final : Chain {
 
   Impl(world::Robot robot_in, const pinocchio::Model& model_in)
       : robot(std::move(robot_in)), model(model_in), data(model) {
-    model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravityMS2);
+    model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravity_m_s2);
     model.armature = robot.rotor_inertia_kg_m2;
     const auto flange = model.getFrameId(robot.flange_link);
     last_joint = model.frames[flange].parentJoint;

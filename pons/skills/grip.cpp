@@ -4,12 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include "pons/core/gravity.hpp"
+
 namespace pons::skills {
 namespace {
 
 constexpr double kStep_s = 0.010;
 constexpr double kFriction = 0.8;  // between a lip and cardboard
-const Vector3 kGravity_m_s2{0, 0, -9.81};
 
 Vector3 turn_between(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to) {
   const Eigen::AngleAxisd turn(Eigen::Matrix3d(from.transpose() * to));
@@ -32,7 +33,7 @@ Wrench wrench(const std::array<Pose, 3>& poses, const Load& load, double mass_kg
   const Eigen::Matrix3d tip_from_load = Eigen::AngleAxisd(load.yaw_in_tip_rad, Vector3::UnitZ()).toRotationMatrix();
   const Vector3 inertia =
       mass_kg / 12 * Vector3(square.y() + square.z(), square.x() + square.z(), square.x() + square.y());
-  const Vector3 force = mass_kg * (poses[1].linear().transpose() * (acceleration - kGravity_m_s2));
+  const Vector3 force = mass_kg * (poses[1].linear().transpose() * (acceleration + Vector3(0, 0, kGravity_m_s2)));
   return {force,
           tip_from_com.cross(force) + tip_from_load * inertia.asDiagonal() * (tip_from_load.transpose() * spin_up)};
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/cell.hpp"
 #include "pons/skills/test_kit.hpp"
 
@@ -12,7 +13,6 @@ namespace pons::skills {
 namespace {
 
 const Time kBegin = Time(from_s(2));
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kFriction = 0.8;
 constexpr double kCups = 4, kCup_n = 60, kLever_m = 0.022;  // of parcel_cell: at (± lever, ± lever) about the tip
 

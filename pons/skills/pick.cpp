@@ -135,6 +135,8 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
     if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
+    const Progress late{Status::kException, "would ride past the pick zone", {}};
+    if (soonest && soonest->hover.x() > belt.pick_x_max_m) return late;
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
     if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
@@ -143,14 +145,11 @@ class Pick final : public task::Skill {
       ++quarters_;
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
-      last_error_ = grasp.error().line();
       if (!blocked_since_) blocked_since_ = now;
-      return now - *blocked_since_ < kBlockedFor ? Progress{} : Progress{Status::kFailed, last_error_, {}};
+      return now - *blocked_since_ < kBlockedFor ? Progress{} : Progress{Status::kFailed, grasp.error().line(), {}};
     }
     if (grasp->contact_point.x() < belt.pick_x_min_m) return wait_for(*object, *grasp, now);
-    if (grasp->contact_point.x() > belt.pick_x_max_m) {
-      return {Status::kException, "would ride past the pick zone", {}};
-    }
+    if (grasp->contact_point.x() > belt.pick_x_max_m) return late;
     return start(*grasp, *object, now);
   }
 
@@ -430,7 +429,6 @@ class Pick final : public task::Skill {
   SetDown set_down_;
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_;
-  std::string last_error_;
   int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
 };

@@ -6,6 +6,7 @@
 
 #include <memory>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/rest.hpp"
 #include "pons/skills/test_kit.hpp"
 
@@ -47,7 +48,7 @@ class PickTest : public ::testing::Test {
       std::ranges::fill(state.cup_vacuum_kpa, world_.robot.tool.sealed_kpa);
       const Pose flange = cell_.model.world_from_tip(at.position) * world_.robot.tool.flange_from_tip.inverse();
       const Vector3 pull =
-          flange.linear().transpose() * Vector3(0, 0, -9.81 * (*grips_kg_ + world_.robot.tool.mass_kg));
+          flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * (*grips_kg_ + world_.robot.tool.mass_kg));
       std::ranges::copy(pull, state.wrist_force_n.begin());
     }
     cerebellum_.publish(state);

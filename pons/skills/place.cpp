@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
 #include "pons/world/mouth.hpp"
@@ -22,8 +23,7 @@ constexpr double kHigher_m = 0.025;     // tried next when a mouth is out of rea
 constexpr int kHeights = 5;
 constexpr double kSofter_m = 0.015;  // than the longest fall that is allowed: sizes are measured
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kAside_m = 0.004;  // a load hangs beside where the cups were believed to hold it, at most
-constexpr double kGravity_m_s2 = 9.81;
+constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
 constexpr double kSwings = 2.5;      // a lean when it is let go over the one it may fall in with
 constexpr double kStill_nm = 0.15;   // nothing hangs stiller than that

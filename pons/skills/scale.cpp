@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pons/core/gravity.hpp"
+
 namespace pons::skills {
 namespace {
 
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kSpan_s = 0.15;  // the slowest swing of a load on the bellows
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 

@@ -8,13 +8,13 @@
 #include <optional>
 #include <vector>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
 namespace {
 
 constexpr Duration kTick = std::chrono::milliseconds(10);
-constexpr double kGravity_m_s2 = 9.81;
 constexpr double kSpan_s = 0.15;
 // Four bellows side by side; and as if their folds did not rub.
 constexpr double kStiffness_n_m = 4 * 3000, kDamping_n_s_m = 4 * 25, kHardlyDamped_n_s_m = 4 * 5;
