@@ -135,7 +135,7 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
     if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
-    const Progress late{Status::kException, "would ride past the pick zone", {}};
+    Progress late{Status::kException, "would ride past the pick zone", {}};
     if (soonest && soonest->hover.x() > belt.pick_x_max_m) return late;
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
