@@ -71,10 +71,10 @@ void expect_one_of_each(const std::set<std::string>& libraries) {
 
 TEST(OneWorld, InThisProcess) {
   // Mesa and what it brings are loaded when a display is opened, as the camera does.
+  // Stays open, as the renderer leaves it: a driver that is unloaded leaks a little.
   const EGLDisplay display = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
   ASSERT_EQ(eglInitialize(display, nullptr, nullptr), EGLBoolean{EGL_TRUE});
   const std::set<std::string> libraries = libraries_in(read("/proc/self/maps"));
-  eglTerminate(display);
   EXPECT_THAT(named(libraries, "libmujoco"), SizeIs(1));
   EXPECT_THAT(named(libraries, "libopencv_core"), SizeIs(1));
   expect_one_of_each(libraries);
