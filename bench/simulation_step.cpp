@@ -1,4 +1,4 @@
-// What the simulation costs beyond its physics: Simulation::advance_to against bare mj_step, without cameras and
+// What the simulation costs beyond its physics: Simulation::advance_to against bare mj_step, with no frame taken and no
 // control. A whole run of the cell is rehearsed first and its set-points are kept; then the same run is repeated from
 // them, and in each stretch of it a bare copy takes the same steps from the same state with the same set-points.
 
@@ -120,11 +120,10 @@ struct Cost {
 int main(int argc, char** argv) {
   const int parcels = argc > 1 ? std::atoi(argv[1]) : 20;
   const auto seed = static_cast<std::uint64_t>(argc > 2 ? std::atoll(argv[2]) : 1);
-  world::World world = must(world::load(apps::worlds_folder(), "parcel_cell"));
+  const world::World world = must(world::load(apps::worlds_folder(), "parcel_cell"));
   const world::Manifest manifest = must(world::draw_manifest(world, parcels, seed));
   const Rehearsal rehearsal = rehearse(world, manifest, seed);
 
-  world.cameras.clear();
   const auto simulation = must(sim::Simulation::create(world, manifest, seed));
   sim::BareStep bare(*simulation);
   Cost ours, theirs;
