@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "pons/rt/clock.hpp"
+#include "pons/rt/guard.hpp"
 #include "pons/rt/periodic_loop.hpp"
 #include "pons/rt/triple_buffer.hpp"
 #include "pons/runner/ending.hpp"
@@ -80,6 +81,7 @@ LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& ex
   Exchange::Asked asked;
   rt::PeriodicLoop loop(clock, kControlPeriod);
   loop.run([&](Time now) {
+    const rt::InTick in_tick;
     const body::Sensors& sensors = exchange.measured.read();
     if (sensors.position.size() > 0) {
       parts.cerebellum->step(now, sensors, *parts.link, asked.set_points);
