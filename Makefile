@@ -7,8 +7,10 @@ SEED ?= 1
 SOURCES = git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
 # What reads bytes from outside or handles memory by hand; the rest runs under the sanitizers with make asan.
 ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
+# What runs inside a tick, and what is exercised with it.
+LOOP = rt_test link_test motion_test cerebellum_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan bench clean
+.PHONY: help setup build demo test check format asan asan-quick tsan rtsan bench clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -61,6 +63,13 @@ tsan: setup ## all tests under the thread sanitizer
 	cmake --preset tsan
 	cmake --build --preset tsan --parallel $(JOBS)
 	ctest --preset tsan --parallel 2 --no-tests=error
+
+rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
+	@tools/setup --check
+	cmake --preset rtsan
+	cmake --build --preset rtsan --parallel $(JOBS) --target $(LOOP) known_bad_test
+	for name in $(LOOP); do build/rtsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; done
+	ctest --preset rtsan -R 'KnownBad|KnownGood|blocking_call' --no-tests=error
 
 bench: build ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \

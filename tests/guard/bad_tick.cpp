@@ -6,12 +6,14 @@
 #include <semaphore.h>
 #include <sys/mman.h>
 #include <sys/syscall.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -86,6 +88,21 @@ void second_thread() {
     while (state != 2) {
     }
   });
+}
+
+// The handler's return is a system call, though not the tick's.
+void interrupted() {
+  static std::atomic<bool> rang{false};
+  std::signal(SIGALRM, [](int) { rang = true; });
+  constexpr timeval kOften{.tv_sec = 0, .tv_usec = 1'000};
+  const itimerval timer{.it_interval = kOften, .it_value = kOften}, off{};
+  setitimer(ITIMER_REAL, &timer, nullptr);
+  tick([] {
+    rang = false;
+    while (!rang) {
+    }
+  });
+  setitimer(ITIMER_REAL, &off, nullptr);
 }
 
 void clock_read() {
@@ -193,9 +210,9 @@ void raw() {
 }
 
 void faults() {
+  good();  // past the warm-up, and past the locking of what memory there is
   const auto bytes = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   void* page = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  good();  // past the warm-up
   tick([&] { *static_cast<volatile char*>(page) = 1; });
 }
 
@@ -206,6 +223,7 @@ const std::map<std::string, void (*)()> kCases{
     {"outside", outside},
     {"second_thread", second_thread},
     {"clock", clock_read},
+    {"interrupted", interrupted},
     {"malloc", [] { tick([] { kept = std::malloc(8); }); }},
     {"calloc", [] { tick([] { kept = std::calloc(1, 8); }); }},
     {"realloc", [] { tick([] { kept = std::realloc(kept, 8); }); }},

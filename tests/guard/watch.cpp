@@ -81,6 +81,19 @@ std::int64_t page_faults() {
   return usage.ru_minflt + usage.ru_majflt;
 }
 
+// A page that was not needed so far, or that the machine took back, would fault although the tick does nothing amiss: a
+// loop in real time locks its memory, so the guard does, too, where it may.
+bool lock_memory() {
+  static const bool locked = mlockall(MCL_CURRENT) == 0;
+  return locked;
+}
+
+void arm() {
+  if (!watch_system_calls()) give_up("the kernel does not show system calls (Linux 5.11 or newer does, on x86-64)");
+  lock_memory();
+  watch.armed = true;
+}
+
 // Before main, and before any thread: what would later allocate, does it now.
 [[gnu::constructor]] void prepare() {
   std::array<void*, 1> frame{};
@@ -123,8 +136,7 @@ extern "C" {
 void pons_tick_begin() noexcept {
   using pons::guard::watch;
   if (watch.depth++ > 0) return;
-  if (!watch.armed && !pons::guard::watch_system_calls()) pons::guard::give_up("the kernel shows no system calls");
-  watch.armed = true;
+  if (!watch.armed) pons::guard::arm();
   pons::guard::ticks.fetch_add(1, std::memory_order_relaxed);
   watch.faults = pons::guard::page_faults();
   watch.watching = true;
@@ -138,8 +150,9 @@ void pons_tick_end() noexcept {
   watch.watching = false;
   const auto faults = pons::guard::page_faults() - watch.faults;
   if (++watch.ticks <= pons::guard::settings.warm_up || faults == 0) return;
-  std::array<char, 64> what{};
-  std::snprintf(what.data(), what.size(), "%ld, in the tick that ends here", faults);
+  std::array<char, 128> what{};
+  std::snprintf(what.data(), what.size(), "%ld, in the tick that ends here%s", faults,
+                pons::guard::lock_memory() ? "" : " (its memory could not be locked)");
   pons::guard::found(pons::guard::Kind::kPageFault, what.data());
 }
 }
