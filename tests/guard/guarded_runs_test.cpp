@@ -3,6 +3,7 @@
 
 #include <regex>
 #include <string>
+#include <vector>
 
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -28,6 +29,12 @@ TEST(Guarded, AWholeRun) {
   expect_clean(run_pons({"run", "parcel_cell", "--parcels", "5", "--seed", "1", "--lockstep", "--socket", folder / "s",
                          "--journal", folder / "j.db"},
                         kGuarded));
+}
+
+TEST(Guarded, NotInAModeThatNobodyKnows) {
+  const Finished run = run_pons({"--version"}, {"LD_PRELOAD=" PONS_GUARD_LIBRARY, "PONS_GUARD=rport"});
+  EXPECT_EQ(run.code, 2);
+  EXPECT_EQ(run.err, "pons_guard: PONS_GUARD is neither report nor die\n");
 }
 
 }  // namespace

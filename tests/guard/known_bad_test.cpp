@@ -29,14 +29,17 @@ struct Bad {
   bool sanitizer = true;  // RealtimeSanitizer sees it, too
 };
 
-void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.what; }
+std::ostream& operator<<(std::ostream& out, const Bad& bad) { return out << bad.what; }
 
 class KnownBad : public ::testing::TestWithParam<Bad> {};
 
 TEST_P(KnownBad, IsCaught) {
   const Bad& bad = GetParam();
-  if (kSanitizer && !bad.sanitizer) GTEST_SKIP() << "RealtimeSanitizer does not see it";
   const Finished caught = bad_tick(bad.what);
+  if (kSanitizer && !bad.sanitizer) {
+    EXPECT_EQ(caught.code, 0) << "RealtimeSanitizer sees it now: good, say so here and in docs/real_time.md";
+    return;
+  }
   EXPECT_EQ(caught.code, kExitFound);
   EXPECT_THAT(caught.err, HasSubstr(bad.function));
   if (kSanitizer) {
@@ -88,13 +91,6 @@ TEST_P(KnownGood, IsLeftAlone) {
 INSTANTIATE_TEST_SUITE_P(All, KnownGood,
                          ::testing::Values("good", "nested", "outside", "second_thread", "clock", "interrupted"),
                          [](const auto& good) { return good.param; });
-
-TEST(Guard, RefusesAModeThatItDoesNotKnow) {
-  if (kSanitizer) GTEST_SKIP() << "has no modes";
-  const Finished run = bad_tick("good", "rport");
-  EXPECT_EQ(run.code, 2);
-  EXPECT_THAT(run.err, HasSubstr("PONS_GUARD is neither report nor die"));
-}
 
 }  // namespace
 }  // namespace pons::tests

@@ -31,7 +31,7 @@ void* next(std::atomic<void*>& known, const char* function) {
 }  // namespace
 
 // glibc's own, under names that nobody stands in for: dlsym itself would allocate.
-// NOLINTBEGIN(bugprone-reserved-identifier)
+// NOLINTBEGIN(bugprone-reserved-identifier, readability-identifier-naming)
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
@@ -39,7 +39,7 @@ void* __libc_realloc(void* old, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
 void __libc_free(void* memory);
 }
-// NOLINTEND(bugprone-reserved-identifier)
+// NOLINTEND(bugprone-reserved-identifier, readability-identifier-naming)
 
 extern "C" {
 
@@ -93,12 +93,14 @@ void free(void* memory) noexcept {
 }
 
 // What takes a lock or waits. An uncontended lock makes no system call, so nothing else would see it.
+// NOLINTBEGIN(bugprone-macro-parentheses)
 #define PONS_GUARD_LOCK(name, parameters, arguments)                          \
   int name parameters {                                                       \
     static constinit std::atomic<void*> known{nullptr};                       \
     if (pons::guard::watch.watching) pons::guard::found(Kind::kLock, #name);  \
     return reinterpret_cast<int(*) parameters>(next(known, #name)) arguments; \
   }
+// NOLINTEND(bugprone-macro-parentheses)
 
 PONS_GUARD_LOCK(pthread_mutex_lock, (pthread_mutex_t * mutex), (mutex))
 PONS_GUARD_LOCK(pthread_mutex_timedlock, (pthread_mutex_t * mutex, const timespec* until), (mutex, until))
