@@ -64,6 +64,7 @@ tsan: setup ## all tests under the thread sanitizer
 	cmake --build --preset tsan --parallel $(JOBS)
 	ctest --preset tsan --parallel 2 --no-tests=error
 
+rtsan: export RTSAN_OPTIONS = external_symbolizer_path=/usr/bin/addr2line
 rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
 	@tools/setup --check
 	cmake --preset rtsan
