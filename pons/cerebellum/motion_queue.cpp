@@ -42,7 +42,7 @@ std::string_view name(Refusal refusal) {
     case Refusal::kNone:
       return "taken";
     case Refusal::kNotFinite:
-      return "not finite, or of no duration";
+      return "not finite, or of no sensible duration";
     case Refusal::kFromThePast:
       return "from the past";
     case Refusal::kGap:

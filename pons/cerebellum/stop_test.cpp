@@ -62,7 +62,7 @@ const StopCase kCases[] = {
     {"FollowingError", StopCause::kFollowingError, false, [](Bench& b) { b.plant.blocked = true; },
      [](Bench& b) { b.plant.blocked = false; }, "rad from where it was told to be"},
     {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing,
-     "of no duration"},
+     "of no sensible duration"},
 };
 
 class Stop : public testing::TestWithParam<StopCase> {};

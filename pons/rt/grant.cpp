@@ -1,5 +1,6 @@
 #include "pons/rt/grant.hpp"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -7,6 +8,7 @@
 
 #include <cerrno>
 #include <climits>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 
@@ -54,7 +56,24 @@ cpu_set_t isolated_cpus() {
   return cpus;
 }
 
+constexpr const char* kLatencyDevice = "/dev/cpu_dma_latency";
+
+// Negative, and errno says why, if it is refused.
+int open_latency_device() {
+  const int file = open(kLatencyDevice, O_WRONLY | O_CLOEXEC);
+  constexpr std::int32_t kNone_us = 0;
+  if (file < 0 || write(file, &kNone_us, sizeof kNone_us) == sizeof kNone_us) return file;
+  const int error = errno;
+  close(file);
+  errno = error;
+  return -1;
+}
+
 }  // namespace
+
+AwakeCpus::~AwakeCpus() {
+  if (file_ >= 0) close(file_);
+}
 
 Grant make_realtime(const Scheduling& scheduling) {
   Grant grant;
@@ -74,6 +93,9 @@ Grant make_realtime(const Scheduling& scheduling) {
   }
   grant.locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
   if (!grant.locked) note(grant, "locking memory", errno, remedy("ipc_lock"));
+  grant.awake = AwakeCpus(open_latency_device());
+  if (!grant.awake.held())
+    note(grant, "keeping CPUs awake", errno, std::string("needs write access to ") + kLatencyDevice + ": packaging/");
   touch_stack();
   return grant;
 }

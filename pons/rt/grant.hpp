@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 namespace pons::rt {
 
@@ -11,11 +12,31 @@ struct Scheduling {
   int cpu = -1;       // pins to this CPU; -1 does not pin
 };
 
-// What was asked for and what was given. Nothing here fails: a loop runs degraded, and says so.
+// Keeps idle CPUs from sleeping so deep that waking takes long, while it lives: the kernel's cpu_dma_latency at 0. An
+// idle CPU then spins, and takes power and, on a shared host, other guests' time.
+class AwakeCpus {
+ public:
+  AwakeCpus() = default;
+  explicit AwakeCpus(int file) : file_(file) {}
+  AwakeCpus(AwakeCpus&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+  AwakeCpus& operator=(AwakeCpus&& other) noexcept {
+    std::swap(file_, other.file_);
+    return *this;
+  }
+  ~AwakeCpus();
+  [[nodiscard]] bool held() const { return file_ >= 0; }
+
+ private:
+  int file_ = -1;
+};
+
+// What was asked for and what was given. Nothing here fails: a loop runs degraded, and says so. The first three stay
+// with thread and process; the last lasts as long as this.
 struct Grant {
   bool fifo = false;    // SCHED_FIFO at the asked priority
   bool locked = false;  // all memory of the process, present and future
   bool pinned = false;  // on the asked CPU
+  AwakeCpus awake;
   std::string refused;  // one line: what was refused, why, and what would allow it; empty when all was given
   [[nodiscard]] bool degraded() const { return !refused.empty(); }
 };
