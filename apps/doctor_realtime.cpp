@@ -50,6 +50,13 @@ std::string line_of(const char* file) {
   return line;
 }
 
+// The kernel's list has a headline and a line for each swap.
+bool has_swap() {
+  std::ifstream in("/proc/swaps");
+  std::string line;
+  return std::getline(in, line) && std::getline(in, line);
+}
+
 // What no trial of a moment shows, but a long run does.
 Finding read_settings() {
   Finding worst = Finding::kGood;
@@ -66,8 +73,10 @@ Finding read_settings() {
         governor.empty() ? "none: the clock rate is not this system's to choose" : governor);
   const std::string pages = line_of("/sys/kernel/mm/transparent_hugepage/enabled");
   check(pages.find("[always]") == std::string::npos, "huge pages", pages.empty() ? "none" : pages);
-  const std::string swap = line_of("/proc/sys/vm/swappiness");
-  check(!swap.empty() && std::atoi(swap.c_str()) <= 10, "swappiness", swap);
+  const std::string swappiness = line_of("/proc/sys/vm/swappiness");
+  const bool swaps = has_swap();
+  check(!swaps || (!swappiness.empty() && std::atoi(swappiness.c_str()) <= 10), "swappiness",
+        swaps ? swappiness : "of no matter: there is no swap");
   const std::string budget = line_of("/proc/sys/kernel/sched_rt_runtime_us");
   check(budget == "-1" || std::atoi(budget.c_str()) >= 900'000, "real-time budget",
         budget + " of every 1000000 µs; -1 is no limit");
