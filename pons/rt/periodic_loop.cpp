@@ -1,27 +1,19 @@
 #include "pons/rt/periodic_loop.hpp"
 
 namespace pons::rt {
-namespace {
-
-timespec soon() {
-  constexpr long kSoon_ns = 200'000, kSecond_ns = 1'000'000'000;
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  time.tv_nsec += kSoon_ns;
-  if (time.tv_nsec >= kSecond_ns) ++time.tv_sec, time.tv_nsec -= kSecond_ns;
-  return time;
-}
-
-}  // namespace
 
 Time PeriodicLoop::sleep_until(Time scheduled) {
+  constexpr std::int64_t kSoon_ns = 200'000;
   timespec deadline = clock_.absolute(scheduled);
   for (;;) {
     const auto woken = word_.wait(seen_, deadline);
+    const std::int64_t raw_ns = MonotonicClock::raw_ns();
     const Time now = clock_.now();
+    late_ = Duration(raw_ns - deadline.tv_sec * 1'000'000'000LL - deadline.tv_nsec);
     if (now >= scheduled) return scheduled;
     if (woken == WakeWord::Woken::kChanged) return now;
-    deadline = soon();  // on a leash, standing still: whoever paces the clock needs the CPU
+    // On a leash, standing still: whoever paces the clock needs the CPU.
+    deadline = MonotonicClock::as_timespec(raw_ns + kSoon_ns);
   }
 }
 
@@ -33,9 +25,10 @@ void PeriodicLoop::run(const std::function<bool(Time)>& tick) {
     seen_ = word_.value();  // before the tick looks at what it stands for: a change from here on wakes again
     const Time begin = clock_.now();
     if (time == scheduled) {
-      lateness_.record(begin - scheduled);
+      lateness_.record(late_);
       scheduled += period_;
     } else {
+      late_ = Duration{0};
       ++woken_;
     }
     const bool go_on = tick(time);

@@ -29,7 +29,10 @@ class PeriodicLoop {
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }
   [[nodiscard]] std::uint64_t woken() const { return woken_; }             // ticks that the word asked for
-  [[nodiscard]] const Histogram& lateness() const { return lateness_; }    // from schedule to the tick's begin
+  // How late this tick's thread was woken; 0 for one that the word asked for. What a clock on a leash stood still is
+  // not the thread's lateness.
+  [[nodiscard]] Duration late() const { return late_; }
+  [[nodiscard]] const Histogram& lateness() const { return lateness_; }    // of all scheduled ticks
   [[nodiscard]] const Histogram& execution() const { return execution_; }  // from the tick's begin to its end
 
  private:
@@ -42,6 +45,7 @@ class PeriodicLoop {
   const WakeWord& word_;
   std::uint32_t seen_ = 0;  // of the word
   std::uint64_t ticks_ = 0, missed_ = 0, woken_ = 0;
+  Duration late_{0};
   Histogram lateness_, execution_;
 };
 

@@ -22,6 +22,9 @@ constexpr int kBodyPriority = 60, kBridgePriority = 10;
 // loop is held up; a simulated one need not, and what a busy computer does to it would say nothing about a robot.
 constexpr Duration kLeash = 4 * kControlPeriod;
 
+// A loop that was woken so late is told of: libfranka's robots stop after twenty missed packets in a row.
+constexpr Duration kStall = 20 * kControlPeriod;
+
 // Measurements and set-points change hands without either side waiting.
 struct Exchange {
   struct Asked {
@@ -81,6 +84,9 @@ LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& ex
   Exchange::Asked asked;
   rt::PeriodicLoop loop(clock, kControlPeriod, parts.link->emergency_word());
   loop.run([&](Time now) {
+    if (loop.late() >= kStall)
+      parts.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
+                                    1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));
     const body::Sensors& sensors = exchange.measured.read();
     if (sensors.position.size() > 0) {
       parts.cerebellum->step(now, sensors, *parts.link, asked.set_points);
