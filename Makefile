@@ -9,8 +9,10 @@ SOURCES = git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
 ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
 # What threads share without locks.
 TSAN_QUICK = rt_test link_test
+# What runs inside a tick, and what is exercised with it.
+LOOP = rt_test link_test motion_test cerebellum_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick bench clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan bench clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -70,6 +72,13 @@ tsan-quick: setup ## the tests of what threads share without locks, under the sa
 	for name in $(TSAN_QUICK); do \
 	  TSAN_OPTIONS=suppressions=$(CURDIR)/tools/tsan_suppressions.txt build/tsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; \
 	done
+
+rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
+	@tools/setup --check
+	cmake --preset rtsan
+	cmake --build --preset rtsan --parallel $(JOBS) --target $(LOOP) known_bad_test
+	for name in $(LOOP); do build/rtsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; done
+	ctest --preset rtsan -R 'KnownBad|KnownGood|blocking_call' --no-tests=error
 
 bench: build ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \

@@ -9,6 +9,13 @@ target_compile_options(pons_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -W
   -Wno-missing-field-initializers -Wnon-virtual-dtor -Woverloaded-virtual -Werror -ffp-contract=off
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<NOT:$<CONFIG:Debug>>>:-Wno-maybe-uninitialized>)
 target_include_directories(pons_flags INTERFACE "${PROJECT_SOURCE_DIR}")
+# What PONS_NONBLOCKING promises, clang checks where it compiles. Eigen's and Pinocchio's templates promise nothing, so of
+# the modules that compute with them only the run-time checks judge.
+set(PONS_EFFECTS "")
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 20)
+  set(PONS_EFFECTS -Wfunction-effects)
+endif()
+set(PONS_EFFECTS_UNKNOWN_IN model cerebellum)
 
 # pons_module(NAME [SOURCES ...] [TESTS ...] [USES modules ...] [LIBRARIES external targets ...] [TEST_LIBRARIES ...])
 #
@@ -32,6 +39,9 @@ function(pons_module name)
   if(ARG_SOURCES)
     add_library(pons_${name} STATIC ${ARG_SOURCES})
     target_link_libraries(pons_${name} PUBLIC pons_flags ${uses} ${ARG_LIBRARIES})
+    if(NOT name IN_LIST PONS_EFFECTS_UNKNOWN_IN)
+      target_compile_options(pons_${name} PRIVATE ${PONS_EFFECTS})
+    endif()
   else()
     add_library(pons_${name} INTERFACE)
     target_link_libraries(pons_${name} INTERFACE pons_flags ${uses} ${ARG_LIBRARIES})

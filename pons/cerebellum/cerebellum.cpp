@@ -5,6 +5,8 @@
 #include <span>
 #include <utility>
 
+#include "pons/rt/guard.hpp"
+
 namespace pons::cerebellum {
 namespace {
 
@@ -44,6 +46,7 @@ const AxisLimits& Cerebellum::limits() const { return tracker_.robot_model().rob
 
 void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
                       body::SetPoints& set_points) PONS_NONBLOCKING {
+  const rt::InTick in_tick;
   if (now <= stepped_) return;  // no time has passed: what was written stays in force
   dt_s_ = to_s(now - stepped_);
   ++state_.tick;

@@ -8,6 +8,7 @@
 
 #include "pons/rt/clock.hpp"
 #include "pons/rt/grant.hpp"
+#include "pons/rt/guard.hpp"
 #include "pons/rt/periodic_loop.hpp"
 #include "pons/rt/triple_buffer.hpp"
 #include "pons/runner/ending.hpp"
@@ -61,12 +62,15 @@ void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Share
   body::Sensors sensors;
   const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
   rt::PeriodicLoop loop(own, kControlPeriod);
+  Time reached;
   loop.run([&](Time) {
     const Exchange::Asked& asked = exchange.asked.read();
     const bool controlled = asked.set_points.torque_nm.size() > 0;
     if (controlled) parts.plant.body->write(asked.set_points);
-    // Until the loop has begun, the clock must go on for it to begin.
-    const Time now = controlled ? std::min(clock.now(), asked.at + kLeash) : clock.now();
+    // Until the loop has begun, the clock must go on for it to begin. What passed during its first tick stays passed:
+    // the loop has gone by it, and would wait for ever on a clock that went back.
+    reached = std::max(reached, controlled ? std::min(clock.now(), asked.at + kLeash) : clock.now());
+    const Time now = reached;
     parts.plant.advance(now);
     clock.reach(now);
     parts.plant.body->read(sensors);
@@ -84,6 +88,7 @@ LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& ex
   Exchange::Asked asked;
   rt::PeriodicLoop loop(clock, kControlPeriod, parts.link->emergency_word());
   loop.run([&](Time now) {
+    const rt::InTick in_tick;
     if (loop.late() >= kStall)
       parts.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
                                     1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));

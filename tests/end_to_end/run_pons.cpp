@@ -15,20 +15,20 @@ namespace pons::tests {
 namespace {
 
 // In the child: becomes the program, with its streams where `out` and `err` lead.
-[[noreturn]] void become_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
-                              int out, int err) {
+[[noreturn]] void become(const std::string& file, const std::vector<std::string>& arguments,
+                         const std::vector<std::string>& environment, int out, int err) {
   for (const std::string& entry : environment) {
     const auto equals = entry.find('=');
     setenv(entry.substr(0, equals).c_str(), entry.substr(equals + 1).c_str(), 1);
   }
   dup2(out, STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
-  std::vector<std::string> words{"pons"};
+  std::vector<std::string> words{std::filesystem::path(file).filename()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  execv(PONS_BINARY, argv.data());
+  execv(file.c_str(), argv.data());
   _exit(127);
 }
 
@@ -40,22 +40,27 @@ int exit_code(pid_t child) {
 
 }  // namespace
 
-Finished run_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
+Finished run_program(const std::string& file, const std::vector<std::string>& arguments,
+                     const std::vector<std::string>& environment) {
   const Folder folder;
   const std::string out = folder / "out", err = folder / "err";
   const pid_t child = fork();
   if (child == 0) {
-    become_pons(arguments, environment, open(out.c_str(), O_CREAT | O_WRONLY, 0600),
-                open(err.c_str(), O_CREAT | O_WRONLY, 0600));
+    become(file, arguments, environment, open(out.c_str(), O_CREAT | O_WRONLY, 0600),
+           open(err.c_str(), O_CREAT | O_WRONLY, 0600));
   }
   const int code = exit_code(child);
   return {code, read_text(out), read_text(err)};
 }
 
+Finished run_pons(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
+  return run_program(PONS_BINARY, arguments, environment);
+}
+
 int run_pons_unheard(const std::vector<std::string>& arguments) {
   const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
   const pid_t child = fork();
-  if (child == 0) become_pons(arguments, {}, full, full);
+  if (child == 0) become(PONS_BINARY, arguments, {}, full, full);
   close(full);
   return exit_code(child);
 }
@@ -65,7 +70,7 @@ Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
   std::array<int, 2> err{};
   if (pipe2(err.data(), O_CLOEXEC) != 0) return {};
   const pid_t child = fork();
-  if (child == 0) become_pons(arguments, {}, open("/dev/null", O_WRONLY | O_CLOEXEC), err[1]);
+  if (child == 0) become(PONS_BINARY, arguments, {}, open("/dev/null", O_WRONLY | O_CLOEXEC), err[1]);
   close(err[1]);
   Finished finished;
   std::array<char, 256> chunk{};

@@ -16,6 +16,8 @@ struct Finished {
 };
 
 // `arguments` are handed over as they are, through no shell. `environment` entries ("NAME=value") are added.
+[[nodiscard]] Finished run_program(const std::string& file, const std::vector<std::string>& arguments,
+                                   const std::vector<std::string>& environment = {});
 [[nodiscard]] Finished run_pons(const std::vector<std::string>& arguments,
                                 const std::vector<std::string>& environment = {});
 
