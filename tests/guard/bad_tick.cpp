@@ -226,7 +226,11 @@ const std::map<std::string, void (*)()> kCases{
     {"interrupted", interrupted},
     {"malloc", [] { tick([] { kept = std::malloc(8); }); }},
     {"calloc", [] { tick([] { kept = std::calloc(1, 8); }); }},
-    {"realloc", [] { tick([] { kept = std::realloc(nullptr, 8); }); }},
+    {"realloc",
+     [] {
+       kept = std::malloc(4);
+       tick([] { kept = std::realloc(kept, 8); });
+     }},
     {"aligned_alloc", [] { tick([] { kept = std::aligned_alloc(64, 64); }); }},
     {"posix_memalign", aligns},
     {"free", frees},
