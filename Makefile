@@ -7,10 +7,12 @@ SEED ?= 1
 SOURCES = git ls-files --cached --others --exclude-standard -- '*.cpp' '*.hpp'
 # What reads bytes from outside or handles memory by hand; the rest runs under the sanitizers with make asan.
 ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
+# What threads share without locks.
+TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan rtsan bench clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan bench clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -63,6 +65,13 @@ tsan: setup ## all tests under the thread sanitizer
 	cmake --preset tsan
 	cmake --build --preset tsan --parallel $(JOBS)
 	ctest --preset tsan --parallel 2 --no-tests=error
+
+tsan-quick: setup ## the tests of what threads share without locks, under the same sanitizer
+	cmake --preset tsan
+	cmake --build --preset tsan --parallel $(JOBS) --target $(TSAN_QUICK)
+	for name in $(TSAN_QUICK); do \
+	  TSAN_OPTIONS=suppressions=$(CURDIR)/tools/tsan_suppressions.txt build/tsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; \
+	done
 
 rtsan: export RTSAN_OPTIONS = external_symbolizer_path=/usr/bin/addr2line
 rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires

@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <pthread.h>
-#include <sys/mman.h>
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <memory>
 #include <numbers>
 
 #include "apps/commands.hpp"
+#include "apps/doctor.hpp"
 #include "apps/paths.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/sim/simulation.hpp"
@@ -17,37 +18,15 @@
 #include "pons/world/world.hpp"
 
 namespace pons::apps {
-namespace {
-
-enum class Finding : std::uint8_t { kGood, kDegraded, kBad };
 
 Finding say(Finding finding, std::string_view what, std::string_view how) {
   constexpr const char* kWords[] = {"good", "slow", "bad"};
-  fmt::print("{:<5} {:<22} {}\n", kWords[static_cast<int>(finding)], what, how);
+  say(stdout, fmt::format("{:<5} {:<22} {}\n", kWords[static_cast<int>(finding)], what, how));
+  std::fflush(stdout);  // a minute passes before the last line
   return finding;
 }
 
-Finding try_realtime_priority() {
-  pthread_t self = pthread_self();
-  int policy = 0;
-  sched_param before{}, wanted{};
-  pthread_getschedparam(self, &policy, &before);
-  wanted.sched_priority = 80;
-  const int refused = pthread_setschedparam(self, SCHED_FIFO, &wanted);
-  pthread_setschedparam(self, policy, &before);
-  if (refused == 0) return say(Finding::kGood, "real-time priority", "SCHED_FIFO granted");
-  return say(Finding::kDegraded, "real-time priority",
-             "SCHED_FIFO refused: sudo setcap cap_sys_nice,cap_ipc_lock+ep $(which pons)");
-}
-
-Finding try_locked_memory() {
-  constexpr std::size_t kBytes = 1U << 20U;
-  void* page = mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  const bool locked = page != MAP_FAILED && mlock(page, kBytes) == 0;
-  if (page != MAP_FAILED) munmap(page, kBytes);
-  if (locked) return say(Finding::kGood, "locked memory", "granted");
-  return say(Finding::kDegraded, "locked memory", "refused: sudo setcap cap_sys_nice,cap_ipc_lock+ep $(which pons)");
-}
+namespace {
 
 // Where the tool must get: over each mouth, and to the belt at both ends of the pick zone. Empty, or what it does not
 // reach.
@@ -93,15 +72,14 @@ Finding try_world(const std::string& name) {
              fmt::format("composes, the arm reaches, and {} cameras render", world->cameras.size()));
 }
 
-int doctor() {
+int doctor(double jitter_s) {
   Finding worst = Finding::kGood;
   const auto note = [&](Finding finding) { worst = std::max(worst, finding); };
   const auto folder = worlds_folder();
   const auto names = world::list(folder);
   if (names.empty()) note(say(Finding::kBad, "worlds", fmt::format("none in {}: set PONS_WORLDS", folder.string())));
   for (const std::string& name : names) note(try_world(name));
-  note(try_realtime_priority());
-  note(try_locked_memory());
+  note(try_realtime(from_s(jitter_s)));
   if (worst == Finding::kDegraded) fmt::print("Everything works; --realtime will be less regular than it could be.\n");
   return worst == Finding::kBad ? kExitBadInput : kExitGood;
 }
@@ -109,7 +87,11 @@ int doctor() {
 }  // namespace
 
 void add_doctor(CLI::App& app, Chosen& chosen) {
-  app.add_subcommand("doctor", "Try what a run needs on this machine")->callback([&chosen] { chosen = doctor; });
+  auto jitter_s = std::make_shared<double>(60);
+  CLI::App* command = app.add_subcommand("doctor", "Try what a run needs on this machine");
+  command->add_option("--jitter", *jitter_s, "Seconds to measure the control loop's regularity for; 0: not (60)")
+      ->check(CLI::Range(0.0, 86400.0));
+  command->callback([jitter_s, &chosen] { chosen = [jitter_s] { return doctor(*jitter_s); }; });
 }
 
 }  // namespace pons::apps

@@ -4,10 +4,13 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <climits>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <optional>
 
@@ -30,7 +33,7 @@ namespace fs = std::filesystem;
 struct RunOptions {
   std::string world;
   std::int64_t parcels = 200;
-  fs::path manifest, journal, report, picture, socket;
+  fs::path manifest, journal, report, log, picture, socket;
   std::uint64_t seed = 1;
   bool parcels_given = false, realtime = false, lockstep = false, quiet = false, explain = false;
 };
@@ -67,9 +70,10 @@ fs::path absolute_of(const fs::path& file) {
 // What a run reads and writes, by option. Refused now rather than after the work: files that cannot be written, and one
 // file for two things.
 Expected<void> check_files(const RunOptions& options) {
-  const std::array<std::pair<const char*, fs::path>, 5> files{{{"--manifest", options.manifest},
+  const std::array<std::pair<const char*, fs::path>, 6> files{{{"--manifest", options.manifest},
                                                                {"--journal", options.journal},
                                                                {"--report", options.report},
+                                                               {"--log", options.log},
                                                                {"--picture", options.picture},
                                                                {"--socket", options.socket}}};
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -85,7 +89,7 @@ Expected<void> check_files(const RunOptions& options) {
   }
   if (options.journal == ":memory:")
     return fail("is no file", "--journal :memory:", "name a file, or leave --journal away");
-  for (const fs::path& file : {options.report, options.picture}) {
+  for (const fs::path& file : {options.report, options.log, options.picture}) {
     if (file.empty()) continue;
     if (auto possible = record::check_writable(file); !possible) return possible;
   }
@@ -164,7 +168,13 @@ record::Report report_of(const RunOptions& options, const Assembly& cell, const 
   report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
                  .missed = static_cast<std::int64_t>(result.loop.missed),
                  .p50_us = result.loop.p50_us,
-                 .p99_us = result.loop.p99_us};
+                 .p99_us = result.loop.p99_us,
+                 .degraded = result.loop.degraded};
+  if (const auto& late = result.loop.late) {
+    report.loop.late_p50_us = late->p50_us;
+    report.loop.late_p99_us = late->p99_us;
+    report.loop.late_max_us = late->max_us;
+  }
   report.sim_seconds = result.end.s();
   report.wall_seconds = wall_s;
   report.state_hash = state_hash(cell, verdict);
@@ -177,8 +187,32 @@ Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
   return write_png(file, kPictureWidth, kPictureHeight, *rgb);
 }
 
-// Watches the run: Ctrl-C, the progress bar, and the moment for the picture.
-runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progress, std::int64_t total, bool& pictured) {
+// What the control loop says, line by line, so that a run that dies leaves what led there.
+class LoopLog {
+ public:
+  // No file: nothing is kept.
+  [[nodiscard]] Expected<void> open(const fs::path& path) {
+    if (path.empty()) return {};
+    file_.reset(std::fopen(path.c_str(), "w"));
+    if (!file_) return fail(std::strerror(errno), path.string(), "name a file that can be written");
+    return {};
+  }
+  void say(Time at, std::string_view text) {
+    if (!file_) return;
+    apps::say(file_.get(), fmt::format("{:12.6f} {}\n", at.s(), text));
+    std::fflush(file_.get());
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+// Watches the run: Ctrl-C, the progress bar, the loop's events, and the moment for the picture.
+runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progress, LoopLog& log, std::int64_t total,
+                    bool& pictured) {
   return {
       .interrupted = [] { return interrupts > 0; },
       .progress =
@@ -191,14 +225,17 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
               pictured = take_picture(cell, options.picture).has_value();
             }
           },
+      .said = [&log](Time at, std::string_view text) { log.say(at, text); },
       .limit = Time(from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(total)))};
 }
 
 int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   Progress progress(stderr, total);
+  LoopLog log;
+  if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
   bool pictured = false;
   runner::Parts parts = cell.parts();
-  const runner::Watch watcher = watch(options, cell, progress, total, pictured);
+  const runner::Watch watcher = watch(options, cell, progress, log, total, pictured);
   const auto began = std::chrono::steady_clock::now();
   const auto result = options.realtime ? runner::run_realtime(parts, watcher) : runner::run_lockstep(parts, watcher);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
@@ -225,7 +262,7 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
     }
     say(stdout, fmt::format("picture: {}\n", options.picture.string()));
   }
-  if (!result->loop.degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->loop.degraded));
+  if (!options.log.empty()) say(stdout, fmt::format("log: {}\n", options.log.string()));
   if (!options.journal.empty()) say(stdout, fmt::format("journal: {}\n", options.journal.string()));
   if (interrupts > 0) return kExitInterrupted;
   if (!result->complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
@@ -293,6 +330,8 @@ void add_run(CLI::App& app, Chosen& chosen) {
       ->excludes(lockstep);
   command->add_option("--journal", options->journal, "SQLite file that keeps tasks and outcomes (a temporary one)");
   command->add_option("--report", options->report, "JSON file for the figures of the run");
+  command->add_option("--log", options->log,
+                      "Text file for what the control loop did: stops, arming, refused commands");
   command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
   command->add_option("--socket", options->socket,
                       "Where `pons task` reaches this run (on by default with --realtime)");

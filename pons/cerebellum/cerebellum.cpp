@@ -103,7 +103,8 @@ bool Cerebellum::is_standing(Time now) const {
 void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   word_raised_ = link.emergency_stop_raised();
   if (word_raised_) stop(StopKind::kEmergency, StopCause::kEmergencyWord, now);
-  if (powered_ && is_silent(now)) stop(StopKind::kEmergency, StopCause::kBodySilent, now);
+  if (powered_ && is_silent(now) && stop(StopKind::kEmergency, StopCause::kBodySilent, now))
+    log_.write(now, "no newer measurement for {:.1f} ms", 1e3 * to_s(now - fresh_at_));
   if (stop_input_) stop(StopKind::kProtective, StopCause::kStopInput, now);
   watch_following(now);
 }
@@ -115,25 +116,30 @@ void Cerebellum::watch_following(Time now) {
   }
   // commanded_ is still the last step's: compare it with where the arm was then.
   const AxisVector then = position_now_ - dt_s_ * speed_now_;
-  const double error = (commanded_.position - then).cwiseAbs().maxCoeff();
+  Eigen::Index axis = 0;
+  const double error = (commanded_.position - then).cwiseAbs().maxCoeff(&axis);
   statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
   const bool strays = error > settings_.following_error_rad;
   if (strays && !strays_) strays_since_ = now;
   strays_ = strays;
-  if (strays && now - strays_since_ >= settings_.following_time) {
-    stop(StopKind::kProtective, StopCause::kFollowingError, now);
-  }
+  if (strays && now - strays_since_ >= settings_.following_time &&
+      stop(StopKind::kProtective, StopCause::kFollowingError, now))
+    log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
 }
 
 void Cerebellum::take_commands(Time now, link::CerebellumEnd& link) {
+  const std::uint64_t dropped = state_.dropped;
   for (int i = 0; i < kCommandsPerTick && link.receive(command_); ++i) {
     heard_at_ = now;
     state_.last_sequence = std::max(state_.last_sequence, command_.sequence);
     if (!take(command_, now)) ++state_.dropped;
   }
-  if (state_.safety == SafetyState::kOperational && now - heard_at_ >= settings_.heartbeat_timeout) {
-    stop(StopKind::kProtective, StopCause::kHeartbeatLost, now);
-  }
+  if (state_.dropped > dropped)
+    log_.write(now, "refused {} commands up to number {}: {}, epoch {}", state_.dropped - dropped, state_.last_sequence,
+               name(state_.safety), state_.epoch);
+  if (state_.safety == SafetyState::kOperational && now - heard_at_ >= settings_.heartbeat_timeout &&
+      stop(StopKind::kProtective, StopCause::kHeartbeatLost, now))
+    log_.write(now, "no command for {:.1f} ms", 1e3 * to_s(now - heard_at_));
 }
 
 bool Cerebellum::take(const link::Command& command, Time now) {
@@ -154,7 +160,7 @@ bool Cerebellum::take(const link::Command& command, Time now) {
     case CommandKind::kPayload:
       return take_payload(command, now);
     case CommandKind::kReset:
-      return is_standing(now) && reset();
+      return is_standing(now) && reset(now);
     case CommandKind::kArm:
       return is_standing(now) && arm(now);
     default:
@@ -163,8 +169,11 @@ bool Cerebellum::take(const link::Command& command, Time now) {
 }
 
 bool Cerebellum::take_motion(const link::Command& command, Time now) {
-  if (queue_.append(command.segment, command.splice, stepped_) == Refusal::kNone) return true;
-  stop(StopKind::kProtective, StopCause::kBadCommand, now);
+  const Refusal refusal = queue_.append(command.segment, command.splice, stepped_);
+  if (refusal == Refusal::kNone) return true;
+  if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+    log_.write(now, "command {}, motion from {:.6f} s on: {}", command.sequence, command.segment.start.s(),
+               name(refusal));
   return false;
 }
 
@@ -172,20 +181,23 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
   const auto& com = command.payload_com_m;
   const bool near = std::all_of(com.begin(), com.end(), [](double x) { return std::abs(x) <= 2; });
   if (!(command.payload_kg >= 0) || !(command.payload_kg <= settings_.max_payload_kg) || !near) {
-    stop(StopKind::kProtective, StopCause::kBadCommand, now);
+    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+      log_.write(now, "command {}: a payload of {:.3g} kg, or where no load can be", command.sequence,
+                 command.payload_kg);
     return false;
   }
   tracker_.carry({command.payload_kg, com});
   return true;
 }
 
-bool Cerebellum::reset() {
+bool Cerebellum::reset(Time now) {
   const bool stopped = state_.safety == SafetyState::kProtectiveStop || state_.safety == SafetyState::kEmergencyStop;
   if (!stopped || !is_released()) return false;
   state_.safety = SafetyState::kDisarmed;
   state_.cause = StopCause::kNone;
   state_.stop_result = StopResult::kNone;
   emergency_ = false;
+  log_.write(now, "reset: disarmed");
   return true;
 }
 
@@ -199,14 +211,15 @@ bool Cerebellum::arm(Time now) {
   queue_.rest(inside, stepped_);
   heard_at_ = now;
   state_.safety = SafetyState::kOperational;
+  log_.write(now, "armed in epoch {}", state_.epoch);
   return true;
 }
 
-void Cerebellum::stop(StopKind kind, StopCause cause, Time now) {
+bool Cerebellum::stop(StopKind kind, StopCause cause, Time now) {
   const bool stopped = state_.safety == SafetyState::kStopping || state_.safety == SafetyState::kProtectiveStop ||
                        state_.safety == SafetyState::kEmergencyStop;
   const bool overtakes = kind == StopKind::kEmergency && !emergency_;
-  if (stopped && !overtakes) return;
+  if (stopped && !overtakes) return false;
   ++statistics_.stops;
   if (overtakes) {
     emergency_ = true;
@@ -226,6 +239,9 @@ void Cerebellum::stop(StopKind kind, StopCause cause, Time now) {
     queue_.rest(commanded_.position, stop_ends_);
   }
   state_.safety = SafetyState::kStopping;
+  log_.write(now, "{} stop: {}", emergency_ ? std::string_view("emergency") : std::string_view("protective"),
+             name(cause));
+  return true;
 }
 
 void Cerebellum::advance(Time now) {
@@ -243,10 +259,12 @@ void Cerebellum::follow(Time now) {
   AxisState next = commanded_;
   const Phase phase = queue_.sample(now, next);
   if (phase == Phase::kEndedMoving) {
-    stop(StopKind::kProtective, StopCause::kBadCommand, now);
-  } else if (!limit_watch_.allows(commanded_, next, dt_s_)) {
+    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+      log_.write(now, "the motion ended moving, and nothing followed");
+  } else if (const auto breach = limit_watch_.breach(commanded_, next, dt_s_)) {
     ++statistics_.refused;
-    stop(StopKind::kProtective, StopCause::kLimit, now);
+    if (stop(StopKind::kProtective, StopCause::kLimit, now))
+      log_.write(now, "axis {} would have gone beyond its {} limit", breach->axis + 1, name(breach->limit));
   } else {
     commanded_ = next;
   }
@@ -275,6 +293,8 @@ void Cerebellum::judge_stop(Time now) {
     state_.stop_result = StopResult::kUncertain;
   }
   if (!at_end || state_.stop_result == StopResult::kPending) return;
+  log_.write(now, "standstill {} {:.0f} ms after the stop began", name(state_.stop_result),
+             1e3 * to_s(now - stop_began_));
   state_.safety = emergency_ ? SafetyState::kEmergencyStop : SafetyState::kProtectiveStop;
   if (emergency_) {
     powered_ = false;

@@ -25,6 +25,7 @@
 #include "pons/link/link.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/motion/axis_profile.hpp"
+#include "pons/rt/event_log.hpp"
 
 namespace pons::cerebellum {
 
@@ -73,6 +74,8 @@ class Cerebellum {
   // As of the last step. The stepping thread's.
   [[nodiscard]] const link::State& state() const { return state_; }
   [[nodiscard]] const Statistics& statistics() const { return statistics_; }
+  // Stops and why, standstill, resets, arming, refused commands. One other thread may drain it.
+  [[nodiscard]] rt::EventLog& log() { return log_; }
 
  private:
   enum class StopKind : std::uint8_t { kProtective, kEmergency };
@@ -84,9 +87,10 @@ class Cerebellum {
   [[nodiscard]] bool take(const link::Command& command, Time now);
   [[nodiscard]] bool take_motion(const link::Command& command, Time now);
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
-  [[nodiscard]] bool reset();
+  [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
-  void stop(StopKind kind, link::StopCause cause, Time now);
+  // False if it is stopped or stopping already.
+  bool stop(StopKind kind, link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
   void sample_stop(Time now);
@@ -105,6 +109,7 @@ class Cerebellum {
   MotionQueue queue_;
   link::State state_;
   Statistics statistics_;
+  rt::EventLog log_;
   link::Command command_;  // scratch
 
   // The commanded state at stepped_, the last step's time; before_ is the one a step earlier.

@@ -14,40 +14,60 @@ constexpr double kPosition = 1e-6;  // rad
 
 }  // namespace
 
-bool LimitWatch::is_inside(const AxisState& previous, const AxisState& next, double dt_s) const {
+std::string_view name(Limit limit) {
+  switch (limit) {
+    case Limit::kPosition:
+      return "position";
+    case Limit::kSpeed:
+      return "speed";
+    case Limit::kAcceleration:
+      return "acceleration";
+    case Limit::kJerk:
+      return "jerk";
+    case Limit::kStoppingDistance:
+      return "stopping distance";
+  }
+  return "unknown";
+}
+
+std::optional<Breach> LimitWatch::breach_now(const AxisState& previous, const AxisState& next, double dt_s) const {
   for (Eigen::Index i = 0; i < next.position.size(); ++i) {
     const double change = std::abs(next.acceleration[i] - previous.acceleration[i]);
     // Written so that a value that is not a number fails.
     if (!(next.position[i] >= limits_.position_min[i] - kPosition) ||
-        !(next.position[i] <= limits_.position_max[i] + kPosition) ||
-        !(std::abs(next.speed[i]) <= limits_.speed_rad_s[i] * kRate) ||
-        !(std::abs(next.acceleration[i]) <= limits_.acceleration_rad_s2[i] * kRate) ||
-        !(change <= limits_.jerk_rad_s3[i] * dt_s * kRate + SeamTolerance::kAcceleration)) {
-      return false;
-    }
+        !(next.position[i] <= limits_.position_max[i] + kPosition))
+      return Breach{i, Limit::kPosition};
+    if (!(std::abs(next.speed[i]) <= limits_.speed_rad_s[i] * kRate)) return Breach{i, Limit::kSpeed};
+    if (!(std::abs(next.acceleration[i]) <= limits_.acceleration_rad_s2[i] * kRate))
+      return Breach{i, Limit::kAcceleration};
+    if (!(change <= limits_.jerk_rad_s3[i] * dt_s * kRate + SeamTolerance::kAcceleration))
+      return Breach{i, Limit::kJerk};
   }
-  return true;
+  return std::nullopt;
 }
 
-bool LimitWatch::can_stop(const AxisState& state) const {
+std::optional<Breach> LimitWatch::breach_ahead(const AxisState& state) const {
   for (Eigen::Index i = 0; i < state.position.size(); ++i) {
     const motion::AxisBounds bounds{limits_.speed_rad_s[i], limits_.acceleration_rad_s2[i], limits_.jerk_rad_s3[i]};
     const motion::AxisPoint point{state.position[i], state.speed[i], state.acceleration[i]};
     const double a = std::abs(point.acceleration), coasting = std::abs(motion::coasting_speed(point, bounds.jerk));
-    if (coasting > bounds.speed * kRate + SeamTolerance::kSpeed) return false;
+    if (coasting > bounds.speed * kRate + SeamTolerance::kSpeed) return Breach{i, Limit::kSpeed};
     // No stop travels farther than this; only near a limit is the exact way worth its time.
     const double fastest = std::abs(point.speed) + a * a / (2 * bounds.jerk);
     const double farthest = fastest * (fastest / (2 * bounds.acceleration) + (bounds.acceleration + a) / bounds.jerk);
     if (point.position - farthest >= limits_.position_min[i] && point.position + farthest <= limits_.position_max[i])
       continue;
     const double end = motion::plan_to_speed(point, 0, bounds).end().position;
-    if (end < limits_.position_min[i] - kPosition || end > limits_.position_max[i] + kPosition) return false;
+    if (end < limits_.position_min[i] - kPosition || end > limits_.position_max[i] + kPosition)
+      return Breach{i, Limit::kStoppingDistance};
   }
-  return true;
+  return std::nullopt;
 }
 
-bool LimitWatch::allows(const AxisState& previous, const AxisState& next, double dt_s) const PONS_NONBLOCKING {
-  return is_inside(previous, next, dt_s) && can_stop(next);
+std::optional<Breach> LimitWatch::breach(const AxisState& previous, const AxisState& next,
+                                         double dt_s) const PONS_NONBLOCKING {
+  const auto now = breach_now(previous, next, dt_s);
+  return now ? now : breach_ahead(next);
 }
 
 void LimitWatch::record(const AxisState& previous, const AxisState& next, double dt_s,
@@ -59,7 +79,7 @@ void LimitWatch::record(const AxisState& previous, const AxisState& next, double
     const double jerk = std::abs(next.acceleration[i] - previous.acceleration[i]) / dt_s;
     use.jerk = std::max(use.jerk, jerk / limits_.jerk_rad_s3[i]);
   }
-  if (!is_inside(previous, next, dt_s)) ++statistics.violations;
+  if (breach_now(previous, next, dt_s)) ++statistics.violations;
 }
 
 }  // namespace pons::cerebellum

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "pons/core/axes.hpp"
 #include "pons/core/realtime.hpp"
@@ -27,22 +29,31 @@ struct Statistics {
   std::uint64_t stops = 0;               // of any kind
 };
 
+enum class Limit : std::uint8_t { kPosition, kSpeed, kAcceleration, kJerk, kStoppingDistance };
+[[nodiscard]] std::string_view name(Limit limit);
+
+struct Breach {
+  Eigen::Index axis;
+  Limit limit;
+};
+
 class LimitWatch {
  public:
   // `limits` must outlive it.
   explicit LimitWatch(const AxisLimits& limits) : limits_(limits) {}
 
-  // Whether `next` may follow `previous` after dt_s: position, speed, acceleration inside their limits, the change of
-  // acceleration inside the jerk limit, and the arm still able to stop inside its position and speed limits from there.
+  // Why `next` may not follow `previous` after dt_s, if so: position, speed, acceleration beyond their limits, the
+  // change of acceleration beyond the jerk limit, or no way left to stop inside the position and speed limits.
   // Tolerances: 1e-6 rad, 1e-6 of each rate, and for jerk what a seam may add (SeamTolerance).
-  [[nodiscard]] bool allows(const AxisState& previous, const AxisState& next, double dt_s) const PONS_NONBLOCKING;
+  [[nodiscard]] std::optional<Breach> breach(const AxisState& previous, const AxisState& next,
+                                             double dt_s) const PONS_NONBLOCKING;
   // Records what was sent; counts it as a violation if it broke a limit all the same.
   void record(const AxisState& previous, const AxisState& next, double dt_s,
               Statistics& statistics) const PONS_NONBLOCKING;
 
  private:
-  [[nodiscard]] bool is_inside(const AxisState& previous, const AxisState& next, double dt_s) const;
-  [[nodiscard]] bool can_stop(const AxisState& state) const;
+  [[nodiscard]] std::optional<Breach> breach_now(const AxisState& previous, const AxisState& next, double dt_s) const;
+  [[nodiscard]] std::optional<Breach> breach_ahead(const AxisState& state) const;
   const AxisLimits& limits_;
 };
 

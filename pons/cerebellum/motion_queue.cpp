@@ -37,6 +37,24 @@ bool is_at_rest(const AxisState& state) PONS_NONBLOCKING {
          state.acceleration.cwiseAbs().maxCoeff() <= SeamTolerance::kAcceleration;
 }
 
+std::string_view name(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::kNone:
+      return "taken";
+    case Refusal::kNotFinite:
+      return "not finite, or of no sensible duration";
+    case Refusal::kFromThePast:
+      return "from the past";
+    case Refusal::kGap:
+      return "a gap in time";
+    case Refusal::kDiscontinuous:
+      return "a jump in the motion";
+    case Refusal::kFull:
+      return "too much motion queued";
+  }
+  return "unknown";
+}
+
 void MotionQueue::rest(const AxisVector& position, Time time) PONS_NONBLOCKING {
   first_ = count_ = 0;
   rest_ = position;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "pons/core/axes.hpp"
 #include "pons/core/realtime.hpp"
@@ -21,6 +22,7 @@ struct SeamTolerance {
 };
 
 enum class Refusal : std::uint8_t { kNone, kNotFinite, kFromThePast, kGap, kDiscontinuous, kFull };
+[[nodiscard]] std::string_view name(Refusal refusal);
 
 enum class Phase : std::uint8_t {
   kResting,     // nothing to follow now; the state holds still

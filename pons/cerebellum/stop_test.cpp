@@ -1,4 +1,5 @@
 // Every cause stops the arm along its limits, from full motion and from rest; and only the right acts leave a stop.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -44,6 +45,7 @@ struct StopCase {
   bool emergency;
   std::function<void(Bench&)> trigger;
   std::function<void(Bench&)> release;
+  const char* detail = "";  // what the log adds to the cause
 };
 
 void nothing(Bench&) {}
@@ -56,10 +58,11 @@ const StopCase kCases[] = {
     {"StopInput", StopCause::kStopInput, false, [](Bench& b) { b.plant.sensors.stop_input = true; },
      [](Bench& b) { b.plant.sensors.stop_input = false; }},
     {"HeartbeatLost", StopCause::kHeartbeatLost, false, [](Bench& b) { b.mute = true; },
-     [](Bench& b) { b.mute = false; }},
+     [](Bench& b) { b.mute = false; }, "no command for 10"},
     {"FollowingError", StopCause::kFollowingError, false, [](Bench& b) { b.plant.blocked = true; },
-     [](Bench& b) { b.plant.blocked = false; }},
-    {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing},
+     [](Bench& b) { b.plant.blocked = false; }, "rad from where it was told to be"},
+    {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing,
+     "of no sensible duration"},
 };
 
 class Stop : public testing::TestWithParam<StopCase> {};
@@ -92,6 +95,19 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
   EXPECT_EQ(bench.state().epoch, GetParam().emergency ? 2u : 1u);
   EXPECT_EQ(bench.cerebellum.statistics().violations, 0u);
   EXPECT_LE(bench.cerebellum.statistics().commanded.jerk, 1 + 1e-5);
+}
+
+TEST_P(Stop, IsToldWithItsCauseAndItsStandstill) {
+  Bench bench;
+  get_moving(bench);
+  GetParam().trigger(bench);
+  bench.run(1500ms);
+  std::string told;
+  bench.cerebellum.log().drain([&](Time, std::string_view text) { told += std::string(text) + "\n"; });
+  const std::string kind = GetParam().emergency ? "emergency" : "protective";
+  EXPECT_THAT(told, testing::HasSubstr("armed in epoch 1\n" + kind + " stop: " + std::string(name(GetParam().cause))));
+  EXPECT_THAT(told, testing::HasSubstr(GetParam().detail));
+  EXPECT_THAT(told, testing::HasSubstr("standstill CONFIRMED "));
 }
 
 TEST_P(Stop, OnlyResetAndArmLeaveItAndNeitherMovesAnything) {

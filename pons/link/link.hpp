@@ -2,13 +2,13 @@
 // them, in order), states come up through a triple buffer (the newest), and one word stops everything.
 #pragma once
 
-#include <atomic>
-#include <cstdint>
+#include <cstddef>
 
 #include "pons/core/realtime.hpp"
 #include "pons/link/message.hpp"
 #include "pons/rt/ring.hpp"
 #include "pons/rt/triple_buffer.hpp"
+#include "pons/rt/wake_word.hpp"
 
 namespace pons::link {
 
@@ -17,20 +17,18 @@ class Link {
  public:
   static constexpr std::size_t kCommands = 1024;
 
-  // Latches an emergency stop. Any thread, signal handlers too; wait-free. No command lifts it.
-  void raise_emergency_stop() PONS_NONBLOCKING { emergency_.store(1, std::memory_order_release); }
+  // Latches an emergency stop and wakes the loop for it. Any thread, signal handlers too. No command lifts it.
+  void raise_emergency_stop() { emergency_.set(1); }
   // Lets go of the word, as a person does who unlocks the button. The stop itself stays until kReset.
-  void clear_emergency_stop() PONS_NONBLOCKING { emergency_.store(0, std::memory_order_release); }
-  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING {
-    return emergency_.load(std::memory_order_acquire) != 0;
-  }
+  void clear_emergency_stop() { emergency_.set(0); }
+  [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return emergency_.value() != 0; }
 
  private:
   friend class BridgeEnd;
   friend class CerebellumEnd;
   rt::SpscRing<Command, kCommands> commands_;
   rt::TripleBuffer<State> states_;
-  std::atomic<std::uint32_t> emergency_{0};
+  rt::WakeWord emergency_;
 };
 
 // The bridge's end. One thread.
@@ -46,8 +44,8 @@ class BridgeEnd {
   // The newest state; a default one (epoch 0) before the first tick. Valid until the next call.
   [[nodiscard]] const State& latest() PONS_NONBLOCKING { return link_.states_.read(); }
   void latest(State& state) PONS_NONBLOCKING { state = link_.states_.read(); }
-  void raise_emergency_stop() PONS_NONBLOCKING { link_.raise_emergency_stop(); }
-  void clear_emergency_stop() PONS_NONBLOCKING { link_.clear_emergency_stop(); }
+  void raise_emergency_stop() { link_.raise_emergency_stop(); }
+  void clear_emergency_stop() { link_.clear_emergency_stop(); }
 
  private:
   Link& link_;
@@ -62,6 +60,8 @@ class CerebellumEnd {
   [[nodiscard]] bool receive(Command& command) PONS_NONBLOCKING { return link_.commands_.pop(command); }
   void publish(const State& state) PONS_NONBLOCKING { link_.states_.write(state); }
   [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return link_.emergency_stop_raised(); }
+  // What the loop sleeps on: it changes with raise_ and clear_emergency_stop().
+  [[nodiscard]] const rt::WakeWord& emergency_word() const { return link_.emergency_; }
 
  private:
   Link& link_;

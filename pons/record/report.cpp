@@ -43,8 +43,14 @@ nlohmann::ordered_json to_json(const Report& report) {
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
   json["retries"] = report.retries;
   json["limits"] = {{"violations", report.limits.violations}, {"worst_ratio", number(report.limits.worst_ratio)}};
-  json["loop"] = {
-      {"ticks", loop.ticks}, {"missed", loop.missed}, {"p50_us", number(loop.p50_us)}, {"p99_us", number(loop.p99_us)}};
+  json["loop"] = {{"ticks", loop.ticks},
+                  {"missed", loop.missed},
+                  {"p50_us", number(loop.p50_us)},
+                  {"p99_us", number(loop.p99_us)},
+                  {"late_p50_us", number(loop.late_p50_us)},
+                  {"late_p99_us", number(loop.late_p99_us)},
+                  {"late_max_us", number(loop.late_max_us)},
+                  {"degraded", loop.degraded}};
   json["sim_seconds"] = number(report.sim_seconds);
   json["wall_seconds"] = number(report.wall_seconds);
   json["state_hash"] = hex(report.state_hash);
@@ -79,6 +85,10 @@ std::string summary(const Report& report) {
                              100 * report.limits.worst_ratio));
   line("control loop", fmt::format("{} ticks, {} missed, step {:.1f} µs median, {:.1f} µs p99", report.loop.ticks,
                                    report.loop.missed, report.loop.p50_us, report.loop.p99_us));
+  if (std::isfinite(report.loop.late_p50_us))
+    line("begins late", fmt::format("{:.0f} µs median, {:.0f} µs p99, {:.0f} µs at worst", report.loop.late_p50_us,
+                                    report.loop.late_p99_us, report.loop.late_max_us));
+  if (!report.loop.degraded.empty()) line("degraded", report.loop.degraded);
   line("time", fmt::format("{:.1f} s simulated in {:.1f} s", report.sim_seconds, report.wall_seconds));
   line("state hash", hex(report.state_hash));
   return text;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -39,6 +40,11 @@ struct Report {
     std::int64_t missed = 0;  // ticks that began later than a period after their time; 0 in lockstep
     double p50_us = 0;        // CPU time of a control step
     double p99_us = 0;
+    // From a tick's time to its begin; NaN in lockstep, where nothing is late.
+    double late_p50_us = std::numeric_limits<double>::quiet_NaN();
+    double late_p99_us = late_p50_us;
+    double late_max_us = late_p50_us;
+    std::string degraded{};  // which real-time conditions the operating system refused, and what would help
   };
 
   std::uint64_t seed = 0;

@@ -26,8 +26,16 @@ class MonotonicClock {
   }
   // The absolute CLOCK_MONOTONIC time at which now() will be `time`, for absolute sleeps; on a leash, at the earliest.
   [[nodiscard]] timespec absolute(Time time) const {
-    const std::int64_t ns = start_ns_ + still_ns_.load(std::memory_order_relaxed) + time.ns();
+    return as_timespec(start_ns_ + still_ns_.load(std::memory_order_relaxed) + time.ns());
+  }
+  [[nodiscard]] static timespec as_timespec(std::int64_t ns) {
     return {.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  }
+  // CLOCK_MONOTONIC itself, in nanoseconds.
+  [[nodiscard]] static std::int64_t raw_ns() {
+    timespec t{};
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
   }
   // How long it has stood still.
   [[nodiscard]] Duration stood_still() const { return Duration(still_ns_.load(std::memory_order_relaxed)); }
@@ -45,11 +53,6 @@ class MonotonicClock {
  private:
   static constexpr std::int64_t kFree = std::numeric_limits<std::int64_t>::max();
 
-  static std::int64_t raw_ns() {
-    timespec t{};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
-  }
   [[nodiscard]] std::int64_t running_ns() const {
     // In this order: a clock read before a later standing still would be set back by it.
     const std::int64_t still = still_ns_.load(std::memory_order_acquire);

@@ -20,8 +20,7 @@ std::uint64_t Histogram::upper_edge(std::size_t bucket) {
 }
 
 void Histogram::record(Duration value) PONS_NONBLOCKING {
-  constexpr std::int64_t kLongest = (std::int64_t{1} << kTopBit) - 1;
-  const Duration clamped(std::clamp<std::int64_t>(value.count(), 0, kLongest));
+  const Duration clamped(std::clamp<std::int64_t>(value.count(), 0, kLongest_ns));
   ++counts_[bucket(static_cast<std::uint64_t>(clamped.count()))];
   ++count_;
   sum_ns_ += static_cast<double>(clamped.count());
@@ -44,6 +43,13 @@ Duration Histogram::percentile(double percent) const {
     if (seen >= wanted) return std::min(max_, Duration(static_cast<std::int64_t>(upper_edge(i))));
   }
   return max_;
+}
+
+std::uint64_t Histogram::count_above(Duration limit) const {
+  const auto within = bucket(static_cast<std::uint64_t>(std::clamp<std::int64_t>(limit.count(), 0, kLongest_ns)));
+  std::uint64_t above = 0;
+  for (std::size_t i = within + 1; i < kBuckets; ++i) above += counts_[i];
+  return above;
 }
 
 void Histogram::add(const Histogram& other) {

@@ -22,11 +22,14 @@ class Histogram {
   // The smallest recorded step that `percent` (0…100) of all values do not exceed: its upper edge, at most max(). 0
   // when empty.
   [[nodiscard]] Duration percentile(double percent) const;
+  // How many values were above `limit`; one within its step (1.6 %) counts as not above.
+  [[nodiscard]] std::uint64_t count_above(Duration limit) const;
   void add(const Histogram& other);
 
  private:
   static constexpr int kStepBits = 6, kSteps = 1 << kStepBits, kTopBit = 36;
   static constexpr std::size_t kBuckets = static_cast<std::size_t>((kTopBit - kStepBits + 1) * kSteps);
+  static constexpr std::int64_t kLongest_ns = (std::int64_t{1} << kTopBit) - 1;
   static std::size_t bucket(std::uint64_t ns);
   static std::uint64_t upper_edge(std::size_t bucket);
 

@@ -30,6 +30,14 @@ TEST(Histogram, PercentilesAreWithinTwoPercentAndEndsExact) {
   EXPECT_NEAR(static_cast<double>(histogram.mean().count()), 50e6, 1e5);
 }
 
+TEST(Histogram, CountsWhatIsAbove) {
+  Histogram histogram;
+  for (int us = 1; us <= 1000; ++us) histogram.record(microseconds(us));
+  EXPECT_NEAR(static_cast<double>(histogram.count_above(microseconds(100))), 900, 2);
+  EXPECT_EQ(histogram.count_above(microseconds(1000)), 0U);
+  EXPECT_EQ(histogram.count_above(Duration(-1)), 1000U);
+}
+
 TEST(Histogram, TakesWhatIsOutOfRange) {
   Histogram histogram;
   histogram.record(Duration(-5));

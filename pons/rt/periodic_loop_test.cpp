@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
 #include <vector>
 
 namespace pons::rt {
@@ -52,10 +53,39 @@ TEST(PeriodicLoop, TicksOnAClockThatStandsStill) {
   EXPECT_EQ(loop.missed(), 7U);
 }
 
-TEST(MakeRealtime, SaysWhatWasRefused) {
-  const Grant grant = make_realtime({.priority = 0, .cpu = 100'000 % 1024});
-  EXPECT_FALSE(grant.pinned);
-  EXPECT_NE(grant.refused.find("pinning refused"), std::string::npos);
+// Far apart ticks, so that the one the word asks for cannot be one of the schedule's.
+TEST(PeriodicLoop, AChangedWordBringsATickAtOnceAndTheScheduleStays) {
+  constexpr Duration kPeriod{50'000'000};
+  const MonotonicClock clock;
+  WakeWord word;
+  PeriodicLoop loop(clock, kPeriod, word);
+  std::vector<Time> ticks;
+  std::thread other;
+  loop.run([&](Time time) {
+    ticks.push_back(time);
+    if (ticks.size() == 1) other = std::thread([&] { word.set(1); });
+    return ticks.size() < 3;
+  });
+  other.join();
+  ASSERT_EQ(ticks.size(), 3U);
+  EXPECT_EQ(loop.woken(), 1U);
+  EXPECT_LT(ticks[1] - ticks[0], kPeriod);
+  EXPECT_EQ((ticks[2] - ticks[0]) % kPeriod, Duration{0});
+  EXPECT_EQ(loop.lateness().count(), 2U);
+}
+
+// A raised stop stays raised: the loop must sleep on, not turn at full speed.
+TEST(PeriodicLoop, AWordThatStaysChangedWakesOnce) {
+  const MonotonicClock clock;
+  WakeWord word;
+  word.set(1);
+  PeriodicLoop loop(clock, Duration{500'000}, word);
+  loop.run([&](Time) {
+    if (loop.ticks() == 3) word.set(2);  // within a tick: seen at the next sleep
+    return loop.ticks() < 9;
+  });
+  EXPECT_EQ(loop.ticks(), 10U);
+  EXPECT_EQ(loop.woken(), 1U);
 }
 
 }  // namespace

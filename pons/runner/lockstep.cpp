@@ -26,6 +26,7 @@ Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
 
     if (now.ns() % kBridgePeriod.count() != 0) continue;
     if (auto ticked = parts.bridge_side->tick(now, *parts.crew); !ticked) return std::unexpected(ticked.error());
+    pass_on_events(parts, watch);
     if (auto healthy = parts.plant.health(); !healthy) return std::unexpected(healthy.error());
     if (!ending.check(now, parts.plant.finished())) continue;
     parts.bridge_side->close(now);

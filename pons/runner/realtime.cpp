@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "pons/rt/clock.hpp"
+#include "pons/rt/grant.hpp"
 #include "pons/rt/guard.hpp"
 #include "pons/rt/periodic_loop.hpp"
 #include "pons/rt/triple_buffer.hpp"
@@ -21,6 +22,9 @@ constexpr int kBodyPriority = 60, kBridgePriority = 10;
 // Neither the body nor the run's clock goes further than this past the last set-points. A real arm falls on while its
 // loop is held up; a simulated one need not, and what a busy computer does to it would say nothing about a robot.
 constexpr Duration kLeash = 4 * kControlPeriod;
+
+// A loop that was woken so late is told of: libfranka's robots stop after twenty missed packets in a row.
+constexpr Duration kStall = 20 * kControlPeriod;
 
 // Measurements and set-points change hands without either side waiting.
 struct Exchange {
@@ -54,7 +58,7 @@ struct Leaving {
 
 void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
   // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
-  (void)rt::make_realtime({.period = kControlPeriod, .priority = kBodyPriority});
+  (void)rt::make_realtime({.priority = kBodyPriority});
   body::Sensors sensors;
   const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
   rt::PeriodicLoop loop(own, kControlPeriod);
@@ -80,11 +84,14 @@ void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Share
 }
 
 LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
-  const rt::Grant grant = rt::make_realtime({.period = kControlPeriod});
+  const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
   Exchange::Asked asked;
-  rt::PeriodicLoop loop(clock, kControlPeriod);
+  rt::PeriodicLoop loop(clock, kControlPeriod, parts.link->emergency_word());
   loop.run([&](Time now) {
     const rt::InTick in_tick;
+    if (loop.late() >= kStall)
+      parts.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
+                                    1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));
     const body::Sensors& sensors = exchange.measured.read();
     if (sensors.position.size() > 0) {
       parts.cerebellum->step(now, sensors, *parts.link, asked.set_points);
@@ -93,10 +100,12 @@ LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& ex
     }
     return shared.running.load();
   });
+  const auto late_us = [&](double percent) { return 1e6 * to_s(loop.lateness().percentile(percent)); };
   return {.ticks = loop.ticks(),
           .missed = loop.missed() + static_cast<std::uint64_t>(clock.stood_still() / kControlPeriod),
           .p50_us = 1e6 * to_s(loop.execution().percentile(50)),
           .p99_us = 1e6 * to_s(loop.execution().percentile(99)),
+          .late = Lateness{late_us(50), late_us(99), 1e6 * to_s(loop.lateness().max())},
           .degraded = grant.refused};
 }
 
@@ -112,7 +121,7 @@ Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
     std::jthread body_thread([&] { run_body(parts, clock, exchange, shared); });
     std::jthread loop_thread([&] { result.loop = run_loop(parts, clock, exchange, shared); });
     const Leaving leaving{shared};  // also by an exception: both threads are waited for
-    (void)rt::make_realtime({.period = kBridgePeriod, .priority = kBridgePriority});
+    (void)rt::make_realtime({.priority = kBridgePriority});
     rt::PeriodicLoop loop(clock, kBridgePeriod);
     loop.run([&](Time now) {
       if (auto ticked = parts.bridge_side->tick(now, *parts.crew); !ticked) {
@@ -121,6 +130,7 @@ Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
         parts.bridge_side->close(now);
         shared.running.store(false);
       }
+      pass_on_events(parts, watch);
       result.end = now;
       return shared.running.load();
     });

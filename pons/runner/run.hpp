@@ -3,6 +3,9 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "pons/cerebellum/cerebellum.hpp"
 #include "pons/core/error.hpp"
@@ -24,16 +27,23 @@ struct Parts {
   CameraCrew* crew = nullptr;
 };
 
-// How the run is broken off and watched. Both are called once a bridge period, on the bridge's thread; may be empty.
+// How the run is broken off and watched. All are called in every bridge period, on the bridge's thread; may be empty.
 struct Watch {
   std::function<bool()> interrupted;
   std::function<void(Time)> progress;
-  Time limit;  // a run that takes longer is broken off
+  std::function<void(Time, std::string_view)> said;  // an event of the control loop: stops, arming, refused commands
+  Time limit;                                        // a run that takes longer is broken off
+};
+
+// From a tick's time to its begin.
+struct Lateness {
+  double p50_us, p99_us, max_us;
 };
 
 struct LoopFigures {
   std::uint64_t ticks = 0, missed = 0;
   double p50_us = 0, p99_us = 0;  // time of one control step
+  std::optional<Lateness> late;   // real time only
   std::string degraded;           // real time only: what the operating system refused; empty when nothing
 };
 
@@ -42,5 +52,10 @@ struct RunResult {
   bool complete = false;  // false: broken off
   LoopFigures loop;
 };
+
+// Tells the watch what the control loop has said since the last time.
+inline void pass_on_events(Parts& parts, const Watch& watch) {
+  if (watch.said) parts.cerebellum->log().drain(watch.said);
+}
 
 }  // namespace pons::runner

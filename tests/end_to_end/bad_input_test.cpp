@@ -94,7 +94,7 @@ TEST_F(BadInput, PlacesThatCannotBeWritten) {
 }
 
 TEST_F(BadInput, NothingGivenOrTooMuch) {
-  for (const char* option : {"--manifest", "--journal", "--report", "--picture", "--socket", "--seed"})
+  for (const char* option : {"--manifest", "--journal", "--report", "--log", "--picture", "--socket", "--seed"})
     expect_refused({"run", "parcel_cell", "--parcels", "1", option, ""}, {option});
   for (const char* seed : {"-1", "18446744073709551616", "1e3"})
     expect_refused({"run", "parcel_cell", "--parcels", "1", "--seed", seed}, {"--seed", seed});
@@ -112,7 +112,7 @@ TEST_F(BadInput, OneFileForTwoThings) {
 }
 
 TEST_F(BadInput, ANameThatIsTooLong) {
-  for (const char* option : {"--report", "--picture", "--journal"})
+  for (const char* option : {"--report", "--log", "--picture", "--journal"})
     expect_refused({"run", "parcel_cell", "--parcels", "1", option, folder_ / std::string(250, 'n')}, {option, "long"});
 }
 

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <fstream>
+#include <iterator>
+#include <string>
 #include <utility>
 
 #include "tests/end_to_end/outcomes.hpp"
@@ -18,13 +21,17 @@ class RealTime : public ::testing::Test {
   struct Result {
     Finished finished;
     nlohmann::json report;
+    std::string log;
     std::map<std::string, std::string> outcomes;
   };
   Result run(const std::string& how, const std::string& name) {
     Result result;
-    result.finished = run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "4", "--quiet", "--explain",
-                                "--" + how, "--socket", folder_ / (name + ".sock"), "--report",
-                                folder_ / (name + ".json"), "--journal", folder_ / (name + ".db")});
+    result.finished =
+        run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "4", "--quiet", "--explain", "--" + how,
+                  "--socket", folder_ / (name + ".sock"), "--report", folder_ / (name + ".json"), "--log",
+                  folder_ / (name + ".log"), "--journal", folder_ / (name + ".db")});
+    std::ifstream log(folder_ / (name + ".log"));
+    result.log.assign(std::istreambuf_iterator(log), {});
     EXPECT_FALSE(std::filesystem::exists(folder_ / (name + ".sock")));
     result.report = read_json(folder_ / (name + ".json"));
     result.outcomes = outcomes(folder_ / (name + ".db"));
@@ -46,8 +53,11 @@ TEST_F(RealTime, AgreesWithLockstepOnEachOfThirtyParcels) {
   for (const Result* result : std::array{&std::as_const(lockstep), &std::as_const(realtime)}) {
     EXPECT_EQ(result->finished.code, 0) << result->finished.out << result->finished.err;
     expect_accounted_for(result->report);
+    EXPECT_NE(result->log.find("armed in epoch 1\n"), std::string::npos) << result->log;
   }
   EXPECT_GT(realtime.report["loop"]["ticks"], 60'000);
+  EXPECT_GT(realtime.report["loop"]["late_p50_us"], 0);
+  EXPECT_TRUE(lockstep.report["loop"]["late_p50_us"].is_null());
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ TEST(Sorting, APlaceOutOfReachStopsNothing) {
   move("scene.xml", " -0.82 0.", " -2.82 0.");
   move("scene.xml", "0.4 -1.015 ", "0.4 -3.015 ");
   move("scene.xml", "0.4 -0.625 ", "0.4 -2.625 ");
-  const Finished doctor = run_pons({"doctor"}, {"PONS_WORLDS=" + worlds.string()});
+  const Finished doctor = run_pons({"doctor", "--jitter", "0"}, {"PONS_WORLDS=" + worlds.string()});
   EXPECT_NE(doctor.out.find("the tool does not reach east"), std::string::npos) << doctor.out;
   const Finished run =
       run_pons({"run", "small_cell", "--parcels", "3", "--quiet", "--explain", "--report", folder / "report.json"},
@@ -76,6 +76,14 @@ TEST(Sorting, APlaceOutOfReachStopsNothing) {
   expect_accounted_for(report);
   EXPECT_GE(report["parcels"]["exceptions"]["undeserved"], 1);
   EXPECT_NE(run.out.find("east: out of reach"), std::string::npos) << run.out;
+}
+
+TEST(Doctor, MeasuresAndJudgesTheLoop) {
+  const Finished doctor = run_pons({"doctor", "--jitter", "0.3"});
+  EXPECT_EQ(doctor.code, 0) << doctor.out << doctor.err;
+  for (const char* line : {"real-time priority", "locked memory", "CPUs kept awake", "a CPU for the loop", "kernel",
+                           "jitter                 ticks begin late by ", " ticks"})
+    EXPECT_NE(doctor.out.find(line), std::string::npos) << line << "\n" << doctor.out;
 }
 
 TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {

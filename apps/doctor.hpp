@@ -1,0 +1,20 @@
+// What the parts of `pons doctor` share.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "pons/core/time.hpp"
+
+namespace pons::apps {
+
+enum class Finding : std::uint8_t { kGood, kDegraded, kBad };
+
+// One line of the diagnosis; gives `finding` back.
+Finding say(Finding finding, std::string_view what, std::string_view how);
+
+// What the control loop needs of this machine: tries each thing, reads the settings that trials do not show, and runs
+// an empty 1 kHz loop for that long (0: not). The worst of its findings.
+Finding try_realtime(Duration jitter);
+
+}  // namespace pons::apps

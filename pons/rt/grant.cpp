@@ -1,0 +1,116 @@
+#include "pons/rt/grant.hpp"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <climits>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+
+namespace pons::rt {
+namespace {
+
+void touch_stack() {
+  constexpr std::size_t kBytes = 256 * 1024, kPage = 4096;
+  volatile char stack[kBytes];
+  for (std::size_t i = 0; i < kBytes; i += kPage) stack[i] = 0;
+  static_cast<void>(stack[0]);
+}
+
+std::string own_path() {
+  char path[PATH_MAX];
+  const ssize_t length = readlink("/proc/self/exe", path, sizeof path);
+  return length > 0 ? std::string(path, static_cast<std::size_t>(length)) : "pons";
+}
+
+// Capabilities on the file are the quickest remedy; root has them all, and then it is the group's budget.
+std::string remedy(const char* capability) {
+  if (geteuid() == 0)
+    return "give this process's cgroup a real-time budget (cpu.rt_runtime_us), or its container the capability "
+           "cap_" +
+           std::string(capability);
+  return "sudo setcap cap_sys_nice,cap_ipc_lock+ep " + own_path() + ", or run it as the service in packaging/";
+}
+
+void note(Grant& grant, const char* what, int error, const std::string& mend) {
+  if (!grant.refused.empty()) grant.refused += "; ";
+  grant.refused += std::string(what) + " refused (" + std::strerror(error) + "): " + mend;
+}
+
+// The kernel's list form, "0-3,6". An unreadable one holds nothing.
+cpu_set_t isolated_cpus() {
+  cpu_set_t cpus;
+  CPU_ZERO(&cpus);
+  std::ifstream file("/sys/devices/system/cpu/isolated");
+  for (std::size_t first = 0, last = 0; file >> first;) {
+    last = first;
+    if (file.peek() == '-') file.ignore() >> last;
+    for (std::size_t cpu = first; cpu <= last && cpu < CPU_SETSIZE; ++cpu) CPU_SET(cpu, &cpus);
+    if (file.peek() == ',') file.ignore();
+  }
+  return cpus;
+}
+
+constexpr const char* kLatencyDevice = "/dev/cpu_dma_latency";
+
+// Negative, and errno says why, if it is refused.
+int open_latency_device() {
+  const int file = open(kLatencyDevice, O_WRONLY | O_CLOEXEC);
+  constexpr std::int32_t kNone_us = 0;
+  if (file < 0 || write(file, &kNone_us, sizeof kNone_us) == sizeof kNone_us) return file;
+  const int error = errno;
+  close(file);
+  errno = error;
+  return -1;
+}
+
+}  // namespace
+
+AwakeCpus::~AwakeCpus() {
+  if (file_ >= 0) close(file_);
+}
+
+Grant make_realtime(const Scheduling& scheduling) {
+  Grant grant;
+  if (scheduling.priority > 0) {
+    const sched_param param{.sched_priority = scheduling.priority};
+    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
+    grant.fifo = error == 0;
+    if (error != 0) note(grant, "SCHED_FIFO", error, remedy("sys_nice"));
+  }
+  if (scheduling.cpu >= 0) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(static_cast<std::size_t>(scheduling.cpu), &cpus);
+    const int error = pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus);
+    grant.pinned = error == 0;
+    if (error != 0) note(grant, "pinning", error, "name a CPU that this process may use");
+  }
+  grant.locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  if (!grant.locked) note(grant, "locking memory", errno, remedy("ipc_lock"));
+  grant.awake = AwakeCpus(open_latency_device());
+  if (!grant.awake.held())
+    note(grant, "keeping CPUs awake", errno, std::string("needs write access to ") + kLatencyDevice + ": packaging/");
+  touch_stack();
+  return grant;
+}
+
+int loop_cpu() {
+  cpu_set_t allowed;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0 || CPU_COUNT(&allowed) < 2) return -1;
+  const cpu_set_t isolated = isolated_cpus();
+  int last = -1, last_isolated = -1;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (!CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) continue;
+    last = cpu;
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &isolated)) last_isolated = cpu;
+  }
+  return last_isolated >= 0 ? last_isolated : last;
+}
+
+}  // namespace pons::rt

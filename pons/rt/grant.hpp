@@ -1,0 +1,51 @@
+// Real-time conditions for the calling thread: asked of the operating system by trying, for hosts claim what they then
+// refuse.
+#pragma once
+
+#include <string>
+#include <utility>
+
+namespace pons::rt {
+
+struct Scheduling {
+  int priority = 80;  // SCHED_FIFO, 1…99; 0 leaves the thread's scheduling as it is
+  int cpu = -1;       // pins to this CPU; -1 does not pin
+};
+
+// Keeps idle CPUs from sleeping so deep that waking takes long, while it lives: the kernel's cpu_dma_latency at 0. An
+// idle CPU then spins, and takes power and, on a shared host, other guests' time.
+class AwakeCpus {
+ public:
+  AwakeCpus() = default;
+  explicit AwakeCpus(int file) : file_(file) {}
+  AwakeCpus(AwakeCpus&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+  AwakeCpus& operator=(AwakeCpus&& other) noexcept {
+    std::swap(file_, other.file_);
+    return *this;
+  }
+  ~AwakeCpus();
+  [[nodiscard]] bool held() const { return file_ >= 0; }
+
+ private:
+  int file_ = -1;
+};
+
+// What was asked for and what was given. Nothing here fails: a loop runs degraded, and says so. The first three stay
+// with thread and process; the last lasts as long as this.
+struct Grant {
+  bool fifo = false;    // SCHED_FIFO at the asked priority
+  bool locked = false;  // all memory of the process, present and future
+  bool pinned = false;  // on the asked CPU
+  AwakeCpus awake;
+  std::string refused;  // one line: what was refused, why, and what would allow it; empty when all was given
+  [[nodiscard]] bool degraded() const { return !refused.empty(); }
+};
+
+// Asks for all that for the calling thread, and touches 256 KiB of its stack, so that no page fault comes later.
+[[nodiscard]] Grant make_realtime(const Scheduling& scheduling);
+
+// Where a loop should run: the last CPU that this thread may use and that the kernel keeps free of other work
+// (isolcpus), else the last that it may use, else, if there is but one, -1: pinning would only take it from others.
+[[nodiscard]] int loop_cpu();
+
+}  // namespace pons::rt
