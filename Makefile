@@ -73,6 +73,7 @@ tsan-quick: setup ## the tests of what threads share without locks, under the sa
 	  TSAN_OPTIONS=suppressions=$(CURDIR)/tools/tsan_suppressions.txt build/tsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; \
 	done
 
+rtsan: export RTSAN_OPTIONS = external_symbolizer_path=/usr/bin/addr2line
 rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
 	@tools/setup --check
 	cmake --preset rtsan

@@ -113,6 +113,12 @@ void clock_read() {
   });
 }
 
+void grows() {
+  void* memory = std::malloc(8);
+  kept = memory;
+  tick([&] { kept = std::realloc(memory, 800); });
+}
+
 void aligns() {
   void* memory = nullptr;
   tick([&] { number = posix_memalign(&memory, 64, 64); });
@@ -226,11 +232,7 @@ const std::map<std::string, void (*)()> kCases{
     {"interrupted", interrupted},
     {"malloc", [] { tick([] { kept = std::malloc(8); }); }},
     {"calloc", [] { tick([] { kept = std::calloc(1, 8); }); }},
-    {"realloc",
-     [] {
-       kept = std::malloc(4);
-       tick([] { kept = std::realloc(kept, 8); });
-     }},
+    {"realloc", grows},
     {"aligned_alloc", [] { tick([] { kept = std::aligned_alloc(64, 64); }); }},
     {"posix_memalign", aligns},
     {"free", frees},
