@@ -5,6 +5,8 @@
 #include <span>
 #include <utility>
 
+#include "pons/motion/stop.hpp"
+
 namespace pons::cerebellum {
 namespace {
 

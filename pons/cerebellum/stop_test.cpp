@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pons/cerebellum/test_bench.hpp"
+#include "pons/motion/axis_plan.hpp"
 
 namespace pons::cerebellum {
 namespace {
@@ -31,9 +32,10 @@ double shortest_stop_s(const AxisState& state) {
   const AxisLimits& limits = bench_robot().limits;
   double longest = 0;
   for (Eigen::Index i = 0; i < 6; ++i) {
-    const motion::AxisBounds bounds{limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i]};
+    const auto bounds =
+        motion::AxisBounds::symmetric(limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i]);
     const motion::AxisPoint point{state.position[i], state.speed[i], state.acceleration[i]};
-    longest = std::max(longest, motion::plan_to_speed(point, 0, bounds).duration_s());
+    longest = std::max(longest, motion::SpeedPlan(point, 0, bounds).duration_s());
   }
   return longest;
 }
