@@ -49,10 +49,10 @@ double draw_value(Random& random, double low, double high) {
 AxisTask draw_hard(Random& random) {
   const double unit = random.below(2) == 0 ? 1 : decade(random, 1e-3, 1e3);
   // In terms of the times it takes to get up to speed, and up to acceleration.
-  const double speed = unit * decade(random, 0.03, 30), acceleration = speed / decade(random, 1e-4, 10);
+  const double speed = unit * decade(random, 0.03, 30), acceleration = speed / decade(random, 1e-3, 10);
   AxisTask task;
   task.bounds = {-speed * decade(random, 0.2, 5), speed, -acceleration * decade(random, 0.2, 5), acceleration,
-                 acceleration / std::min(speed / acceleration * decade(random, 1e-7, 3), 5.0)};
+                 acceleration / std::min(speed / acceleration * decade(random, 1e-5, 3), 5.0)};
   task.start.position = random.below(3) == 0 ? 0 : unit * random.normal();
   task.start.speed = draw_value(random, task.bounds.speed_min, task.bounds.speed_max);
   task.start.acceleration = draw_value(random, task.bounds.acceleration_min, task.bounds.acceleration_max);
@@ -89,28 +89,34 @@ bool is_inside(const AxisPoint& point, const AxisBounds& bounds) {
          std::min(point.speed, coasting) >= bounds.speed_min * slack;
 }
 
+// What a moment may be off by, as a number: sums of phases, relative to the whole.
+constexpr double kMoment = 4e-15;
+
 // Of the way from phase to phase.
 void look(const AxisTask& task, const AxisProfile& profile, Worst& seen) {
   const AxisBounds& bounds = task.bounds;
-  // What a moment, as a number, may be off by, and jerk makes of it.
-  const double moment_s = 1e-15 * profile.duration_s();
+  const double moment_s = kMoment * profile.duration_s(), jerk_off = bounds.jerk * moment_s;
+  const double acceleration_off = moment_s * std::max(bounds.acceleration_max, -bounds.acceleration_min);
+  const double speed_off = moment_s * std::max(bounds.speed_max, -bounds.speed_min);
   bool inside = false;
   for (std::size_t i = 0; i < profile.phases(); ++i) {
     const AxisPoint &from = profile.begin(i), &next = profile.begin(i + 1);
     const AxisPoint to = after(from, profile.begin_s(i + 1) - profile.begin_s(i), profile.jerk(i));
-    const auto off = [](double a, double b, double scale) { return std::abs(a - b) / (1 + scale); };
-    const double speed = std::max(std::abs(from.speed), std::abs(to.speed));
-    seen.seam =
-        std::max({seen.seam, off(to.position, next.position, speed * profile.duration_s()),
-                  off(to.speed, next.speed, speed + bounds.acceleration_max * profile.duration_s()),
-                  off(to.acceleration, next.acceleration, bounds.acceleration_max + 1e9 * bounds.jerk * moment_s)});
+    const auto off = [](double a, double b, double unresolved) {
+      return std::max(0.0, std::abs(a - b) - unresolved) / (1 + std::abs(a));
+    };
+    seen.seam = std::max({seen.seam, off(to.position, next.position, 2 * speed_off),
+                          off(to.speed, next.speed, 2 * acceleration_off),
+                          off(to.acceleration, next.acceleration, 2 * jerk_off)});
     seen.jerk = std::max(seen.jerk, std::abs(profile.jerk(i)) / bounds.jerk - 1);
     inside = inside || is_inside(from, bounds);
     if (!inside) continue;
     const Range range = bench::range(from, next, profile.jerk(i));
-    seen.beyond = std::max(
-        {seen.beyond, beyond(range.speed_min, range.speed_max, bounds.speed_min, bounds.speed_max),
-         beyond(range.acceleration_min, range.acceleration_max, bounds.acceleration_min, bounds.acceleration_max)});
+    seen.beyond = std::max({seen.beyond,
+                            beyond(range.speed_min + acceleration_off, range.speed_max - acceleration_off,
+                                   bounds.speed_min, bounds.speed_max),
+                            beyond(range.acceleration_min + jerk_off, range.acceleration_max - jerk_off,
+                                   bounds.acceleration_min, bounds.acceleration_max)});
   }
 }
 
@@ -143,13 +149,16 @@ bool is_right(std::span<const AxisTask> tasks, std::span<const AxisProfile> prof
     const AxisPoint last = after(profile.end(), spare_s, 0);
     const AxisProfile::Extent extent = profile.extent();
     const double most = std::max({1.0, std::abs(extent.position_min), std::abs(extent.position_max)});
-    // What numbers beyond one cannot resolve is taken off.
-    Worst seen{std::max(0.0, std::abs(last.position - task.end_position) - 1e-13 * (most - 1)),
-               std::max(0.0, std::abs(last.speed - task.end_speed) - 1e-13 * extent.speed_max),
-               std::abs(last.acceleration),
-               0,
-               0,
-               0};
+    // What numbers cannot resolve is taken off.
+    const double moment_s = kMoment * duration_s;
+    Worst seen{
+        std::max(0.0, std::abs(last.position - task.end_position) - 1e-13 * (most - 1) - moment_s * extent.speed_max),
+        std::max(0.0,
+                 std::abs(last.speed - task.end_speed) - 1e-13 * extent.speed_max - moment_s * extent.acceleration_max),
+        std::abs(last.acceleration),
+        0,
+        0,
+        0};
     look(task, profile, seen);
     const double rest_s = task.end_speed == 0 ? 30e-9 : 0;  // what ends at rest may end that much sooner
     const bool in_time = spare_s <= rest_s + 1e-12 * (1 + duration_s) && spare_s >= -1e-12 * (1 + duration_s);
