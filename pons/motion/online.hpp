@@ -18,7 +18,7 @@
 namespace pons::motion {
 
 inline constexpr std::size_t kMostTasks = 16;
-inline constexpr double kLongestMotion_s = 10'000;  // what takes longer is a mistake
+inline constexpr double kLongestMotion_s = 1e6;  // what takes longer is a mistake
 
 enum class OnlineError : std::uint8_t {
   kCount,      // no axis, more than kMostTasks, or another number of profiles than of tasks

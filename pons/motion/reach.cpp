@@ -11,13 +11,17 @@ namespace {
 // A Newton step this small, relatively, leaves an error of its square.
 constexpr double kSameDuration = 1e-9;
 
+// Changes of speed that are less, relatively, are rounding; the root would make a thousand times as much of them.
+constexpr double kSameSpeed = 1e-14;
+
 // Half of a push: between states without acceleration.
 struct Ramp {
   double acceleration, hold_s, duration;
 };
 
-Ramp ramp(double change, double limit, double jerk) {
-  const double square = std::max(0.0, change) * jerk;
+Ramp ramp(double change, double noise, double limit, double jerk) {
+  if (change <= noise) return {0, 0, 0};
+  const double square = change * jerk;
   if (square <= limit * limit) {
     const double acceleration = std::sqrt(square);
     return {acceleration, 0, 2 * acceleration / jerk};
@@ -41,22 +45,23 @@ Reach::Reach(Side side, const AxisPoint& start, double end_speed, const AxisBoun
   base_ = sign_ * start.speed - lift;
   before_ = lead_ * (base_ + lift / 3);
   gain_ = jerk_ * (end_ - base_);
+  noise_ = kSameSpeed * (std::abs(start.speed) + std::abs(lift) + std::abs(end_));
 }
 
 Reach::Push Reach::direct() const PONS_NONBLOCKING {
   const double turning = base_ + start_acceleration_ * lead_;  // speed where a pull through the start would begin
   if ((start_acceleration_ > 0 ? turning : base_) < end_) {
-    const Ramp rise = ramp(end_ - base_, up_, jerk_);
+    const Ramp rise = ramp(end_ - base_, noise_, up_, jerk_);
     return {rise.duration - lead_, rise.acceleration, rise.hold_s, 0, 0, 0, end_};
   }
-  const Ramp fall = ramp(turning - end_, down_, jerk_);
+  const Ramp fall = ramp(turning - end_, noise_, down_, jerk_);
   return {fall.duration + lead_, start_acceleration_, 0, 0, fall.acceleration, fall.hold_s, turning};
 }
 
 Reach::Push Reach::limit(double cap) const PONS_NONBLOCKING {
   const double coasting = start_acceleration_ > 0 ? base_ + start_acceleration_ * lead_ : base_;
   const double peak = std::max({sign_ * cap, coasting, end_});
-  const Ramp rise = ramp(peak - base_, up_, jerk_), fall = ramp(peak - end_, down_, jerk_);
+  const Ramp rise = ramp(peak - base_, noise_, up_, jerk_), fall = ramp(peak - end_, noise_, down_, jerk_);
   return {
       rise.duration + fall.duration - lead_, rise.acceleration, rise.hold_s, 0, fall.acceleration, fall.hold_s, peak};
 }
@@ -141,7 +146,7 @@ double Reach::crest(const Push& first, const Push& limit) const {
   const double free = -share * std::sqrt(std::max(0.0, -gain_) / (1 - share * share));
   const double top = -free / share <= down_ ? free : -down_ / 4;
   if (top <= start_acceleration_) return 0;
-  const Ramp fall = ramp(base_ + top * top * per_jerk_ - end_, down_, jerk_);
+  const Ramp fall = ramp(base_ + top * top * per_jerk_ - end_, noise_, down_, jerk_);
   const double bottom = 2 * top * per_jerk_ + fall.duration - lead_;
   const auto slope_in = [&](double duration) { return slope(in(duration, limit)); };
   if (slope_in(bottom) >= 0) return 0;

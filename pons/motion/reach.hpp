@@ -61,6 +61,7 @@ class Reach {
   double lead_, base_;         // the time from the base to the start, negative if it lies ahead; the speed there
   double before_;              // way from the base to the start
   double gain_;                // jerk·(end − base)
+  double noise_;               // what rounding may make of a speed
 };
 
 }  // namespace pons::motion
