@@ -28,8 +28,8 @@ using namespace pons;
 using bench::Kind;
 using motion::AxisProfile;
 using motion::AxisTask;
-using motion::Company;
 using motion::kMostTasks;
+using motion::Synchronization;
 
 constexpr double kSameDuration = 1e-8;
 constexpr double kPeerMiss = 1e-8;
@@ -40,7 +40,7 @@ struct Options {
   std::size_t axes = 7;
   unsigned rounds = 5, threads = 1;
   Kind kind = Kind::kRandom;
-  Company company = Company::kTime;
+  Synchronization synchronization = Synchronization::kTime;
   bool gate = false, endure = false;
   std::string python = ".venv-bench/bin/python", script = "bench/ruckig_peer.py";
 };
@@ -83,10 +83,10 @@ double plan(std::span<const AxisTask> tasks, const Options& options, double& us,
   thread_local std::array<AxisProfile, kMostTasks> profiles;
   const std::span<AxisProfile> used(profiles.data(), tasks.size());
   const double began = now_us();
-  const auto duration_s = plan_positions(tasks, {.company = options.company}, used);
+  const auto duration_s = plan_positions(tasks, {.synchronization = options.synchronization}, used);
   us = now_us() - began;
   ++checked.cases;
-  const auto end = options.company == Company::kNone ? bench::End::kAlone : bench::End::kTogether;
+  const auto end = options.synchronization == Synchronization::kNone ? bench::End::kAlone : bench::End::kTogether;
   if (duration_s && is_right(tasks, used, *duration_s, end, checked.worst)) return *duration_s;
   if (++checked.failures <= 3) {
     fmt::print("failure: {}\n", duration_s ? "a motion is wrong" : text(duration_s.error()));
@@ -113,7 +113,7 @@ Results theirs(const std::vector<AxisTask>& tasks, const Options& options, const
     const auto put = [&](std::initializer_list<double> values) {
       for (const double value : values) file.write(reinterpret_cast<const char*>(&value), sizeof value);
     };
-    const bool together = options.company != Company::kNone;
+    const bool together = options.synchronization != Synchronization::kNone;
     put({static_cast<double>(tasks.size() / options.axes), static_cast<double>(options.axes), together ? 1.0 : 0.0});
     for (const AxisTask& task : tasks) {
       put({task.start.position, task.start.speed, task.start.acceleration, task.end_position, task.end_speed,
@@ -268,9 +268,9 @@ int main(int argc, char** argv) {
   app.add_option("--kind", options.kind, "random or hard cases")
       ->transform(
           CLI::CheckedTransformer(std::map<std::string, Kind>{{"random", Kind::kRandom}, {"hard", Kind::kHard}}));
-  app.add_option("--company", options.company, "whether axes end together: time or none")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, Company>{{"time", Company::kTime}, {"none", Company::kNone}}));
+  app.add_option("--synchronization", options.synchronization, "whether axes end together: time or none")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Synchronization>{{"time", Synchronization::kTime}, {"none", Synchronization::kNone}}));
   app.add_flag("--gate", options.gate, "fail if our mean time is the longer one");
   app.add_flag("--endure", options.endure, "check our motions, no peer");
   app.add_option("--threads", options.threads, "with --endure")->check(CLI::Range(1U, 64U));

@@ -20,7 +20,7 @@ Planned check(const OnlineOptions& options, std::size_t axes, std::size_t profil
   if (axes < 1 || axes > kMostTasks || profiles != axes) return std::unexpected(OnlineError::kCount);
   if (!std::isfinite(options.least_s + options.grid_s)) return std::unexpected(OnlineError::kNotFinite);
   if (options.least_s < 0 || options.grid_s < 0) return std::unexpected(OnlineError::kBounds);
-  return options.least_s;
+  return options.synchronization == Synchronization::kNone ? 0 : options.least_s;
 }
 
 std::optional<OnlineError> find_error(const AxisTask& task, double end_position) {
@@ -137,15 +137,15 @@ Planned plan_positions(std::span<const AxisTask> tasks, const OnlineOptions& opt
     duration = std::max(*duration, fastest_s);
   }
   if (!duration) return duration;
-  if (options.company == Company::kPhase) {
+  if (options.synchronization == Synchronization::kPhase) {
     if (const auto line = find_line(tasks, Target::kPosition)) {
-      duration = plan_positions(std::span(&line->task, 1), {Company::kTime, options.least_s, options.grid_s},
+      duration = plan_positions(std::span(&line->task, 1), {Synchronization::kTime, options.least_s, options.grid_s},
                                 profiles.subspan(line->leader, 1));
       if (duration) spread(*line, tasks, profiles);
       return duration;
     }
   }
-  if (options.company == Company::kNone) {
+  if (options.synchronization == Synchronization::kNone) {
     for (std::size_t i = 0; i < tasks.size(); ++i) plans[i].fastest(profiles[i]);
     return duration;
   }
@@ -173,16 +173,16 @@ Planned plan_speeds(std::span<const AxisTask> tasks, const OnlineOptions& option
     if (plans[i].duration_s() > plans[slowest].duration_s()) slowest = i;
   }
   if (!duration) return duration;
-  if (options.company == Company::kPhase) {
+  if (options.synchronization == Synchronization::kPhase) {
     if (const auto line = find_line(tasks, Target::kSpeed)) {
-      duration = plan_speeds(std::span(&line->task, 1), {Company::kTime, options.least_s, options.grid_s},
+      duration = plan_speeds(std::span(&line->task, 1), {Synchronization::kTime, options.least_s, options.grid_s},
                              profiles.subspan(line->leader, 1));
       if (duration) spread(*line, tasks, profiles);
       return duration;
     }
   }
   const double fastest_s = plans[slowest].duration_s();
-  if (options.company == Company::kNone) {
+  if (options.synchronization == Synchronization::kNone) {
     for (std::size_t i = 0; i < tasks.size(); ++i) plans[i].fastest(profiles[i]);
     return std::max(*duration, fastest_s);
   }

@@ -29,16 +29,17 @@ enum class OnlineError : std::uint8_t {
 };
 [[nodiscard]] const char* text(OnlineError error);
 
-// How the axes keep company.
-enum class Company : std::uint8_t {
+// What the axes have to do with one another.
+enum class Synchronization : std::uint8_t {
   kTime,   // all end at the same time, the slowest as fast as it can
   kPhase,  // on one straight line if start and target allow (all speeds and accelerations along it), else as kTime
   kNone,   // each as fast as it can
 };
 
+// The durations do not concern kNone.
 struct OnlineOptions {
-  Company company = Company::kTime;
-  double least_s = 0;  // takes at least as long; not with kNone
+  Synchronization synchronization = Synchronization::kTime;
+  double least_s = 0;  // takes at least as long
   double grid_s = 0;   // the common duration is a multiple of this; 0: any
 };
 

@@ -3,12 +3,33 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
+#include <new>
 #include <vector>
 
 #include "pons/core/random.hpp"
+
+namespace {
+// Counted on this thread while switched on. The other tests of this program are not affected.
+thread_local bool counting = false;
+thread_local std::uint64_t allocations = 0;
+void* counted(std::size_t size) {
+  if (counting) ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+// NOLINTBEGIN: replacing the global operators is how allocations are seen.
+void* operator new(std::size_t size) { return counted(size); }
+void* operator new[](std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+// NOLINTEND
 
 namespace pons::motion {
 namespace {
@@ -133,7 +154,7 @@ TEST(Online, AloneEachIsAtLeastAsFast) {
     const Tasks tasks = draw(random, 4);
     Profiles profiles(tasks.size());
     const double together = plan_positions(tasks, {}, profiles).value();
-    const double longest = plan_positions(tasks, {.company = Company::kNone}, profiles).value();
+    const double longest = plan_positions(tasks, {.synchronization = Synchronization::kNone}, profiles).value();
     EXPECT_LE(longest, together * (1 + 1e-12));
     double found = 0;
     for (std::size_t k = 0; k < tasks.size(); ++k) {
@@ -215,7 +236,7 @@ TEST(Online, OnALineIsStraight) {
       shares.push_back(share), tasks.push_back(task);
     }
     Profiles profiles(axes), others(axes);
-    const auto duration = plan_positions(tasks, {.company = Company::kPhase}, profiles);
+    const auto duration = plan_positions(tasks, {.synchronization = Synchronization::kPhase}, profiles);
     ASSERT_TRUE(duration);
     for (std::size_t k = 0; k < axes; ++k) {
       expect_end(profiles[k], *duration, tasks[k]);
@@ -236,7 +257,8 @@ TEST(Online, NotOnALineItEndsTogether) {
   Tasks tasks{{{0, 0.5, 0}, 1, 0, AxisBounds::symmetric(1, 5, 50)},
               {{0, -0.5, 0}, 1, 0, AxisBounds::symmetric(1, 5, 50)}};
   Profiles a(2), b(2);
-  EXPECT_EQ(plan_positions(tasks, {.company = Company::kPhase}, a).value(), plan_positions(tasks, {}, b).value());
+  EXPECT_EQ(plan_positions(tasks, {.synchronization = Synchronization::kPhase}, a).value(),
+            plan_positions(tasks, {}, b).value());
 }
 
 TEST(Online, KeepsToTheGridAndTheLeastDuration) {
@@ -269,19 +291,39 @@ TEST(Online, ReachesSpeedsTogetherInTheShortestTime) {
     SCOPED_TRACE(i);
     const Tasks tasks = draw(random, 3);
     Profiles profiles(3);
-    const auto company = i % 2 == 0 ? Company::kTime : Company::kNone;
-    const double duration = plan_speeds(tasks, {.company = company}, profiles).value();
+    const auto synchronization = i % 2 == 0 ? Synchronization::kTime : Synchronization::kNone;
+    const double duration = plan_speeds(tasks, {.synchronization = synchronization}, profiles).value();
     double longest = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const double expected = fastest_change_s(tasks[k]);
       longest = std::max(longest, expected);
       EXPECT_GE(profiles[k].duration_s(), expected * (1 - kTight));
-      EXPECT_LE(profiles[k].duration_s(), (company == Company::kNone ? expected : duration) * (1 + kTight));
+      EXPECT_LE(profiles[k].duration_s(),
+                (synchronization == Synchronization::kNone ? expected : duration) * (1 + kTight));
       EXPECT_NEAR(profiles[k].end().speed, tasks[k].end_speed, kTight);
       EXPECT_EQ(profiles[k].end().acceleration, 0);
     }
     EXPECT_NEAR(duration, longest, kTight * (1 + longest));
   }
+}
+
+TEST(Online, AllocatesNothing) {
+  Random random(8);
+  for (const Synchronization synchronization :
+       {Synchronization::kTime, Synchronization::kPhase, Synchronization::kNone}) {
+    const Tasks tasks = draw(random, kMostTasks);
+    Profiles profiles(kMostTasks);
+    allocations = 0, counting = true;
+    const bool planned = plan_positions(tasks, {.synchronization = synchronization}, profiles) &&
+                         plan_speeds(tasks, {.synchronization = synchronization, .least_s = 1}, profiles);
+    counting = false;
+    EXPECT_TRUE(planned);
+    EXPECT_EQ(allocations, 0U);
+  }
+  counting = true;
+  const Profiles counted(1);  // that it would be seen
+  counting = false;
+  EXPECT_EQ(allocations, 1U);
 }
 
 TEST(Online, SaysWhatIsWrong) {

@@ -38,11 +38,11 @@ Reach::Reach(Side side, const AxisPoint& start, double end_speed, const AxisBoun
       per_jerk_(1 / bounds.jerk),
       up_(side == Side::kUp ? bounds.acceleration_max : -bounds.acceleration_min),
       down_(side == Side::kUp ? -bounds.acceleration_min : bounds.acceleration_max),
-      start_acceleration_(sign_* start.acceleration),
-      end_(sign_* end_speed),
-      lead_(start_acceleration_* per_jerk_) {
+      start_acceleration_(turned(start.acceleration)),
+      end_(turned(end_speed)),
+      lead_(turned(start.acceleration) / bounds.jerk) {
   const double lift = start_acceleration_ * lead_ / 2;
-  base_ = sign_ * start.speed - lift;
+  base_ = turned(start.speed) - lift;
   before_ = lead_ * (base_ + lift / 3);
   gain_ = jerk_ * (end_ - base_);
   noise_ = kSameSpeed * (std::abs(start.speed) + std::abs(lift) + std::abs(end_));
@@ -60,7 +60,7 @@ Reach::Push Reach::direct() const PONS_NONBLOCKING {
 
 Reach::Push Reach::limit(double cap) const PONS_NONBLOCKING {
   const double coasting = start_acceleration_ > 0 ? base_ + start_acceleration_ * lead_ : base_;
-  const double peak = std::max({sign_ * cap, coasting, end_});
+  const double peak = std::max({turned(cap), coasting, end_});
   const Ramp rise = ramp(peak - base_, noise_, up_, jerk_), fall = ramp(peak - end_, noise_, down_, jerk_);
   return {
       rise.duration + fall.duration - lead_, rise.acceleration, rise.hold_s, 0, fall.acceleration, fall.hold_s, peak};

@@ -5,11 +5,11 @@
 // a side: it pushes that way to a top acceleration, perhaps holds it, lets go through the peak speed (and cruises there
 // if it is the limit), pulls back to a bottom acceleration, perhaps holds that, and lets go. Continue the first push
 // backwards to where the acceleration was zero, at the base speed: then both halves are changes of speed between states
-// without acceleration, their mean speeds are the means of their ends, and given the duration all that is left is
-// linear or a square root:
-//   top² − bottom² = jerk·(end − base) + what the holds add,   top + bottom = jerk·(duration + lead)/2 − …
-// How fast the position in reach grows with the duration is the Hamiltonian of the time-optimal problem (Pontryagin
-// et al. 1962), here peak + top·bottom/(2·jerk).
+// without acceleration, and their mean speeds are the means of their ends. Without holds
+//   top² − bottom² = jerk·(end − base),   top + bottom = jerk·(duration + lead)/2
+// give both accelerations, a hold makes it one square root. How fast the position in reach grows with the duration is
+// the Hamiltonian of the time-optimal problem (Pontryagin et al. 1962), here peak + top·bottom/(2·jerk): the slope for
+// Newton's method where the duration is sought.
 #pragma once
 
 #include "pons/motion/phases.hpp"
@@ -55,13 +55,13 @@ class Reach {
   [[nodiscard]] double crest(const Push& first, const Push& limit) const;
 
   double sign_, jerk_, per_jerk_;
-  double up_, down_;           // bounds of acceleration, both positive
-  double start_acceleration_;  //
-  double end_;                 // speed
-  double lead_, base_;         // the time from the base to the start, negative if it lies ahead; the speed there
-  double before_;              // way from the base to the start
-  double gain_;                // jerk·(end − base)
-  double noise_;               // what rounding may make of a speed
+  double up_, down_;  // bounds of acceleration, both positive
+  double start_acceleration_;
+  double end_;          // speed
+  double lead_, base_;  // the time from the base to the start, negative if it lies ahead; the speed there
+  double before_;       // way from the base to the start
+  double gain_;         // jerk·(end − base)
+  double noise_;        // what rounding may make of a speed
 };
 
 }  // namespace pons::motion
