@@ -120,18 +120,13 @@ void SpeedPlan::in_time(double duration_s, double end_position, AxisProfile& pro
 
 PositionPlan::PositionPlan(const AxisTask& task) PONS_NONBLOCKING
     : change_(task.start, task.end_speed, task.bounds, brake(task.start, task.bounds)),
-      end_position_(task.end_position),
-      reach_(change_.up_),
-      push_(change_.direct_) {
-  const double way = end_position_ - change_.brake_.end.position, beyond = way - change_.direct_way_;
-  if (std::abs(beyond) <= kSamePosition) return;
-  const Side side = beyond > 0 ? Side::kUp : Side::kDown;
-  if (side == Side::kDown) {
-    reach_ = change_.reach(side);
-    push_ = reach_.direct();
-  }
-  const Reach::Push limit = reach_.limit(change_.cap(side));
-  push_ = reach_.in(reach_.duration_to(reach_.turned(way), push_, limit), limit);
+      way_(task.end_position - change_.brake_.end.position),
+      side_(way_ > change_.direct_way_ ? Side::kUp : Side::kDown),
+      reach_(change_.reach(side_)),
+      limit_(reach_.limit(change_.cap(side_))) {
+  const bool is_direct = std::abs(way_ - change_.direct_way_) <= kSamePosition;
+  push_ = is_direct ? reach_.direct()
+                    : reach_.in(reach_.duration_to(reach_.turned(way_), change_.direct_.duration, limit_), limit_);
 }
 
 void PositionPlan::fastest(AxisProfile& profile) const PONS_NONBLOCKING {
@@ -145,27 +140,26 @@ double PositionPlan::possible_s(double duration_s) const PONS_NONBLOCKING {
   if (change_.end_speed_ == 0) return duration_s;
   // Only the motions against the end speed can be on the wrong side of the position.
   const Side side = change_.end_speed_ > 0 ? Side::kDown : Side::kUp;
-  const Reach against = change_.reach(side);
-  const Reach::Push limit = against.limit(change_.cap(side));
-  const Reach::Push push = against.in(duration_s - change_.brake_.duration_s, limit);
-  const double way = against.turned(end_position_ - change_.brake_.end.position);
-  if (against.position(push) >= way - kSamePosition) return duration_s;
-  return change_.brake_.duration_s + against.duration_to(way, push, limit);
+  const Reach against = side == side_ ? reach_ : change_.reach(side);
+  const Reach::Push limit = side == side_ ? limit_ : against.limit(change_.cap(side));
+  const double rest_s = duration_s - change_.brake_.duration_s, way = against.turned(way_);
+  if (against.position(against.in(rest_s, limit)) >= way - kSamePosition) return duration_s;
+  return change_.brake_.duration_s + against.duration_to(way, rest_s, limit);
 }
 
 void PositionPlan::in_time(double duration_s, AxisProfile& profile) const PONS_NONBLOCKING {
   if (is_short(duration_s - this->duration_s(), change_.end_speed_)) return fastest(profile);
-  const double rest_s = duration_s - change_.brake_.duration_s, way = end_position_ - change_.brake_.end.position;
+  const double rest_s = duration_s - change_.brake_.duration_s;
   SpeedPlan::Pair pair = change_.unhurried(rest_s);
-  const bool beyond = pair.is_beyond(way, pair.far_way);
-  if (beyond || !pair.is_beyond(way, pair.near_way)) {
+  const bool beyond = pair.is_beyond(way_, pair.far_way);
+  if (beyond || !pair.is_beyond(way_, pair.near_way)) {
     if (beyond) pair.near = pair.far, pair.near_way = pair.far_way;
     const Side side = beyond ? pair.side : other(pair.side);
-    const Reach farthest = change_.reach(side);
-    const Reach::Push push = farthest.in(rest_s, farthest.limit(change_.cap(side)));
+    const Reach farthest = side == side_ ? reach_ : change_.reach(side);
+    const Reach::Push push = farthest.in(rest_s, side == side_ ? limit_ : farthest.limit(change_.cap(side)));
     pair.far = farthest.phases(push), pair.far_way = farthest.turned(farthest.position(push));
   }
-  change_.write_mean(pair, way, rest_s, profile);
+  change_.write_mean(pair, way_, rest_s, profile);
 }
 
 }  // namespace pons::motion

@@ -81,9 +81,10 @@ class PositionPlan {
 
  private:
   SpeedPlan change_;
-  double end_position_;
-  Reach reach_;       // of the side where the end lies
-  Reach::Push push_;  // the fastest
+  double way_;                // from where the brake ends
+  Side side_;                 // of the direct change of speed, on which the end lies
+  Reach reach_;               // to that side
+  Reach::Push limit_, push_;  // and there: the first that peaks at the cap; the fastest
 };
 
 }  // namespace pons::motion

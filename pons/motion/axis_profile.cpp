@@ -1,7 +1,6 @@
 #include "pons/motion/axis_profile.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 namespace pons::motion {
@@ -34,21 +33,6 @@ void extend(AxisProfile::Extent& extent, const AxisPoint& from, double duration,
 
 double coasting_speed(const AxisPoint& start, double jerk) PONS_NONBLOCKING {
   return start.speed + start.acceleration * std::abs(start.acceleration) / (2 * jerk);
-}
-
-void AxisProfile::add(double duration_s, double jerk) PONS_NONBLOCKING {
-  if (!(duration_s > 0)) return;
-  assert(count_ < kMaxPhases);
-  jerk_[count_] = jerk;
-  begin_s_[count_ + 1] = begin_s_[count_] + duration_s;
-  state_[count_ + 1] = after(state_[count_], duration_s, jerk);
-  ++count_;
-}
-
-void AxisProfile::add(double duration_s, double jerk, double acceleration) PONS_NONBLOCKING {
-  if (!(duration_s > 0)) return;
-  add(duration_s, jerk);
-  state_[count_].acceleration = acceleration;
 }
 
 AxisPoint AxisProfile::at(double t_s) const PONS_NONBLOCKING { return continued(t_s, t_s); }

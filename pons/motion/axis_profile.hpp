@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cstddef>
 
 #include "pons/core/realtime.hpp"
@@ -45,9 +46,20 @@ class AxisProfile {
     state_[0] = start;
   }
   // Appends a phase; one of no duration is left out.
-  void add(double duration_s, double jerk) PONS_NONBLOCKING;
+  void add(double duration_s, double jerk) PONS_NONBLOCKING {
+    if (!(duration_s > 0)) return;
+    assert(count_ < kMaxPhases);
+    jerk_[count_] = jerk;
+    begin_s_[count_ + 1] = begin_s_[count_] + duration_s;
+    state_[count_ + 1] = after(state_[count_], duration_s, jerk);
+    ++count_;
+  }
   // The same where the acceleration it ends with is known, but for rounding.
-  void add(double duration_s, double jerk, double acceleration) PONS_NONBLOCKING;
+  void add(double duration_s, double jerk, double acceleration) PONS_NONBLOCKING {
+    if (!(duration_s > 0)) return;
+    add(duration_s, jerk);
+    state_[count_].acceleration = acceleration;
+  }
   // The motion at t_s: before 0 the start, after the end on with the end speed and no acceleration.
   [[nodiscard]] AxisPoint at(double t_s) const PONS_NONBLOCKING;
   // What the phase that holds at phase_at_s, continued without end in both directions, has at t_s.

@@ -19,11 +19,11 @@ struct Ramp {
   double acceleration, hold_s, duration;
 };
 
-Ramp ramp(double change, double noise, double limit, double jerk) {
-  if (change <= noise) return {0, 0, 0};
+// With an acceleration of at least `least`, which is there already.
+Ramp ramp(double change, double noise, double least, double limit, double jerk) {
   const double square = change * jerk;
   if (square <= limit * limit) {
-    const double acceleration = std::sqrt(square);
+    const double acceleration = change <= noise ? least : std::max(least, std::sqrt(square));
     return {acceleration, 0, 2 * acceleration / jerk};
   }
   const double duration = change / limit + limit / jerk;
@@ -51,17 +51,18 @@ Reach::Reach(Side side, const AxisPoint& start, double end_speed, const AxisBoun
 Reach::Push Reach::direct() const PONS_NONBLOCKING {
   const double turning = base_ + start_acceleration_ * lead_;  // speed where a pull through the start would begin
   if ((start_acceleration_ > 0 ? turning : base_) < end_) {
-    const Ramp rise = ramp(end_ - base_, noise_, up_, jerk_);
+    const Ramp rise = ramp(end_ - base_, noise_, std::max(0.0, start_acceleration_), up_, jerk_);
     return {rise.duration - lead_, rise.acceleration, rise.hold_s, 0, 0, 0, end_};
   }
-  const Ramp fall = ramp(turning - end_, noise_, down_, jerk_);
+  const Ramp fall = ramp(turning - end_, noise_, std::max(0.0, -start_acceleration_), down_, jerk_);
   return {fall.duration + lead_, start_acceleration_, 0, 0, fall.acceleration, fall.hold_s, turning};
 }
 
 Reach::Push Reach::limit(double cap) const PONS_NONBLOCKING {
   const double coasting = start_acceleration_ > 0 ? base_ + start_acceleration_ * lead_ : base_;
   const double peak = std::max({turned(cap), coasting, end_});
-  const Ramp rise = ramp(peak - base_, noise_, up_, jerk_), fall = ramp(peak - end_, noise_, down_, jerk_);
+  const Ramp rise = ramp(peak - base_, noise_, std::max(0.0, start_acceleration_), up_, jerk_);
+  const Ramp fall = ramp(peak - end_, noise_, 0, down_, jerk_);
   return {
       rise.duration + fall.duration - lead_, rise.acceleration, rise.hold_s, 0, fall.acceleration, fall.hold_s, peak};
 }
@@ -139,27 +140,28 @@ double Reach::guess(double position) const {
 // The position in reach grows with the duration all the time if the end speed points to the side, too; else it first
 // goes with the end speed and turns back once. But if the start accelerates away, too, it may go forth, back and forth.
 // The duration where the first forth ends, else 0.
-double Reach::crest(const Push& first, const Push& limit) const {
-  if (end_ >= 0 || start_acceleration_ >= 0 || first.top > start_acceleration_ || slope(first) <= 0) return 0;
+double Reach::crest(double first_s, const Push& limit) const {
+  if (end_ >= 0 || start_acceleration_ >= 0) return 0;
+  const auto slope_in = [&](double duration) { return slope(in(duration, limit)); };
+  const double slope_first = slope_in(first_s);
+  if (slope_first <= 0) return 0;
   // The slope itself falls until the top acceleration is this share of the bottom one, without and with hold.
   const double share = 2 - std::sqrt(3.0);
   const double free = -share * std::sqrt(std::max(0.0, -gain_) / (1 - share * share));
   const double top = -free / share <= down_ ? free : -down_ / 4;
   if (top <= start_acceleration_) return 0;
-  const Ramp fall = ramp(base_ + top * top * per_jerk_ - end_, noise_, down_, jerk_);
-  const double bottom = 2 * top * per_jerk_ + fall.duration - lead_;
-  const auto slope_in = [&](double duration) { return slope(in(duration, limit)); };
-  if (slope_in(bottom) >= 0) return 0;
-  return find_root(slope_in, first.duration, slope(first), bottom, slope_in(bottom));
+  const Ramp fall = ramp(base_ + top * top * per_jerk_ - end_, noise_, 0, down_, jerk_);
+  const double bottom_s = 2 * top * per_jerk_ + fall.duration - lead_, slope_bottom = slope_in(bottom_s);
+  return bottom_s > first_s && slope_bottom < 0 ? find_root(slope_in, first_s, slope_first, bottom_s, slope_bottom) : 0;
 }
 
-double Reach::duration_to(double position, const Push& first, const Push& limit) const PONS_NONBLOCKING {
+double Reach::duration_to(double position, double first_s, const Push& limit) const PONS_NONBLOCKING {
   const double beyond = position - this->position(limit);
-  if (beyond >= 0 || limit.duration <= first.duration) {
-    return std::max(first.duration, limit.duration + beyond / limit.peak);
+  if (beyond >= 0 || limit.duration <= first_s) {
+    return std::max(first_s, limit.duration + beyond / limit.peak);
   }
-  double low = first.duration, high = limit.duration;
-  if (const double top = crest(first, limit); top > low) {
+  double low = first_s, high = limit.duration;
+  if (const double top = crest(first_s, limit); top > low) {
     (this->position(in(top, limit)) >= position ? high : low) = top;
   }
   double duration = std::clamp(guess(position), low, high);

@@ -38,9 +38,9 @@ class Reach {
   [[nodiscard]] Push limit(double cap) const PONS_NONBLOCKING;
   // The farthest in `duration_s`, which is at least the direct one's.
   [[nodiscard]] Push in(double duration_s, const Push& limit) const PONS_NONBLOCKING;
-  // The shortest duration in which `position` is reached, from that of `first` on, which ends short of it. The cap must
-  // lie on this side of zero.
-  [[nodiscard]] double duration_to(double position, const Push& first, const Push& limit) const PONS_NONBLOCKING;
+  // The shortest duration from `first_s` on in which `position` is reached; in `first_s` it is not. The cap must lie on
+  // this side of zero.
+  [[nodiscard]] double duration_to(double position, double first_s, const Push& limit) const PONS_NONBLOCKING;
 
   // Where a push ends.
   [[nodiscard]] double position(const Push& push) const PONS_NONBLOCKING;
@@ -52,7 +52,7 @@ class Reach {
  private:
   [[nodiscard]] double slope(const Push& push) const;
   [[nodiscard]] double guess(double position) const;
-  [[nodiscard]] double crest(const Push& first, const Push& limit) const;
+  [[nodiscard]] double crest(double first_s, const Push& limit) const;
 
   double sign_, jerk_, per_jerk_;
   double up_, down_;  // bounds of acceleration, both positive
