@@ -40,13 +40,11 @@ Reach::Reach(Side side, const AxisPoint& start, double end_speed, const AxisBoun
       down_(side == Side::kUp ? -bounds.acceleration_min : bounds.acceleration_max),
       start_acceleration_(turned(start.acceleration)),
       end_(turned(end_speed)),
-      lead_(turned(start.acceleration) / bounds.jerk) {
-  const double lift = start_acceleration_ * lead_ / 2;
-  base_ = turned(start.speed) - lift;
-  before_ = lead_ * (base_ + lift / 3);
-  gain_ = jerk_ * (end_ - base_);
-  noise_ = kSameSpeed * (std::abs(start.speed) + std::abs(lift) + std::abs(end_));
-}
+      lead_(start_acceleration_ / bounds.jerk),
+      base_(turned(start.speed) - start_acceleration_ * lead_ / 2),
+      before_((base_ + start_acceleration_ * lead_ / 6) * lead_),
+      gain_((end_ - base_) * jerk_),
+      noise_((std::abs(start.speed) + std::abs(start_acceleration_ * lead_) + std::abs(end_)) * kSameSpeed) {}
 
 Reach::Push Reach::direct() const PONS_NONBLOCKING {
   const double turning = base_ + start_acceleration_ * lead_;  // speed where a pull through the start would begin
