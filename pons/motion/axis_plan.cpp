@@ -8,7 +8,7 @@ namespace {
 
 // Ends that differ less count as one. The fastest duration jumps where the axis just fails to reach a position on the
 // way to a speed: the end of one plan must not count as out of reach for the next, for rounding's sake.
-constexpr double kSamePosition = 1e-10;
+constexpr double kSamePosition = 1e-10, kSamePlace = 1e-14;  // absolute, and in terms of the positions there are
 // A start may be beyond its bounds by this share of their span, as sampling a motion that used them fully leaves it.
 constexpr double kSlack = 1e-12;
 // What ends at rest, and so can wait there, does not spread such a difference over the motion.
@@ -121,10 +121,11 @@ void SpeedPlan::in_time(double duration_s, double end_position, AxisProfile& pro
 PositionPlan::PositionPlan(const AxisTask& task) PONS_NONBLOCKING
     : change_(task.start, task.end_speed, task.bounds, brake(task.start, task.bounds)),
       way_(task.end_position - change_.brake_.end.position),
+      same_(kSamePosition + kSamePlace * (std::abs(task.start.position) + std::abs(task.end_position))),
       side_(way_ > change_.direct_way_ ? Side::kUp : Side::kDown),
       reach_(change_.reach(side_)),
       limit_(reach_.limit(change_.cap(side_))) {
-  const bool is_direct = std::abs(way_ - change_.direct_way_) <= kSamePosition;
+  const bool is_direct = std::abs(way_ - change_.direct_way_) <= same_;
   push_ = is_direct ? reach_.direct()
                     : reach_.in(reach_.duration_to(reach_.turned(way_), change_.direct_.duration, limit_), limit_);
 }
@@ -143,7 +144,7 @@ double PositionPlan::possible_s(double duration_s) const PONS_NONBLOCKING {
   const Reach against = side == side_ ? reach_ : change_.reach(side);
   const Reach::Push limit = side == side_ ? limit_ : against.limit(change_.cap(side));
   const double rest_s = duration_s - change_.brake_.duration_s, way = against.turned(way_);
-  if (against.position(against.in(rest_s, limit)) >= way - kSamePosition) return duration_s;
+  if (against.position(against.in(rest_s, limit)) >= way - same_) return duration_s;
   return change_.brake_.duration_s + against.duration_to(way, rest_s, limit);
 }
 

@@ -82,6 +82,7 @@ class PositionPlan {
  private:
   SpeedPlan change_;
   double way_;                // from where the brake ends
+  double same_;               // what positions may differ by and count as one
   Side side_;                 // of the direct change of speed, on which the end lies
   Reach reach_;               // to that side
   Reach::Push limit_, push_;  // and there: the first that peaks at the cap; the fastest

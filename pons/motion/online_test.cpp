@@ -106,6 +106,17 @@ void expect_end(const AxisProfile& profile, double at_s, const AxisTask& task) {
   EXPECT_NEAR(end.acceleration, 0, kTight);
 }
 
+// Push to a peak acceleration, hold it, let go: by hand.
+double fastest_change_s(const AxisTask& task) {
+  const AxisBounds& b = task.bounds;
+  const double side = task.end_speed >= coasting_speed(task.start, b.jerk) ? 1 : -1;
+  const double bound = side > 0 ? b.acceleration_max : -b.acceleration_min, a = side * task.start.acceleration;
+  const double change = side * (task.end_speed - task.start.speed), square = b.jerk * change + a * a / 2;
+  if (a <= bound && square <= bound * bound) return (2 * std::sqrt(std::max(0.0, square)) - a) / b.jerk;
+  const double push = std::abs(bound - a) / b.jerk, gained = push * (a + bound) / 2;
+  return push + (change - gained - bound * bound / (2 * b.jerk)) / bound + bound / b.jerk;
+}
+
 AxisTask mirrored(const AxisTask& task) {
   const AxisBounds& b = task.bounds;
   return {{-task.start.position, -task.start.speed, -task.start.acceleration},
@@ -253,6 +264,18 @@ TEST(Online, OnALineIsStraight) {
   }
 }
 
+TEST(Online, StopsOnALine) {
+  const AxisBounds bounds = AxisBounds::symmetric(2, 5, 50);
+  const Tasks tasks{{{1, 1, 2}, 0, 0, bounds}, {{0, -0.5, -1}, 0, 0, bounds}, {{0, 0, 0}, 0, 0, bounds}};
+  Profiles profiles(3);
+  const double duration = plan_speeds(tasks, {.synchronization = Synchronization::kPhase}, profiles).value();
+  EXPECT_NEAR(duration, fastest_change_s(tasks[0]), kTight);
+  for (double t = 0; t <= duration; t += duration / 13) {
+    EXPECT_NEAR(profiles[1].at(t).position, -0.5 * (profiles[0].at(t).position - 1), kTight);
+    EXPECT_EQ(profiles[2].at(t).position, 0);
+  }
+}
+
 TEST(Online, NotOnALineItEndsTogether) {
   Tasks tasks{{{0, 0.5, 0}, 1, 0, AxisBounds::symmetric(1, 5, 50)},
               {{0, -0.5, 0}, 1, 0, AxisBounds::symmetric(1, 5, 50)}};
@@ -272,17 +295,6 @@ TEST(Online, KeepsToTheGridAndTheLeastDuration) {
     EXPECT_NEAR(std::remainder(duration, 0.004), 0, 1e-9);
     for (std::size_t k = 0; k < 3; ++k) expect_end(profiles[k], duration, tasks[k]);
   }
-}
-
-// Push to a peak acceleration, hold it, let go: by hand.
-double fastest_change_s(const AxisTask& task) {
-  const AxisBounds& b = task.bounds;
-  const double side = task.end_speed >= coasting_speed(task.start, b.jerk) ? 1 : -1;
-  const double bound = side > 0 ? b.acceleration_max : -b.acceleration_min, a = side * task.start.acceleration;
-  const double change = side * (task.end_speed - task.start.speed), square = b.jerk * change + a * a / 2;
-  if (a <= bound && square <= bound * bound) return (2 * std::sqrt(std::max(0.0, square)) - a) / b.jerk;
-  const double push = std::abs(bound - a) / b.jerk, gained = push * (a + bound) / 2;
-  return push + (change - gained - bound * bound / (2 * b.jerk)) / bound + bound / b.jerk;
 }
 
 TEST(Online, ReachesSpeedsTogetherInTheShortestTime) {

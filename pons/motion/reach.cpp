@@ -11,7 +11,8 @@ namespace {
 // A Newton step this small, relatively, leaves an error of its square.
 constexpr double kSameDuration = 1e-9;
 
-// Changes of speed that are less, relatively, are rounding; the root would make a thousand times as much of them.
+// Changes of speed that are less, in terms of the speeds there may be, are rounding, such as sampling a motion leaves;
+// the root would make much more of them.
 constexpr double kSameSpeed = 1e-14;
 
 // Half of a push: between states without acceleration.
@@ -44,7 +45,8 @@ Reach::Reach(Side side, const AxisPoint& start, double end_speed, const AxisBoun
       base_(turned(start.speed) - start_acceleration_ * lead_ / 2),
       before_((base_ + start_acceleration_ * lead_ / 6) * lead_),
       gain_((end_ - base_) * jerk_),
-      noise_((std::abs(start.speed) + std::abs(start_acceleration_ * lead_) + std::abs(end_)) * kSameSpeed) {}
+      noise_((std::abs(start.speed) + std::abs(start_acceleration_ * lead_) + bounds.speed_max - bounds.speed_min) *
+             kSameSpeed) {}
 
 Reach::Push Reach::direct() const PONS_NONBLOCKING {
   const double turning = base_ + start_acceleration_ * lead_;  // speed where a pull through the start would begin

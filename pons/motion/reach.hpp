@@ -28,7 +28,7 @@ class Reach {
   };
 
   Reach() = default;
-  // The start's acceleration must be inside the bounds; those of speed are not read.
+  // The start's acceleration must be inside the bounds; those of speed need not hold.
   Reach(Side side, const AxisPoint& start, double end_speed, const AxisBounds& bounds) PONS_NONBLOCKING;
 
   // The fastest change to the end speed: the same motion whichever the side.
