@@ -13,7 +13,7 @@ constexpr double kSameDuration = 1e-9;
 
 // Changes of speed that are less, in terms of the speeds there may be, are rounding, such as sampling a motion leaves;
 // the root would make much more of them.
-constexpr double kSameSpeed = 1e-14;
+constexpr double kSameSpeed = 2e-15;
 
 // Half of a push: between states without acceleration.
 struct Ramp {
