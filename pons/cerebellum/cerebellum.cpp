@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "pons/motion/stop.hpp"
 #include "pons/rt/guard.hpp"
 
 namespace pons::cerebellum {

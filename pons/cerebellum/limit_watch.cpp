@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "pons/cerebellum/motion_queue.hpp"
-#include "pons/motion/axis_profile.hpp"
+#include "pons/motion/axis_plan.hpp"
 
 namespace pons::cerebellum {
 namespace {
@@ -48,16 +48,17 @@ std::optional<Breach> LimitWatch::breach_now(const AxisState& previous, const Ax
 
 std::optional<Breach> LimitWatch::breach_ahead(const AxisState& state) const {
   for (Eigen::Index i = 0; i < state.position.size(); ++i) {
-    const motion::AxisBounds bounds{limits_.speed_rad_s[i], limits_.acceleration_rad_s2[i], limits_.jerk_rad_s3[i]};
+    const double acceleration = limits_.acceleration_rad_s2[i], jerk = limits_.jerk_rad_s3[i];
     const motion::AxisPoint point{state.position[i], state.speed[i], state.acceleration[i]};
-    const double a = std::abs(point.acceleration), coasting = std::abs(motion::coasting_speed(point, bounds.jerk));
-    if (coasting > bounds.speed * kRate + SeamTolerance::kSpeed) return Breach{i, Limit::kSpeed};
+    const double a = std::abs(point.acceleration), coasting = std::abs(motion::coasting_speed(point, jerk));
+    if (coasting > limits_.speed_rad_s[i] * kRate + SeamTolerance::kSpeed) return Breach{i, Limit::kSpeed};
     // No stop travels farther than this; only near a limit is the exact way worth its time.
-    const double fastest = std::abs(point.speed) + a * a / (2 * bounds.jerk);
-    const double farthest = fastest * (fastest / (2 * bounds.acceleration) + (bounds.acceleration + a) / bounds.jerk);
+    const double fastest = std::abs(point.speed) + a * a / (2 * jerk);
+    const double farthest = fastest * (fastest / (2 * acceleration) + (acceleration + a) / jerk);
     if (point.position - farthest >= limits_.position_min[i] && point.position + farthest <= limits_.position_max[i])
       continue;
-    const double end = motion::plan_to_speed(point, 0, bounds).end().position;
+    const auto bounds = motion::AxisBounds::symmetric(limits_.speed_rad_s[i], acceleration, jerk);
+    const double end = motion::SpeedPlan(point, 0, bounds).end_position();
     if (end < limits_.position_min[i] - kPosition || end > limits_.position_max[i] + kPosition)
       return Breach{i, Limit::kStoppingDistance};
   }

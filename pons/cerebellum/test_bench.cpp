@@ -8,6 +8,8 @@
 #include <iterator>
 #include <numbers>
 
+#include "pons/motion/online.hpp"
+
 namespace pons::cerebellum {
 namespace {
 
@@ -152,20 +154,18 @@ void Bench::arm() {
 std::vector<Segment> point_to_point(const AxisState& start, Time at, const AxisVector& to, const AxisLimits& limits) {
   const auto axes = static_cast<std::size_t>(to.size());
   std::vector<motion::AxisProfile> profiles(axes);
-  const auto point = [&](Eigen::Index i) {
-    return motion::AxisPoint{start.position[i], start.speed[i], start.acceleration[i]};
-  };
-  const auto bounds = [&](Eigen::Index i) {
-    return motion::AxisBounds{limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i]};
-  };
-  double duration = 0;
+  std::vector<motion::AxisTask> tasks;
   for (Eigen::Index i = 0; i < to.size(); ++i) {
-    duration = std::max(duration, motion::plan_to_position(point(i), to[i], 0, bounds(i)).duration_s());
+    tasks.push_back(
+        {{start.position[i], start.speed[i], start.acceleration[i]},
+         to[i],
+         0,
+         motion::AxisBounds::symmetric(limits.speed_rad_s[i], limits.acceleration_rad_s2[i], limits.jerk_rad_s3[i])});
   }
+  if (!motion::plan_positions(tasks, {}, profiles)) return {};
   std::vector<double> knots{0};
   for (Eigen::Index i = 0; i < to.size(); ++i) {
-    auto& profile = profiles[static_cast<std::size_t>(i)];
-    profile = motion::plan_in_time(point(i), to[i], 0, duration, bounds(i));
+    const auto& profile = profiles[static_cast<std::size_t>(i)];
     for (std::size_t k = 1; k <= profile.phases(); ++k) knots.push_back(profile.begin_s(k));
   }
   std::sort(knots.begin(), knots.end());

@@ -30,8 +30,9 @@ Expected<void> check_value(double value, double low, double high, const char* wh
 
 AxisBounds inner_bounds(const AxisLimits& limits, Eigen::Index axis) {
   const double jerk = limits.jerk_rad_s3[axis] * (1 - 1e-10);
-  return {limits.speed_rad_s[axis] * (1 - 1e-10),
-          std::max(limits.acceleration_rad_s2[axis] - 1e-9 * jerk, limits.acceleration_rad_s2[axis] / 2), jerk};
+  return AxisBounds::symmetric(
+      limits.speed_rad_s[axis] * (1 - 1e-10),
+      std::max(limits.acceleration_rad_s2[axis] - 1e-9 * jerk, limits.acceleration_rad_s2[axis] / 2), jerk);
 }
 
 Expected<void> check_limits(const AxisLimits& limits, Eigen::Index axes) {
@@ -114,18 +115,13 @@ double common_duration_s(const Piece& piece) {
   return duration;
 }
 
-Expected<void> plan(const Piece& piece, double duration_s, const AxisLimits& limits, std::span<AxisProfile> profiles) {
-  for (std::size_t i = 0; i < piece.count; ++i) {
+Expected<void> check_way(std::span<const AxisProfile> profiles, const AxisLimits& limits) {
+  for (std::size_t i = 0; i < profiles.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
-    const AxisPiece& one = piece.axes[i];
-    // Time-optimal, then rest for the margin: fewer segments than a weighted mean.
-    const bool slowest =
-        one.to.acceleration == 0 && one.to.speed == 0 && fastest_duration_s(one) >= duration_s - 2 * kMargin_s;
-    profiles[i] =
-        slowest ? plan_to_position(one.from, one.to.position, one.to.speed, one.bounds) : plan_in_time(one, duration_s);
     const AxisProfile::Extent extent = profiles[i].extent();
-    const double low = std::min(limits.position_min[axis], one.from.position) - kPositionSlack;
-    const double high = std::max(limits.position_max[axis], one.from.position) + kPositionSlack;
+    const double from = profiles[i].start().position;
+    const double low = std::min(limits.position_min[axis], from) - kPositionSlack;
+    const double high = std::max(limits.position_max[axis], from) + kPositionSlack;
     if (extent.position_min < low || extent.position_max > high) {
       return fail(
           fmt::format("axis {} swings through [{:.6g}, {:.6g}], beyond its limits [{:.6g}, {:.6g}]", i + 1,

@@ -26,9 +26,8 @@ struct Piece {
 // The shortest common duration in whole nanoseconds, as seconds; infinite if there is none.
 [[nodiscard]] double common_duration_s(const Piece& piece);
 
-// All axes in `duration_s`. Error: an axis leaves its position limits on the way.
-[[nodiscard]] Expected<void> plan(const Piece& piece, double duration_s, const AxisLimits& limits,
-                                  std::span<AxisProfile> profiles);
+// Error: an axis leaves its position limits on the way.
+[[nodiscard]] Expected<void> check_way(std::span<const AxisProfile> profiles, const AxisLimits& limits);
 
 // Appends the profiles as segments from `at` on, for `duration`.
 void append(std::span<const AxisProfile> profiles, Time at, Duration duration, Trajectory& trajectory);

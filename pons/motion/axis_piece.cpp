@@ -16,7 +16,18 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 AxisPiece reversed(const AxisPiece& piece) {
   return {{-piece.to.position, piece.to.speed, -piece.to.acceleration},
           {-piece.from.position, piece.from.speed, -piece.from.acceleration},
-          piece.bounds};
+          {piece.bounds.speed_min, piece.bounds.speed_max, -piece.bounds.acceleration_max,
+           -piece.bounds.acceleration_min, piece.bounds.jerk}};
+}
+
+AxisTask task(const AxisPiece& piece) { return {piece.from, piece.to.position, piece.to.speed, piece.bounds}; }
+
+Phases phases(const AxisProfile& profile) {
+  Phases result;
+  for (std::size_t i = 0; i < profile.phases(); ++i) {
+    result.add(profile.begin_s(i + 1) - profile.begin_s(i), profile.jerk(i), profile.begin(i + 1).acceleration);
+  }
+  return result;
 }
 
 // Motions with acceleration at both ends: to a cruising speed as fast as possible, cruise, and on. Both the duration
@@ -24,29 +35,30 @@ AxisPiece reversed(const AxisPiece& piece) {
 // speeds of the ends.
 class Bridge {
  public:
-  explicit Bridge(const AxisPiece& piece) : piece_(piece), back_(reversed(piece).from) {
-    const double from = coasting_speed(piece.from, piece.bounds.jerk), to = coasting_speed(back_, piece.bounds.jerk);
+  explicit Bridge(const AxisPiece& piece) : piece_(piece), reversed_(reversed(piece)) {
+    const double from = coasting_speed(piece.from, piece.bounds.jerk),
+                 to = coasting_speed(reversed_.from, piece.bounds.jerk);
     low_ = std::min(from, to), high_ = std::max(from, to);
   }
 
-  struct Reach {
+  struct Way {
     double duration, distance;  // without cruise
   };
-  [[nodiscard]] Reach reach(double cruise) const {
-    const SpeedChange first = change_speed(piece_.from, cruise, piece_.bounds);
-    const SpeedChange last = change_speed(back_, cruise, piece_.bounds);
-    return {first.duration_s + last.duration_s, first.distance + last.distance};
+  [[nodiscard]] Way reach(double cruise) const {
+    const SpeedPlan first(piece_.from, cruise, piece_.bounds), last(reversed_.from, cruise, reversed_.bounds);
+    return {first.duration_s() + last.duration_s(),
+            first.end_position() - piece_.from.position + last.end_position() - reversed_.from.position};
   }
   [[nodiscard]] double distance(double cruise, double duration) const {
-    const Reach r = reach(cruise);
+    const Way r = reach(cruise);
     return r.distance + cruise * (duration - r.duration);
   }
 
   [[nodiscard]] double fastest() const {
     const double wish = piece_.to.position - piece_.from.position;
-    const Reach high = reach(high_), low = reach(low_);
-    if (wish >= high.distance) return outwards(high_, std::max(high_, piece_.bounds.speed), wish);
-    if (wish <= low.distance) return outwards(low_, std::min(low_, -piece_.bounds.speed), wish);
+    const Way high = reach(high_), low = reach(low_);
+    if (wish >= high.distance) return outwards(high_, std::max(high_, piece_.bounds.speed_max), wish);
+    if (wish <= low.distance) return outwards(low_, std::min(low_, piece_.bounds.speed_min), wish);
     // Between the two: a mean of cruising at either coasting speed, once both leave enough time and lie on either side.
     double duration = std::max(low.duration, high.duration);
     const auto least = [&] { return low.distance + low_ * (duration - low.duration); };
@@ -63,8 +75,8 @@ class Bridge {
   [[nodiscard]] Span span(double duration) const {
     const bool to_high = reach(high_).duration <= duration, to_low = reach(low_).duration <= duration;
     if (!to_high && !to_low) return {1, -1};
-    return {to_low ? farthest(low_, std::min(low_, -piece_.bounds.speed), duration) : high_,
-            to_high ? farthest(high_, std::max(high_, piece_.bounds.speed), duration) : low_};
+    return {to_low ? farthest(low_, std::min(low_, piece_.bounds.speed_min), duration) : high_,
+            to_high ? farthest(high_, std::max(high_, piece_.bounds.speed_max), duration) : low_};
   }
 
   [[nodiscard]] double possible(double duration) const {
@@ -75,8 +87,10 @@ class Bridge {
   }
 
   [[nodiscard]] AxisProfile profile(double cruise, double duration) const {
-    AxisProfile result = plan_to_speed(piece_.from, cruise, piece_.bounds);
-    const AxisProfile last = plan_to_speed(back_, cruise, piece_.bounds).backwards();
+    AxisProfile result, back;
+    SpeedPlan(piece_.from, cruise, piece_.bounds).fastest(result);
+    SpeedPlan(reversed_.from, cruise, reversed_.bounds).fastest(back);
+    const AxisProfile last = back.backwards();
     result.add(duration - result.duration_s() - last.duration_s(), 0);
     for (std::size_t i = 0; i < last.phases(); ++i) result.add(last.begin_s(i + 1) - last.begin_s(i), last.jerk(i));
     return result;
@@ -92,7 +106,9 @@ class Bridge {
     if (inner && s.low != high_ && s.high != low_) s = {low_, high_};
     const double least = distance(s.low, duration), most = distance(s.high, duration);
     const double weight = most > least ? std::clamp((wish - least) / (most - least), 0.0, 1.0) : 1;
-    return weighted_mean(profile(s.high, duration), profile(s.low, duration), weight, duration);
+    AxisProfile result(piece_.from);
+    append_mean(phases(profile(s.high, duration)), phases(profile(s.low, duration)), weight, duration, result);
+    return result;
   }
 
  private:
@@ -102,8 +118,8 @@ class Bridge {
     // Most often one of these cruising speeds leads less far, and one farther: no search then.
     bool less = false, more = false;
     for (const double cruise : {low_, high_, 0.0, wish / duration}) {
-      if (std::abs(cruise) > piece_.bounds.speed) continue;
-      const Reach r = reach(cruise);
+      if (cruise > piece_.bounds.speed_max || cruise < piece_.bounds.speed_min) continue;
+      const Way r = reach(cruise);
       if (r.duration > duration) continue;
       const double reached = r.distance + cruise * (duration - r.duration);
       less = less || reached <= wish;
@@ -124,7 +140,7 @@ class Bridge {
   }
   // Duration to `wish`, at or beyond reach(inner), cruising between inner and outer.
   [[nodiscard]] double outwards(double inner, double outer, double wish) const {
-    const Reach far = reach(outer);
+    const Way far = reach(outer);
     const double side = outer > inner ? 1 : -1;
     if (side * (wish - far.distance) >= 0) return far.duration + (outer == 0 ? 0 : (wish - far.distance) / outer);
     return reach(find_cruise([&](double cruise) { return reach(cruise).distance - wish; }, inner, outer)).duration;
@@ -135,51 +151,35 @@ class Bridge {
     return find_cruise([&](double cruise) { return reach(cruise).duration - duration; }, inner, outer);
   }
 
-  AxisPiece piece_;
-  AxisPoint back_;  // where the piece begins backwards
+  AxisPiece piece_, reversed_;
   double low_, high_;
 };
 
 }  // namespace
 
-AxisProfile weighted_mean(const AxisProfile& a, const AxisProfile& b, double weight,
-                          double duration_s) PONS_NONBLOCKING {
-  AxisProfile result(a.start());
-  std::size_t i = 0, k = 0;
-  double now = 0;
-  while (now < duration_s) {
-    const double end_a = i < a.phases() ? a.begin_s(i + 1) : duration_s;
-    const double end_b = k < b.phases() ? b.begin_s(k + 1) : duration_s;
-    const double next = std::min({end_a, end_b, duration_s});
-    result.add(next - now, weight * (i < a.phases() ? a.jerk(i) : 0) + (1 - weight) * (k < b.phases() ? b.jerk(k) : 0));
-    if (i < a.phases() && end_a <= next) ++i;
-    if (k < b.phases() && end_b <= next) ++k;
-    now = next;
-  }
-  return result;
-}
-
 double fastest_duration_s(const AxisPiece& piece) PONS_NONBLOCKING {
-  if (piece.to.acceleration == 0) {
-    return fastest_duration_s(piece.from, piece.to.position, piece.to.speed, piece.bounds);
-  }
+  if (piece.to.acceleration == 0) return PositionPlan(task(piece)).duration_s();
   if (piece.from.acceleration == 0) return fastest_duration_s(reversed(piece));
   return Bridge(piece).fastest();
 }
 
 double possible_duration_s(const AxisPiece& piece, double duration_s) PONS_NONBLOCKING {
-  if (piece.to.acceleration == 0) {
-    return possible_duration_s(piece.from, piece.to.position, piece.to.speed, duration_s, piece.bounds);
-  }
+  if (piece.to.acceleration == 0) return PositionPlan(task(piece)).possible_s(duration_s);
   if (piece.from.acceleration == 0) return possible_duration_s(reversed(piece), duration_s);
   return Bridge(piece).possible(duration_s);
 }
 
 AxisProfile plan_in_time(const AxisPiece& piece, double duration_s) PONS_NONBLOCKING {
   if (piece.to.acceleration == 0) {
-    return plan_in_time(piece.from, piece.to.position, piece.to.speed, duration_s, piece.bounds);
+    AxisProfile profile;
+    PositionPlan(task(piece)).in_time(duration_s, profile);
+    return profile;
   }
-  if (piece.from.acceleration == 0) return plan_in_time(reversed(piece), duration_s).backwards();
+  if (piece.from.acceleration == 0) {
+    AxisProfile profile = plan_in_time(reversed(piece), duration_s);
+    profile.add(duration_s - profile.duration_s(), 0);  // what it rests there, it has to wait here
+    return profile.backwards();
+  }
   return Bridge(piece).plan(duration_s);
 }
 

@@ -1,7 +1,7 @@
 // One axis between two states that may both carry acceleration: a piece of a motion through via points.
 #pragma once
 
-#include "pons/motion/axis_profile.hpp"
+#include "pons/motion/axis_plan.hpp"
 
 namespace pons::motion {
 
@@ -19,10 +19,5 @@ struct AxisPiece {
 
 // The piece in exactly a possible duration.
 [[nodiscard]] AxisProfile plan_in_time(const AxisPiece& piece, double duration_s) PONS_NONBLOCKING;
-
-// weight·a + (1 − weight)·b of two profiles from one start; holds every limit that both hold. a and b have seven phases
-// at most.
-[[nodiscard]] AxisProfile weighted_mean(const AxisProfile& a, const AxisProfile& b, double weight,
-                                        double duration_s) PONS_NONBLOCKING;
 
 }  // namespace pons::motion

@@ -1,16 +1,10 @@
 #include "pons/motion/axis_profile.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 namespace pons::motion {
 namespace {
-
-AxisPoint after(const AxisPoint& from, double t, double jerk) {
-  return {from.position + t * (from.speed + t * (from.acceleration / 2 + t * jerk / 6)),
-          from.speed + t * (from.acceleration + t * jerk / 2), from.acceleration + t * jerk};
-}
 
 // Takes a phase's extremes into account: speed where the acceleration crosses zero, position where the speed does.
 void extend(AxisProfile::Extent& extent, const AxisPoint& from, double duration, double jerk) {
@@ -37,13 +31,8 @@ void extend(AxisProfile::Extent& extent, const AxisPoint& from, double duration,
 
 }  // namespace
 
-void AxisProfile::add(double duration_s, double jerk) PONS_NONBLOCKING {
-  if (!(duration_s > 0)) return;
-  assert(count_ < kMaxPhases);
-  jerk_[count_] = jerk;
-  begin_s_[count_ + 1] = begin_s_[count_] + duration_s;
-  state_[count_ + 1] = after(state_[count_], duration_s, jerk);
-  ++count_;
+double coasting_speed(const AxisPoint& start, double jerk) PONS_NONBLOCKING {
+  return start.speed + start.acceleration * std::abs(start.acceleration) / (2 * jerk);
 }
 
 AxisPoint AxisProfile::at(double t_s) const PONS_NONBLOCKING { return continued(t_s, t_s); }

@@ -5,11 +5,34 @@
 #include <cmath>
 
 #include "pons/motion/assemble.hpp"
+#include "pons/motion/online.hpp"
+#include "pons/motion/stop.hpp"
 
 namespace pons::motion {
 
+static_assert(kMaxAxes <= kMostTasks);
+
 Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits) {
-  return move_through(start, at, {}, end, limits);
+  if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
+  if (auto ok = check_waypoint(end, "end", limits); !ok) return std::unexpected(ok.error());
+  const auto axes = static_cast<std::size_t>(start.position.size());
+  std::array<AxisTask, kMaxAxes> tasks;
+  for (std::size_t i = 0; i < axes; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const AxisBounds bounds = inner_bounds(limits, axis);
+    tasks[i] = {{start.position[axis], start.speed[axis], start.acceleration[axis]},
+                end.position[axis],
+                std::clamp(end.speed[axis], bounds.speed_min, bounds.speed_max),
+                bounds};
+  }
+  std::array<AxisProfile, kMaxAxes> profiles;
+  const std::span<AxisProfile> used(profiles.data(), axes);
+  const auto duration_s = plan_positions(std::span(tasks).first(axes), {.grid_s = 1e-9}, used);
+  if (!duration_s) return fail(text(duration_s.error()), "motion", "choose another start or end");
+  if (auto ok = check_way(used, limits); !ok) return std::unexpected(ok.error());
+  Trajectory trajectory;
+  append(used, at, std::max(ceil_ns(*duration_s), Duration{1}), trajectory);
+  return trajectory;
 }
 
 Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& limits) {
@@ -22,7 +45,7 @@ Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& lim
   AxisLimits inner = limits;
   for (Eigen::Index i = 0; i < axes; ++i) {
     const AxisBounds bounds = inner_bounds(limits, i);
-    inner.acceleration_rad_s2[i] = bounds.acceleration;
+    inner.acceleration_rad_s2[i] = bounds.acceleration_max;
     inner.jerk_rad_s3[i] = bounds.jerk;
   }
   std::array<AxisProfile, kMaxAxes> profiles;

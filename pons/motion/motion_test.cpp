@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "pons/core/random.hpp"
-#include "pons/motion/axis_profile.hpp"
+#include "pons/motion/axis_plan.hpp"
 
 namespace pons::motion {
 namespace {
@@ -213,7 +213,7 @@ TEST(Stop, ComesToRestWithinLimitsFromAnyMotion) {
     double slowest = 0;
     for (Eigen::Index k = 0; k < 6; ++k) {
       const AxisPoint point{0, start.speed[k], start.acceleration[k]};
-      slowest = std::max(slowest, plan_to_speed(point, 0, {3.14, 20, 400}).duration_s());
+      slowest = std::max(slowest, SpeedPlan(point, 0, AxisBounds::symmetric(3.14, 20, 400)).duration_s());
     }
     EXPECT_NEAR(to_s(trajectory->back().end() - kAt), slowest, 1e-6);
   }

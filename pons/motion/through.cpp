@@ -30,7 +30,8 @@ class Search {
       bounds_[i] = inner_bounds(limits, axis);
       points_.front()[i] = {start.position[axis], start.speed[axis], start.acceleration[axis]};
       for (std::size_t k = 0; k < vias.size(); ++k) points_[k + 1][i] = {vias[k][axis], 0, 0};
-      points_.back()[i] = {end.position[axis], std::clamp(end.speed[axis], -bounds_[i].speed, bounds_[i].speed), 0};
+      points_.back()[i] = {end.position[axis], std::clamp(end.speed[axis], bounds_[i].speed_min, bounds_[i].speed_max),
+                           0};
     }
   }
 
@@ -43,14 +44,13 @@ class Search {
   }
 
   void run() {
-    if (pieces() == 1) return;
     guess_speeds();
     double step = kFirstStep;
     for (int sweep = 0; sweep < kSweeps; ++sweep, step *= 0.5) {
       for (std::size_t k = 1; k + 1 < points_.size(); ++k) {
         for (std::size_t i = 0; i < axes_; ++i) {
-          improve(k, i, step * bounds_[i].speed, 0);
-          improve(k, i, 0, step * bounds_[i].acceleration);
+          improve(k, i, step * bounds_[i].speed_max, 0);
+          improve(k, i, 0, step * bounds_[i].acceleration_max);
         }
       }
     }
@@ -112,7 +112,7 @@ class Search {
   void scale_speeds(const std::vector<Points>& chord, double scale) {
     for (std::size_t k = 1; k + 1 < points_.size(); ++k) {
       for (std::size_t i = 0; i < axes_; ++i) {
-        points_[k][i].speed = std::clamp(scale * chord[k][i].speed, -bounds_[i].speed, bounds_[i].speed);
+        points_[k][i].speed = std::clamp(scale * chord[k][i].speed, bounds_[i].speed_min, bounds_[i].speed_max);
       }
     }
   }
@@ -126,7 +126,8 @@ class Search {
     point.speed += speed_step;
     point.acceleration += acceleration_step;
     const double bend = point.acceleration * point.acceleration / (2 * bounds_[i].jerk);
-    if (std::abs(point.acceleration) > bounds_[i].acceleration || std::abs(point.speed) + bend > bounds_[i].speed) {
+    if (std::abs(point.acceleration) > bounds_[i].acceleration_max ||
+        std::abs(point.speed) + bend > bounds_[i].speed_max) {
       point = old;
       return false;
     }
@@ -206,7 +207,8 @@ Expected<double> plan_longer(const Piece& piece, const AxisLimits& limits, std::
   for (const double stretch : {1.0, 1.02, 1.06, 1.15, 1.4}) {
     const double duration_s = to_s(ceil_ns(stretch * shortest_s));
     if (!std::isfinite(shortest_s)) break;
-    auto ok = plan(piece, duration_s, limits, profiles);
+    for (std::size_t i = 0; i < piece.count; ++i) profiles[i] = plan_in_time(piece.axes[i], duration_s);
+    auto ok = check_way(profiles, limits);
     if (ok && arrives(piece, profiles)) return duration_s;
     if (!ok) planned = std::move(ok);
   }
@@ -232,6 +234,7 @@ Expected<Trajectory> assemble(const Search& search, Time at, const AxisLimits& l
 
 Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<const AxisVector> vias,
                                   const Waypoint& end, const AxisLimits& limits) {
+  if (vias.empty()) return move(start, at, end, limits);
   if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
   if (auto ok = check_waypoint(end, "end", limits); !ok) return std::unexpected(ok.error());
   for (const AxisVector& via : vias) {
@@ -241,7 +244,6 @@ Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<con
   }
   Search search(start, vias, end, limits);
   Expected<Trajectory> halting = assemble(search, at, limits);
-  if (vias.empty()) return halting;
   search.run();
   Expected<Trajectory> flying = assemble(search, at, limits);
   if (!flying || (halting && halting->back().end() < flying->back().end())) return halting;
