@@ -14,7 +14,7 @@
 
 namespace pons::motion {
 
-// What an axis shall do.
+// What an axis shall do. The end has no acceleration; its speed points where the axis is to fly on to, or is zero.
 struct AxisTask {
   AxisPoint start;
   double end_position = 0, end_speed = 0;
@@ -38,8 +38,9 @@ class SpeedPlan {
   SpeedPlan(const AxisPoint& start, double end_speed, const AxisBounds& bounds) PONS_NONBLOCKING;
 
   [[nodiscard]] double duration_s() const { return brake_.duration_s + direct_.duration; }
-  // Where the fastest change ends.
+  // Where the fastest change ends: nothing that ends as it does can end sooner.
   [[nodiscard]] double end_position() const { return brake_.end.position + direct_way_; }
+  // What `profile` held is forgotten, here and below.
   void fastest(AxisProfile& profile) const PONS_NONBLOCKING;
 
   // In just `duration_s`, to `end_position` or as near to it as leads without leaving the speeds between coasting and
@@ -55,6 +56,7 @@ class SpeedPlan {
   [[nodiscard]] Pair unhurried(double rest_s) const;
   void write_mean(const Pair& pair, double way, double rest_s, AxisProfile& profile) const;
 
+  // Where the brake ends, everything else begins; ways count from there.
   AxisBounds bounds_;
   AxisPoint start_;
   double end_speed_;
@@ -64,7 +66,8 @@ class SpeedPlan {
   double direct_way_;
 };
 
-// To an end position with an end speed.
+// To an end position with an end speed. Ends that differ by less than 1e-10, and 1e-14 of the positions themselves,
+// count as one.
 class PositionPlan {
  public:
   PositionPlan() = default;

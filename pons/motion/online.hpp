@@ -5,7 +5,7 @@
 // A start beyond its bounds is brought back inside first, by the shortest motion that does it. From there on the bounds
 // hold, each direction its own. Positions on the way are not bounded: ask AxisProfile::extent().
 //
-// Accuracy: ends within 1e-9 of position and speed and 1e-9 of acceleration for motions of everyday size (positions
+// Accuracy: ends within 1e-9 of position and speed, without acceleration, for motions of everyday size (positions
 // below 1e3, durations below 1e3 s), bounds kept within 1e-9 of themselves; bench/trajectory_generation measures it.
 #pragma once
 
@@ -20,6 +20,7 @@ namespace pons::motion {
 inline constexpr std::size_t kMostTasks = 16;
 inline constexpr double kLongestMotion_s = 1e6;  // what takes longer is a mistake
 
+// Why there is no motion. None of them is met on the way: what gets past the checks is planned.
 enum class OnlineError : std::uint8_t {
   kCount,      // no axis, more than kMostTasks, or another number of profiles than of tasks
   kNotFinite,  // a position, speed, acceleration, bound or duration that is no finite number
