@@ -13,13 +13,11 @@ constexpr double kExact = 1e-11;          // m and rad: better than this is left
 constexpr int kPolishes = 4;              // steps at most; each squares the error
 constexpr double kPolishDamping = 1e-12;  // of units of the Jacobian squared
 constexpr double kOnLimit = 1e-9;         // rad beyond a limit that are rounding
-constexpr double kNoSide = 1e-7;          // of Sides: as near to a singularity, the seed may leave it on either side
-constexpr double kSingularShare = 1e-3;   // of the seed's distance: as far beyond a singularity is not yet beyond
+constexpr double kNoSide = 1e-7;          // of Sides: as near to a singularity as rounding may be on either side
 
 bool same_side(const Sides& seed, const Sides& other) {
   for (std::size_t i = 0; i < seed.size(); ++i) {
-    const bool opposite = seed[i] * other[i] < 0 && std::abs(other[i]) > kSingularShare * std::abs(seed[i]);
-    if (opposite && std::abs(seed[i]) > kNoSide) return false;
+    if (seed[i] * other[i] < 0 && std::min(std::abs(seed[i]), std::abs(other[i])) > kNoSide) return false;
   }
   return true;
 }

@@ -14,17 +14,24 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kAimFor = 1e-10;        // m and rad: where iterating stops
 constexpr int kIterations = 60;          // of one attempt
-constexpr int kPatience = 8;             // iterations without a better error before an attempt is given up
 constexpr int kBudget = 400;             // iterations in all
 constexpr int kRestarts = 4;             // attempts from nudged seeds
 constexpr double kNudge = 0.6;           // rad
-constexpr double kMaxStep = 0.5;         // rad or m, of any axis in one iteration
 constexpr double kDamping = 1e-2;        // λ² per squared error
 constexpr double kLeastDamping = 1e-12;  // of units of the Jacobian squared: keeps a singular arm solvable
 constexpr double kPull = 0.3;            // share of the way back to the seed, inside the null space
 constexpr double kPullAbove = 1e-3;      // error above which the null space is used
 constexpr double kNear = 0.05;           // m and rad: as near to the seed, a redundant arm takes the least joint motion
 constexpr double kSingularShare = 1e-3;  // of the seed's determinant: closer to singular than this has no side
+
+// How boldly an attempt goes about it.
+struct Manner {
+  double longest_step;  // rad or m, of any axis in one iteration
+  double progress;      // an error below this share of the last one that was counts as better
+  int patience;         // iterations without a better error before the attempt is given up
+};
+constexpr Manner kCareful{0.5, 1.0, 8};  // stays near its start, and notices a singularity on its way
+constexpr Manner kHasty{0.8, 0.9, 4};    // better another start than a slow one
 
 struct Attempt {
   AxisVector q;
@@ -43,7 +50,7 @@ AxisVector pulled_step(const Jacobian& jacobian, const PoseError& error, const A
 
 // A step that leaves axes alone which stand at a limit and would be pushed through it.
 AxisVector bounded_step(Jacobian jacobian, const PoseError& error, AxisVector pull, const AxisVector& q,
-                        const AxisLimits& limits) {
+                        const AxisLimits& limits, double longest_step) {
   AxisVector step = pulled_step(jacobian, error, pull);
   for (Eigen::Index round = 0; round < q.size(); ++round) {
     bool blocked = false;
@@ -59,31 +66,35 @@ AxisVector bounded_step(Jacobian jacobian, const PoseError& error, AxisVector pu
     step = pulled_step(jacobian, error, pull);
   }
   const double longest = step.cwiseAbs().maxCoeff();
-  if (longest > kMaxStep) step *= kMaxStep / longest;
+  if (longest > longest_step) step *= longest_step / longest;
   return step;
 }
 
 // One attempt: from `start`, pulled towards `rest` if redundant. Takes what it uses off the budget.
 Attempt refine(const Chain& chain, const Pose& target, const AxisVector& start, const AxisVector& rest,
-               double seed_determinant, int& budget) {
+               double seed_determinant, const Manner& manner, int& budget) {
   const AxisLimits& limits = chain.limits();
   Attempt attempt{.q = start};
   AxisVector q = start, pull = AxisVector::Zero(start.size());
   Pose tip;
   Jacobian jacobian;
-  double best = INFINITY;
+  double best = INFINITY, mark = INFINITY;
   int since_best = 0;
-  for (int i = 0; i < kIterations && since_best < kPatience && budget > 0; ++i, --budget) {
+  for (int i = 0; i < kIterations && since_best < manner.patience && budget > 0; ++i, --budget) {
     chain.evaluate(q, tip, jacobian);
     const PoseError error = pose_error(target, tip);
     const double worst = std::max(error.head<3>().norm(), error.tail<3>().norm());
     if (worst < best) {
       best = worst;
       attempt.q = q;
+    } else if (best < kAccept) {
+      break;  // at the rounding floor
+    }
+    if (best < manner.progress * mark) {
+      mark = best;
       since_best = 0;
     } else {
       ++since_best;
-      if (best < kAccept) break;  // at the rounding floor
     }
     if (determinant(jacobian) * seed_determinant < -kSingularShare * seed_determinant * seed_determinant)
       attempt.crossed = true;
@@ -94,7 +105,7 @@ Attempt refine(const Chain& chain, const Pose& target, const AxisVector& start, 
       else
         pull.setZero();
     }
-    q += bounded_step(jacobian, error, pull, q, limits);
+    q += bounded_step(jacobian, error, pull, q, limits, manner.longest_step);
     q = q.cwiseMax(limits.position_min).cwiseMin(limits.position_max);
   }
   attempt.solved = best < kAccept;
@@ -163,11 +174,12 @@ std::optional<AxisVector> iterate(const Chain& chain, const Pose& target, const 
   Jacobian jacobian;
   chain.evaluate(seed, tip, jacobian);
   const double seed_determinant = among == Among::kBranchOfSeed ? determinant(jacobian) : 0;
+  const Manner& manner = among == Among::kBranchOfSeed ? kCareful : kHasty;
   int budget = kBudget;
 
   // Only an attempt that crossed no singularity is surely on the seed's side of all of them.
   const auto attempt_from = [&](const AxisVector& start, const AxisVector& rest) -> std::optional<AxisVector> {
-    Attempt attempt = refine(chain, target, start, rest, seed_determinant, budget);
+    Attempt attempt = refine(chain, target, start, rest, seed_determinant, manner, budget);
     if (!attempt.solved || attempt.crossed) return std::nullopt;
     for (Eigen::Index axis = 0; axis < seed.size(); ++axis) {
       if (!chain.joint(axis).revolute) continue;

@@ -7,6 +7,7 @@ namespace pons::model {
 namespace {
 
 constexpr double kTouching = 1e-9;  // share of the amplitude
+constexpr double kOne = 1e-7;       // rad between two solutions that are one, but for rounding
 constexpr double kAllButTouch = 1e-12;
 constexpr int kBisections = 60;
 
@@ -78,10 +79,11 @@ Angles solve_sum(double x, double y, double z, double tiny) {
     return result;
   }
   if (std::abs(z) > amplitude * (1 + kTouching)) return result;
-  // As a product, so that nothing cancels where the two solutions nearly touch.
-  const double square = std::max(0.0, (amplitude - z) * (amplitude + z));
-  const double inverse = 1 / (amplitude * amplitude), rest = std::sqrt(square);
-  if (rest == 0) {
+  // As a product, so that little cancels where the two solutions nearly touch. What does, is a share of 1e-16: taken
+  // for one, they are wrong by 1e-7 rad, the equation by the square of that.
+  const double square = (amplitude - z) * (amplitude + z);
+  const double inverse = 1 / (amplitude * amplitude), rest = std::sqrt(std::max(0.0, square));
+  if (square * inverse < kOne * kOne) {
     result.add({std::copysign(x / amplitude, x * z), std::copysign(y / amplitude, y * z)});
     return result;
   }
