@@ -10,7 +10,7 @@ ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
 # What threads share without locks.
 TSAN_QUICK = rt_test link_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick bench clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick bench bench-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -71,7 +71,14 @@ tsan-quick: setup ## the tests of what threads share without locks, under the sa
 	  TSAN_OPTIONS=suppressions=$(CURDIR)/tools/tsan_suppressions.txt build/tsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; \
 	done
 
-bench: build ## run the benchmarks; docs/figures.md says which figure is whose
+# Outside CMake: a peer is compiled from Debian's Eigen, of which nothing may enter our build.
+bench-peers: ## build what the benchmarks compare against
+	@tools/setup --bench
+	mkdir -p build/release/bench/peers
+	g++ -std=c++17 -O3 -DNDEBUG -Wall -Wextra -Werror -isystem /usr/include/eigen3 bench/peers/kdl_inverse.cpp \
+	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
+
+bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \
 	  [ -n "$$programs" ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }; \
 	  for program in $$programs; do echo "== $$program"; "$$program" || exit 1; done

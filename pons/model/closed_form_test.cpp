@@ -43,102 +43,52 @@ struct Case {
   std::vector<JointRow> rows;
 };
 
-// Each what another part of the solver is for. Frames as in a Denavit-Hartenberg table, or with axes as they happen to
-// point.
-std::vector<Case> cases() {
-  const Vector3 x = Vector3::UnitX(), y = Vector3::UnitY(), z = Vector3::UnitZ(), none = Vector3::Zero();
-  const Vector3 skew = Vector3(0.2, 1, 0.1).normalized();
-  const auto three = Method::kThreeParallelAxes, wrist = Method::kSphericalWrist;
-  return {
-      {"industrial",
-       wrist,
-       {{{0, 0, 0.4}},
-        {{0.15, 0.02, 0}, none, y},
-        {{0, 0.03, 0.6}, none, y},
-        {{0.1, -0.05, 0.12}, none, x},
-        {{0.5, 0, 0}, none, y},
-        {none, none, x}}},
-      {"puma",
-       wrist,
-       {{{0, 0, 0.6}},
-        {{0, 0.15, 0}, none, y},
-        {{0.43, 0, 0}, none, -y},
-        {{0.02, 0, 0.43}, none, z},
-        {none, none, y},
-        {none, none, z}}},
-      {"no_offset",
-       wrist,
-       {{{0, 0, 0.4}},
-        {none, none, y},
-        {{0, 0, 0.5}, none, y},
-        {{0, 0, 0.4}, none, z},
-        {none, none, y},
-        {none, none, z}}},
-      {"skew_wrist",
-       wrist,
-       {{{0, 0, 0.4}},
-        {{0.1, 0, 0}, none, y},
-        {{0, 0, 0.5}, none, y},
-        {{0, 0, 0.4}, none, z},
-        {none, none, skew},
-        {none, none, x}}},
-      {"shoulder_meets",
-       wrist,
-       {{{0, 0, 0.4}},
-        {none, none, y},
-        {{0.5, 0, 0.1}, none, z},
-        {{0.4, 0, 0}, none, x},
-        {none, none, y},
-        {none, none, x}}},
-      {"first_two_parallel",
-       wrist,
-       {{{0, 0, 0.4}},
-        {{0.4, 0, 0}, none, z},
-        {{0.3, 0, 0}, none, y},
-        {{0.35, 0, 0}, none, x},
-        {none, none, y},
-        {none, none, x}}},
-      {"pieper",
-       wrist,
-       {{{0, 0, 0.4}},
-        {{0.1, 0.05, 0}, none, skew},
-        {{0.4, 0.1, 0.1}, none, z},
-        {{0.35, 0.05, 0.1}, none, x},
-        {none, none, y},
-        {none, none, x}}},
-      {"ur_like",
-       three,
-       {{{0, 0, 0.2}},
-        {{0, 0.1, 0}, none, y},
-        {{0, 0, 0.4}, none, -y},
-        {{0.05, 0.02, 0.4}, none, y},
-        {{0, 0.1, 0}, none, z},
-        {{0, 0, 0.1}, none, y}}},
-      {"offset_first",
-       three,
-       {{{0, 0, 0.2}},
-        {{0.12, 0.1, 0}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0.06, 0.1, 0}, none, z},
-        {{0, 0, 0.1}, none, x}}},
-      {"five_beside_six",
-       three,
-       {{{0, 0, 0.2}},
-        {{0.05, 0.1, 0}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0, 0.1, 0}, none, z},
-        {{0.07, 0, 0.1}, none, y}}},
-      {"skew_first",
-       three,
-       {{{0, 0, 0.2}, none, Vector3(0.3, 0.2, 1).normalized()},
-        {{0.05, 0.1, 0}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0, 0, 0.4}, none, y},
-        {{0.03, 0.1, 0}, none, skew.cross(x)},
-        {{0.04, 0, 0.1}, none, y}}},
+// Each what another part of the solver is for, its axes drawn as they happen to point.
+const Vector3 kX = Vector3::UnitX(), kY = Vector3::UnitY(), kZ = Vector3::UnitZ(), kNone = Vector3::Zero();
+const Vector3 kSkew = Vector3(0.2, 1, 0.1).normalized();
+
+// A link to the next axis.
+JointRow row(double x, double y, double z, const Vector3& axis) { return {{x, y, z}, kNone, axis}; }
+
+std::vector<Case> spherical_wrists() {
+  const auto wrist = [](const Vector3& fourth, const Vector3& fifth, const Vector3& sixth, std::vector<JointRow> rows,
+                        const Vector3& centre) {
+    rows.insert(rows.end(), {{centre, kNone, fourth}, row(0, 0, 0, fifth), row(0, 0, 0, sixth)});
+    return rows;
   };
+  const JointRow base = row(0, 0, 0.4, kZ);
+  std::vector<Case> cases;
+  const auto add = [&](const char* name, const std::vector<JointRow>& rows) {
+    cases.push_back({name, Method::kSphericalWrist, rows});
+  };
+  add("industrial", wrist(kX, kY, kX, {base, row(0.15, 0.02, 0, kY), row(0, 0.03, 0.6, kY)}, {0.6, -0.05, 0.12}));
+  add("puma", wrist(kZ, kY, kZ, {base, row(0, 0.15, 0, kY), row(0.43, 0, 0, -kY)}, {0.02, 0, 0.43}));
+  add("no_offset", wrist(kZ, kY, kZ, {base, row(0, 0, 0, kY), row(0, 0, 0.5, kY)}, {0, 0, 0.4}));
+  add("skew_wrist", wrist(kZ, kSkew, kX, {base, row(0.1, 0, 0, kY), row(0, 0, 0.5, kY)}, {0, 0, 0.4}));
+  add("shoulder_meets", wrist(kX, kY, kX, {base, row(0, 0, 0, kY), row(0.5, 0, 0.1, kZ)}, {0.4, 0, 0}));
+  add("first_two_parallel", wrist(kX, kY, kX, {base, row(0.4, 0, 0, kZ), row(0.3, 0, 0, kY)}, {0.35, 0, 0}));
+  add("pieper", wrist(kX, kY, kX, {base, row(0.1, 0.05, 0, kSkew), row(0.4, 0.1, 0.1, kZ)}, {0.35, 0.05, 0.1}));
+  return cases;
+}
+
+std::vector<Case> cases() {
+  const auto three = Method::kThreeParallelAxes;
+  const JointRow base = row(0, 0, 0.2, kZ), along = row(0, 0, 0.4, kY);
+  std::vector<Case> cases = spherical_wrists();
+  cases.push_back({"ur_like",
+                   three,
+                   {base, row(0, 0.1, 0, kY), row(0, 0, 0.4, -kY), row(0.05, 0.02, 0.4, kY), row(0, 0.1, 0, kZ),
+                    row(0, 0, 0.1, kY)}});
+  cases.push_back(
+      {"offset_first", three, {base, row(0.12, 0.1, 0, kY), along, along, row(0.06, 0.1, 0, kZ), row(0, 0, 0.1, kX)}});
+  cases.push_back({"five_beside_six",
+                   three,
+                   {base, row(0.05, 0.1, 0, kY), along, along, row(0, 0.1, 0, kZ), row(0.07, 0, 0.1, kY)}});
+  cases.push_back({"skew_first",
+                   three,
+                   {row(0, 0, 0.2, Vector3(0.3, 0.2, 1).normalized()), row(0.05, 0.1, 0, kY), along, along,
+                    row(0.03, 0.1, 0, kSkew.cross(kX)), row(0.04, 0, 0.1, kY)}});
+  return cases;
 }
 
 AxisVector anywhere(Random& random, double span) {
