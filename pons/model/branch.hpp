@@ -26,20 +26,22 @@ enum class Among {
 };
 
 struct BranchSolution {
-  AxisVector q;  // rad
-  Branch branch;
+  AxisVector q;   // rad (m where an axis slides), in the robot file's order
+  Branch branch;  // of q
 };
 
-// A bounded list of solutions: no allocation. No six-axis arm has more than 16 (Primrose 1986).
+// A bounded list of solutions, in no particular order. It lives on the stack: no allocation. A six-axis arm has 16 at
+// most (Primrose 1986), one with a closed form 8; the rest is room for choices that a singular pose leaves.
 class BranchSolutions {
  public:
   static constexpr std::size_t kMost = 16;
 
   void clear() { count_ = 0; }
-  // Drops what is beyond kMost.
+  // What is beyond kMost is dropped.
   void add(const BranchSolution& solution) {
     if (count_ < kMost) all_[count_++] = solution;
   }
+  // The last one takes its place.
   void remove(std::size_t i) {
     assert(i < count_);
     all_[i] = all_[--count_];

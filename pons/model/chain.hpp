@@ -19,10 +19,12 @@ struct Joint {
   bool revolute = true;
 };
 
-// Immutable; every call is const, keeps its state on the stack and allocates nothing: threads may share one.
+// A chain of up to kMaxAxes joints with a tool tip at its end, in the world. It repeats a little of what Pinocchio
+// does, because solvers ask for it many times a call, from any thread, and Pinocchio needs a scratch pad. Immutable;
+// every call is const, keeps its state on the stack and allocates nothing.
 class Chain {
  public:
-  // At most kMaxAxes joints, base first. `tip_at_zero` is the tool tip in the world when all of them are at zero.
+  // Base first; at most kMaxAxes. `tip_at_zero` is the tool tip in the world when all of them are at zero.
   Chain(std::span<const Joint> joints, const Pose& tip_at_zero, const AxisLimits& limits);
 
   [[nodiscard]] Eigen::Index axes() const { return axes_; }
@@ -50,7 +52,8 @@ class Chain {
   return cosine * v + sine * axis.cross(v) + ((1 - cosine) * axis.dot(v)) * axis;
 }
 
-// What carries `tip` to `target`: (m; rad) along world axes, the turn as a rotation vector.
+// What carries `tip` to `target`, along world axes: the way (m), then the turn as a rotation vector (rad, at most π
+// long).
 using PoseError = Eigen::Matrix<double, 6, 1>;
 [[nodiscard]] PoseError pose_error(const Pose& target, const Pose& tip);
 

@@ -18,12 +18,12 @@ namespace pons::model {
 using Sides = std::array<double, 3>;
 
 // Solves by geometric subproblems (Paden 1986; Pieper 1968; Elias and Wen, "IK-Geo", 2022). Which arms it knows is read
-// from their axes at zero, to 1e-6 (rad; m over the arm's size); offsets along and across the axes may be any:
-//   kThreeParallel   axes 2, 3 and 4 are parallel (UR and its kin). Where axes 5 and 6 meet, axes 1 and 5 come one
-//   after
-//                    the other from one trigonometric equation each; otherwise together, from a quartic.
-//   kSphericalWrist  axes 4, 5 and 6 meet in a point (most industrial arms). Where axes 2 and 3 are parallel, axes 1, 3
-//                    and 2 come one after the other; otherwise axis 3 first, from Pieper's quartic.
+// from their axes at zero, to 1e-5 (rad; m over the arm's size), as files are rounded; offsets along and across them
+// may be any.
+//   kThreeParallel: axes 2, 3 and 4 are parallel (UR and its kin). Where axes 5 and 6 meet, axes 1 and 5 come one after
+//     the other, from one trigonometric equation each; otherwise together, from a quartic.
+//   kSphericalWrist: axes 4, 5 and 6 meet in a point (most industrial arms). Where axes 2 and 3 are parallel, axes 1, 3
+//     and 2 come one after the other; otherwise axis 3 first, from Pieper's quartic.
 // Immutable; const calls allocate nothing, so threads may share one.
 class ClosedForm {
  public:

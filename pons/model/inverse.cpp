@@ -10,7 +10,7 @@ namespace pons::model {
 namespace {
 
 constexpr double kExact = 1e-11;          // m and rad: better than this is left as it is
-constexpr int kPolishes = 4;              // steps at most; each squares the error
+constexpr int kPolishes = 12;             // steps at most; each squares the error, near a singularity it halves it
 constexpr double kPolishDamping = 1e-12;  // of units of the Jacobian squared
 constexpr double kOnLimit = 1e-9;         // rad beyond a limit that are rounding
 constexpr double kNoSide = 1e-7;          // of Sides: as near to a singularity as rounding may be on either side
@@ -67,23 +67,23 @@ std::optional<AxisVector> InverseKinematics::nearest(const Pose& target, const A
   if (!closed_form_) return iterate(chain_, target, seed, among);
   BranchSolutions found;
   closed_form_->solve(target, seed, found);
-  const Sides seed_sides = among == Among::kBranchOfSeed ? closed_form_->sides(seed) : Sides{};
   std::array<double, BranchSolutions::kMost> distance{};
   for (std::size_t i = 0; i < found.size();) {
-    const bool usable = turn_near(seed, found[i].q) &&
-                        (among == Among::kAllBranches || same_side(seed_sides, closed_form_->sides(found[i].q)));
-    if (usable)
+    if (turn_near(seed, found[i].q))
       distance[i] = (found[i].q - seed).squaredNorm(), ++i;
     else
       found.remove(i);
   }
+  const Sides seed_sides = among == Among::kBranchOfSeed ? closed_form_->sides(seed) : Sides{};
+  // The nearest that will do. As a rule it is the first: what is near is on the same branch.
   while (!found.empty()) {
-    const auto best = static_cast<std::size_t>(
+    const auto nearest = static_cast<std::size_t>(
         std::min_element(distance.begin(), distance.begin() + static_cast<std::ptrdiff_t>(found.size())) -
         distance.begin());
-    if (polish(target, found[best].q)) return found[best].q;
-    distance[best] = distance[found.size() - 1];
-    found.remove(best);
+    AxisVector& q = found[nearest].q;
+    if ((among == Among::kAllBranches || same_side(seed_sides, closed_form_->sides(q))) && polish(target, q)) return q;
+    distance[nearest] = distance[found.size() - 1];
+    found.remove(nearest);
   }
   return std::nullopt;
 }

@@ -7,6 +7,7 @@
 
 #include "pons/core/random.hpp"
 #include "pons/model/robot_model.hpp"
+#include "pons/model/test_arms.hpp"
 #include "pons/model/test_robots.hpp"
 
 namespace pons::model {
@@ -134,7 +135,8 @@ TEST(Inverse, RefusesWhatIsOutOfReach) {
 
 // A seven-axis arm of the common kind (published parameters of a Panda).
 world::Robot seven_axis_arm() {
-  auto robot = serial_robot(testing::TempDir(), "seven",
+  const static world::TestFolder folder;
+  auto robot = serial_robot(folder, "seven",
                             {{{0, 0, 0.333}},
                              {{0, 0, 0}, {-kHalfPi, 0, 0}},
                              {{0, -0.316, 0}, {kHalfPi, 0, 0}},
@@ -228,10 +230,11 @@ TEST(Inverse, ArmsWithoutClosedFormAreIterated) {
                                    {{0.1, 0.05, 0.3}, {kHalfPi, 0.2, 0}},
                                    {{0.03, 0, 0.1}, {-kHalfPi, 0, 0}},
                                    {{0.05, 0.02, 0.1}, {kHalfPi, 0, 0}}};
+  const world::TestFolder folder;
   auto sliding = skew;
   sliding[0].type = "prismatic";
   for (const auto& [name, rows] : {std::pair{"skew", skew}, std::pair{"sliding", sliding}}) {
-    auto model = RobotModel::load(serial_robot(testing::TempDir(), name, rows, {0, 0, 0.1}, 2.5)).value();
+    auto model = RobotModel::load(serial_robot(folder, name, rows, {0, 0, 0.1}, 2.5)).value();
     EXPECT_EQ(model.inverse_method(), RobotModel::InverseMethod::kIteration) << name;
     Random random(16);
     int solved = 0;

@@ -9,7 +9,7 @@
 namespace pons::model {
 namespace {
 
-constexpr double kSame = 1e-6;      // rad, or a share of the arm's size: what counts as parallel, or as meeting
+constexpr double kSame = 1e-5;      // rad, or a share of the arm's size: what counts as parallel, or as meeting
 constexpr double kDistinct = 1e-3;  // the same units: what must be more than this, or the arm is all but singular
 
 bool parallel(const Vector3& a, const Vector3& b) { return a.cross(b).norm() < kSame; }

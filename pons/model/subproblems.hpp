@@ -25,7 +25,7 @@ struct Angle {
   return turned(axis, angle.cosine, -angle.sine, v);
 }
 
-// Up to four angles, as many as an equation of the kind below can have.
+// Up to four angles, as many as an equation of the kinds below can have; none where it has no real solution.
 struct Angles {
   std::array<Angle, 4> at{};
   std::size_t count = 0;
@@ -46,8 +46,8 @@ struct Angles {
 // subproblems 5 and 6 (two coupled turns, Pieper 1968) become. Roots that all but touch (1e-12) count as one that does.
 [[nodiscard]] Angles solve_quartic(double a, double b, double c, double d, double e, double f);
 
-// Subproblem 1: the turn about `axis` that brings `from` nearest to `to`. Zero length across the axis: zero, so ask
-// across() first.
+// Subproblem 1: the turn about the unit `axis` that brings `from` nearest to `to`. Where one of them has no part across
+// the axis any turn does: zero then, so ask across() first where that can be.
 [[nodiscard]] Angle solve_turn(const Vector3& axis, const Vector3& from, const Vector3& to);
 
 // The part of v across the unit axis.
