@@ -14,7 +14,7 @@ Chain::Chain(std::span<const Joint> joints, const Pose& tip_at_zero, const AxisL
 }
 
 template <typename AtJoint>
-Pose Chain::walk(const AxisVector& q, AtJoint&& at_joint) const {
+Pose Chain::walk(const AxisVector& q, const AtJoint& at_joint) const {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
   Vector3 here = Vector3::Zero(), here_at_zero = Vector3::Zero();
   for (Eigen::Index i = 0; i < axes_; ++i) {

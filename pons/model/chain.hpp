@@ -39,7 +39,7 @@ class Chain {
 
  private:
   template <typename AtJoint>
-  Pose walk(const AxisVector& q, AtJoint&& at_joint) const;
+  Pose walk(const AxisVector& q, const AtJoint& at_joint) const;
 
   Eigen::Index axes_;
   std::array<Joint, kMaxAxes> joints_;
