@@ -12,7 +12,7 @@ TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan bench clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan bench bench-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -81,7 +81,14 @@ rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
 	for name in $(LOOP); do build/rtsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; done
 	ctest --preset rtsan -R 'KnownBad|KnownGood|blocking_call' --no-tests=error
 
-bench: build ## run the benchmarks; docs/figures.md says which figure is whose
+# Outside CMake: a peer is compiled from Debian's Eigen, of which nothing may enter our build.
+bench-peers: ## build what the benchmarks compare against
+	@tools/setup --bench
+	mkdir -p build/release/bench/peers
+	g++ -std=c++17 -O3 -DNDEBUG -Wall -Wextra -Werror -isystem /usr/include/eigen3 bench/peers/kdl_inverse.cpp \
+	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
+
+bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \
 	  [ -n "$$programs" ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }; \
 	  for program in $$programs; do echo "== $$program"; "$$program" || exit 1; done

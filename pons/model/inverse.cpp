@@ -1,195 +1,112 @@
 #include "pons/model/inverse.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
 
-#include "pons/core/random.hpp"
+#include "pons/model/iterate.hpp"
 
 namespace pons::model {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+constexpr double kExact = 1e-11;          // m and rad: better than this is left as it is
+constexpr int kPolishes = 12;             // steps at most; each squares the error, near a singularity it halves it
+constexpr double kPolishDamping = 1e-12;  // of units of the Jacobian squared
+constexpr double kOnLimit = 1e-9;         // rad beyond a limit that are rounding
+constexpr double kNoSide = 1e-7;          // of Sides: as near to a singularity as rounding may be on either side
 
-constexpr double kAccept = 1e-6;         // m and rad: what counts as a solution
-constexpr double kAimFor = 1e-10;        // m and rad: where iterating stops
-constexpr int kIterations = 60;          // of one attempt
-constexpr int kPatience = 8;             // iterations without a better error before an attempt is given up
-constexpr int kRestarts = 4;             // attempts from nudged seeds
-constexpr double kNudge = 0.6;           // rad
-constexpr double kMaxStep = 0.5;         // rad or m, of any axis in one iteration
-constexpr double kDamping = 1e-2;        // λ² per squared error
-constexpr double kPull = 0.3;            // share of the way back to the seed, inside the null space
-constexpr double kPullAbove = 1e-3;      // error above which the null space is used
-constexpr double kNear = 0.05;           // m and rad: as near to the seed, a redundant arm takes the least joint motion
-constexpr double kSingularShare = 1e-3;  // of the seed's determinant: closer to singular than this has no side
-
-struct Attempt {
-  AxisVector q;
-  bool solved = false;
-  bool crossed = false;  // passed a singularity on its way
-};
-
-Vector6 pose_error(const Pose& target, const Pose& tip) {
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(target.linear() * tip.linear().transpose()));
-  Vector6 error;
-  error << target.translation() - tip.translation(), turn.angle() * turn.axis();
-  return error;
-}
-
-double determinant(const Jacobian& jacobian) { return jacobian.cols() == 6 ? Matrix6(jacobian).determinant() : 0.0; }
-
-// The damped least-squares step; `pull` (zero for arms that are not redundant) acts inside the null space only.
-AxisVector damped_step(const Jacobian& jacobian, const Vector6& error, const AxisVector& pull) {
-  Matrix6 gram = jacobian * jacobian.transpose();
-  gram.diagonal().array() += kDamping * error.squaredNorm() + 1e-14;
-  const Vector6 wanted = error - jacobian * pull;
-  return pull + jacobian.transpose() * gram.ldlt().solve(wanted);
-}
-
-// A step that leaves axes alone which stand at a limit and would be pushed through it.
-AxisVector bounded_step(Jacobian jacobian, const Vector6& error, AxisVector pull, const AxisVector& q,
-                        const AxisLimits& limits) {
-  AxisVector step = damped_step(jacobian, error, pull);
-  for (Eigen::Index round = 0; round < q.size(); ++round) {
-    bool blocked = false;
-    for (Eigen::Index axis = 0; axis < q.size(); ++axis) {
-      const bool outward = (q[axis] <= limits.position_min[axis] && step[axis] < 0) ||
-                           (q[axis] >= limits.position_max[axis] && step[axis] > 0);
-      if (!outward) continue;
-      jacobian.col(axis).setZero();
-      pull[axis] = 0;
-      blocked = true;
-    }
-    if (!blocked) break;
-    step = damped_step(jacobian, error, pull);
+bool same_side(const Sides& seed, const Sides& other) {
+  for (std::size_t i = 0; i < seed.size(); ++i) {
+    if (seed[i] * other[i] < 0 && std::min(std::abs(seed[i]), std::abs(other[i])) > kNoSide) return false;
   }
-  const double longest = step.cwiseAbs().maxCoeff();
-  if (longest > kMaxStep) step *= kMaxStep / longest;
-  return step;
+  return true;
 }
 
-Attempt refine(Chain& chain, const Pose& target, const AxisVector& start, const AxisVector& seed,
-               double seed_determinant) {
-  const AxisLimits& limits = chain.limits();
-  Attempt attempt{.q = start};
-  AxisVector q = start, pull = AxisVector::Zero(start.size());
-  Pose tip;
-  Jacobian jacobian;
-  double best = INFINITY;
-  int since_best = 0;
-  for (int i = 0; i < kIterations && since_best < kPatience; ++i) {
-    chain.evaluate(q, tip, jacobian);
-    const Vector6 error = pose_error(target, tip);
-    const double worst = std::max(error.head<3>().norm(), error.tail<3>().norm());
-    if (worst < best) {
-      best = worst;
-      attempt.q = q;
-      since_best = 0;
-    } else {
-      ++since_best;
-      if (best < kAccept) break;  // at the rounding floor
-    }
-    if (determinant(jacobian) * seed_determinant < -kSingularShare * seed_determinant * seed_determinant)
-      attempt.crossed = true;
-    if (best < kAimFor) break;
-    if (q.size() > 6) {
-      if (worst > kPullAbove)
-        pull = kPull * (seed - q);
-      else
-        pull.setZero();
-    }
-    q += bounded_step(jacobian, error, pull, q, limits);
-    q = q.cwiseMax(limits.position_min).cwiseMin(limits.position_max);
-  }
-  attempt.solved = best < kAccept;
-  return attempt;
-}
-
-// Moves a revolute axis by whole turns as near to `near` as its limits allow.
-double nearest_turn(double angle, double near, double low, double high) {
-  constexpr double kTurn = 2 * std::numbers::pi;
-  angle += kTurn * std::round((near - angle) / kTurn);
-  if (angle > high) angle -= kTurn;
-  if (angle < low) angle += kTurn;
-  return angle;
-}
-
-bool is_revolute(const Jacobian& jacobian, Eigen::Index axis) {
-  return jacobian.col(axis).tail<3>().squaredNorm() > 0.5;
-}
-
-// Turns the first axis until the tip faces the target, then the last until the tool does. Both keep the branch, so what
-// is left for the iterations is a short way.
-AxisVector turned_towards(Chain& chain, const Pose& target, const AxisVector& seed) {
-  const AxisLimits& limits = chain.limits();
-  Pose tip;
-  Jacobian jacobian;
-  AxisVector q = seed;
-  const auto turn = [&](Eigen::Index axis, double angle) {
-    const double turned =
-        nearest_turn(q[axis] + angle, seed[axis], limits.position_min[axis], limits.position_max[axis]);
-    if (turned >= limits.position_min[axis] && turned <= limits.position_max[axis]) q[axis] = turned;
+Branch branch_of(const Sides& sides) {
+  const auto sign = [&](std::size_t i) {
+    return static_cast<std::int8_t>(std::abs(sides[i]) <= kNoSide ? 0 : sides[i] < 0 ? -1 : 1);
   };
-  chain.evaluate(q, tip, jacobian);
-  if (is_revolute(jacobian, 0)) {
-    const Vector3 axis = jacobian.col(0).tail<3>();
-    const Vector3 arm_now = -axis.cross(jacobian.col(0).head<3>());  // from the axis to the tip, across the axis
-    const Vector3 point = tip.translation() - arm_now;
-    Vector3 arm_then = target.translation() - point;
-    arm_then -= axis * axis.dot(arm_then);
-    if (arm_now.norm() > 0.05 && arm_then.norm() > 0.05) {
-      turn(0, std::atan2(axis.dot(arm_now.cross(arm_then)), arm_now.dot(arm_then)));
-    }
-  }
-  const Eigen::Index last = q.size() - 1;
-  chain.evaluate(q, tip, jacobian);
-  if (last > 0 && is_revolute(jacobian, last)) {
-    const Eigen::Quaterniond missing(Eigen::Matrix3d(target.linear() * tip.linear().transpose()));
-    turn(last, 2 * std::atan2(missing.vec().dot(jacobian.col(last).tail<3>()), missing.w()));
-  }
-  return q;
+  return {sign(0), sign(1), sign(2)};
 }
 
 }  // namespace
 
-std::optional<AxisVector> solve_inverse(Chain& chain, const Pose& target, const AxisVector& seed_in) {
-  const AxisLimits& limits = chain.limits();
-  const AxisVector seed = seed_in.cwiseMax(limits.position_min).cwiseMin(limits.position_max);
+InverseKinematics::InverseKinematics(const Chain& chain) : chain_(chain), closed_form_(ClosedForm::recognise(chain)) {}
+
+// Whole turns nearest to the seed; false if an axis has none inside its limits.
+bool InverseKinematics::turn_near(const AxisVector& seed, AxisVector& q) const {
+  const AxisLimits& limits = chain_.limits();
+  for (Eigen::Index axis = 0; axis < q.size(); ++axis) {
+    const double low = limits.position_min[axis], high = limits.position_max[axis];
+    const double angle = nearest_turn(q[axis], seed[axis], low - kOnLimit, high + kOnLimit);
+    if (angle < low - kOnLimit || angle > high + kOnLimit) return false;
+    q[axis] = std::clamp(angle, low, high);
+  }
+  return true;
+}
+
+// Newton's steps on the real axes make up for a tolerance that the closed form took; false if q does not reach.
+bool InverseKinematics::polish(const Pose& target, AxisVector& q) const {
+  double error = pose_error(target, chain_.tip(q)).cwiseAbs().maxCoeff();
+  AxisVector better = q;
   Pose tip;
   Jacobian jacobian;
-  chain.evaluate(seed, tip, jacobian);
-  const double seed_determinant = determinant(jacobian);
-  const Jacobian seed_jacobian = jacobian;
-
-  // Only an attempt that crossed no singularity is surely on the seed's side of all of them.
-  const auto attempt_from = [&](const AxisVector& start) -> std::optional<AxisVector> {
-    Attempt attempt = refine(chain, target, start, seed, seed_determinant);
-    if (!attempt.solved || attempt.crossed) return std::nullopt;
-    for (Eigen::Index axis = 0; axis < seed.size(); ++axis) {
-      if (!is_revolute(seed_jacobian, axis)) continue;
-      attempt.q[axis] = nearest_turn(attempt.q[axis], seed[axis], limits.position_min[axis], limits.position_max[axis]);
-    }
-    return attempt.q;
-  };
-
-  // Turning the first axis would favour it over the others: a chain of small steps must begin the way that the
-  // pseudo-inverse of the Jacobian says, or a path along it starts with other joint speeds than the arm has.
-  if (seed.size() > 6 && pose_error(target, tip).cwiseAbs().maxCoeff() < kNear) {
-    if (auto q = attempt_from(seed)) return q;
+  for (int i = 0; i < kPolishes && error > kExact; ++i) {
+    chain_.evaluate(better, tip, jacobian);
+    better += damped_step(jacobian, pose_error(target, tip), kPolishDamping);
+    better = better.cwiseMax(chain_.limits().position_min).cwiseMin(chain_.limits().position_max);
+    const double now = pose_error(target, chain_.tip(better)).cwiseAbs().maxCoeff();
+    if (now >= error) break;
+    error = now;
+    q = better;
   }
-  const AxisVector turned = turned_towards(chain, target, seed);
-  if (auto q = attempt_from(turned)) return q;
-  if (auto q = attempt_from(seed)) return q;
-  Random random(0x1f0d);
-  for (int restart = 0; restart < kRestarts; ++restart) {
-    AxisVector start = turned;
-    for (Eigen::Index axis = 1; axis + 1 < start.size(); ++axis) start[axis] += random.uniform(-kNudge, kNudge);
-    if (auto q = attempt_from(start.cwiseMax(limits.position_min).cwiseMin(limits.position_max))) return q;
+  return error < kAccept;
+}
+
+std::optional<AxisVector> InverseKinematics::nearest(const Pose& target, const AxisVector& seed, Among among) const {
+  if (!closed_form_) return iterate(chain_, target, seed, among);
+  BranchSolutions found;
+  closed_form_->solve(target, seed, found);
+  std::array<double, BranchSolutions::kMost> distance{};
+  for (std::size_t i = 0; i < found.size();) {
+    if (turn_near(seed, found[i].q))
+      distance[i] = (found[i].q - seed).squaredNorm(), ++i;
+    else
+      found.remove(i);
+  }
+  const Sides seed_sides = among == Among::kBranchOfSeed ? closed_form_->sides(seed) : Sides{};
+  // The nearest that will do. As a rule it is the first: what is near is on the same branch.
+  while (!found.empty()) {
+    const auto nearest = static_cast<std::size_t>(
+        std::min_element(distance.begin(), distance.begin() + static_cast<std::ptrdiff_t>(found.size())) -
+        distance.begin());
+    AxisVector& q = found[nearest].q;
+    if ((among == Among::kAllBranches || same_side(seed_sides, closed_form_->sides(q))) && polish(target, q)) return q;
+    distance[nearest] = distance[found.size() - 1];
+    found.remove(nearest);
   }
   return std::nullopt;
+}
+
+void InverseKinematics::all(const Pose& target, const AxisVector& seed, BranchSolutions& found) const {
+  found.clear();
+  if (closed_form_) {
+    closed_form_->solve(target, seed, found);
+  } else if (const auto q = iterate(chain_, target, seed, Among::kAllBranches)) {
+    found.add({*q, {}});
+  }
+  for (std::size_t i = 0; i < found.size();) {
+    if (turn_near(seed, found[i].q) && polish(target, found[i].q)) {
+      found[i].branch = branch(found[i].q);
+      ++i;
+    } else {
+      found.remove(i);
+    }
+  }
+}
+
+Branch InverseKinematics::branch(const AxisVector& q) const {
+  return closed_form_ ? branch_of(closed_form_->sides(q)) : Branch{};
 }
 
 }  // namespace pons::model

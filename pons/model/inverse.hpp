@@ -1,28 +1,39 @@
-// Inverse kinematics of any serial arm, by numbers. Internal to the model; RobotModel::inverse() is the way in.
+// Inverse kinematics of one robot: the closed form where its axes allow one, iteration otherwise. Internal to the
+// model; RobotModel::inverse() is the way in.
 #pragma once
 
 #include <optional>
 
 #include "pons/core/axes.hpp"
 #include "pons/core/pose.hpp"
-#include "pons/model/robot_model.hpp"
+#include "pons/model/branch.hpp"
+#include "pons/model/chain.hpp"
+#include "pons/model/closed_form.hpp"
 
 namespace pons::model {
 
-// What the solver needs to know of an arm.
-class Chain {
+// The closed form proposes; what it proposes is brought into the limits by whole turns, checked by forward kinematics
+// on the robot's own axes, and where it misses by more than 1e-11 (m, rad) mended by Newton steps. Immutable; const
+// calls allocate nothing, so threads may share one.
+class InverseKinematics {
  public:
-  virtual ~Chain() = default;
-  // Tip pose and Jacobian (world axes, at the tip, linear rows first) at q.
-  virtual void evaluate(const AxisVector& q, Pose& world_from_tip, Jacobian& jacobian) = 0;
-  [[nodiscard]] virtual const AxisLimits& limits() const = 0;
-};
+  explicit InverseKinematics(const Chain& chain);
 
-// Damped Gauss-Newton on the pose error (Nakamura and Hanafusa 1986; damping by the error, Sugihara 2011), started from
-// `seed` with its first and last axis turned towards the target, then from the seed itself and a handful of others. The
-// first solution whose iterations crossed no singularity (six axes: the Jacobian's determinant kept its sign), so it is
-// on the seed's branch. A redundant arm is pulled towards the seed inside the null space. Deterministic. Empty when no
-// attempt reaches 1e-6 m and 1e-6 rad.
-[[nodiscard]] std::optional<AxisVector> solve_inverse(Chain& chain, const Pose& world_from_tip, const AxisVector& seed);
+  [[nodiscard]] const std::optional<ClosedForm>& closed_form() const { return closed_form_; }
+  // As RobotModel::inverse(). The seed is as long as the chain; all values are finite.
+  [[nodiscard]] std::optional<AxisVector> nearest(const Pose& world_from_tip, const AxisVector& seed,
+                                                  Among among) const;
+  // As RobotModel::inverse_all().
+  void all(const Pose& world_from_tip, const AxisVector& seed, BranchSolutions& found) const;
+  // By the signs of the Jacobian's factors; all zero without a closed form.
+  [[nodiscard]] Branch branch(const AxisVector& q) const;
+
+ private:
+  [[nodiscard]] bool turn_near(const AxisVector& seed, AxisVector& q) const;
+  [[nodiscard]] bool polish(const Pose& target, AxisVector& q) const;
+
+  Chain chain_;
+  std::optional<ClosedForm> closed_form_;
+};
 
 }  // namespace pons::model

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
+#include <utility>
+#include <vector>
 
 #include "pons/core/random.hpp"
 #include "pons/model/robot_model.hpp"
+#include "pons/model/test_arms.hpp"
 #include "pons/model/test_robots.hpp"
 
 namespace pons::model {
@@ -131,42 +133,21 @@ TEST(Inverse, RefusesWhatIsOutOfReach) {
   EXPECT_FALSE(model.inverse(nonsense, hanging_arm().home).has_value());
 }
 
-// A seven-axis arm of the common kind (published parameters of a Panda), written out from its table.
-std::filesystem::path seven_axis_urdf() {
-  const double xyz[7][3] = {{0, 0, 0.333},       {0, 0, 0}, {0, -0.316, 0}, {0.0825, 0, 0},
-                            {-0.0825, 0.384, 0}, {0, 0, 0}, {0.088, 0, 0}};
-  const double roll[7] = {0, -kHalfPi, kHalfPi, kHalfPi, -kHalfPi, kHalfPi, kHalfPi};
-  const auto path = std::filesystem::path(testing::TempDir()) / "seven.urdf";
-  std::ofstream file(path);
-  file.precision(17);
-  file << "<robot name='seven'><link name='l0'/>";
-  for (int i = 0; i < 7; ++i) {
-    file << "<link name='l" << i + 1
-         << "'><inertial><mass value='2'/><inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' "
-         << "iyz='0'/></inertial></link><joint name='j" << i + 1 << "' type='revolute'><parent link='l" << i
-         << "'/><child link='l" << i + 1 << "'/><origin xyz='" << xyz[i][0] << ' ' << xyz[i][1] << ' ' << xyz[i][2]
-         << "' rpy='" << roll[i]
-         << " 0 0'/><axis xyz='0 0 1'/><limit lower='-3' upper='3' effort='80' velocity='2'/></joint>";
-  }
-  file << "<link name='flange'/><joint name='f' type='fixed'><parent link='l7'/><child link='flange'/><origin xyz='0 0 "
-          "0.107'/>"
-       << "</joint></robot>";
-  return path;
-}
-
+// A seven-axis arm of the common kind (published parameters of a Panda).
 world::Robot seven_axis_arm() {
-  world::Robot robot;
-  robot.name = "seven";
-  robot.urdf = seven_axis_urdf();
-  robot.flange_link = "flange";
+  const static world::TestFolder folder;
+  auto robot = serial_robot(folder, "seven",
+                            {{{0, 0, 0.333}},
+                             {{0, 0, 0}, {-kHalfPi, 0, 0}},
+                             {{0, -0.316, 0}, {kHalfPi, 0, 0}},
+                             {{0.0825, 0, 0}, {kHalfPi, 0, 0}},
+                             {{-0.0825, 0.384, 0}, {-kHalfPi, 0, 0}},
+                             {{0, 0, 0}, {kHalfPi, 0, 0}},
+                             {{0.088, 0, 0}, {kHalfPi, 0, 0}}},
+                            Vector3(0, 0, 0.107), 3);
   robot.home = axis_vector({0, -0.785, 0, -2.356, 0, 1.571, 0.785});
   robot.limits.position_min = axis_vector({-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973});
   robot.limits.position_max = axis_vector({2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973});
-  for (auto* list : {&robot.limits.speed_rad_s, &robot.limits.acceleration_rad_s2, &robot.limits.jerk_rad_s3,
-                     &robot.limits.torque_nm}) {
-    *list = AxisVector::Constant(7, 10);
-  }
-  robot.rotor_inertia_kg_m2 = AxisVector::Constant(7, 0.01);
   return robot;
 }
 
@@ -210,6 +191,64 @@ TEST(Inverse, RedundantArmTakesSmallStepsByTheLeastJointMotion) {
     const auto q = model.inverse(target, seed);
     ASSERT_TRUE(q.has_value());
     EXPECT_LT((*q - seed - least).norm(), 0.15 * least.norm() + 1e-6);
+  }
+}
+
+// Wherever its limits let the arm be, an answer from home.
+TEST(Inverse, RedundantArmGetsAlmostAnywhereFromHome) {
+  const auto robot = seven_axis_arm();
+  const auto model = RobotModel::load(robot).value();
+  auto check = model.copy();
+  EXPECT_EQ(model.inverse_method(), RobotModel::InverseMethod::kIteration);
+  EXPECT_EQ(model.branch(robot.home), Branch{});
+  Random random(15);
+  constexpr int kPoses = 5000;
+  int solved = 0;
+  for (int i = 0; i < kPoses; ++i) {
+    AxisVector q = robot.home;
+    for (Eigen::Index axis = 0; axis < q.size(); ++axis)
+      q[axis] = random.uniform(robot.limits.position_min[axis], robot.limits.position_max[axis]);
+    const Pose target = check.world_from_tip(q);
+    const auto found = model.inverse(target, robot.home, Among::kAllBranches);
+    if (!found) continue;
+    ++solved;
+    ASSERT_TRUE(check.world_from_tip(*found).isApprox(target, 2e-6));
+    ASSERT_TRUE(((*found - robot.limits.position_min).array() >= 0).all() &&
+                ((robot.limits.position_max - *found).array() >= 0).all());
+    const auto again = model.inverse(target, robot.home, Among::kAllBranches);
+    ASSERT_EQ(*again, *found);
+  }
+  std::printf("seven axes, anywhere: solved %d of %d\n", solved, kPoses);
+  EXPECT_GE(solved, kPoses * 995 / 1000);
+}
+
+// Six axes of which no three are parallel and no three meet, and one that slides: no closed form, but answers.
+TEST(Inverse, ArmsWithoutClosedFormAreIterated) {
+  const std::vector<JointRow> skew{{{0, 0, 0.3}},
+                                   {{0.1, 0.05, 0.1}, {kHalfPi, 0, 0}},
+                                   {{0.4, 0, 0}, {0.3, 0, 0}},
+                                   {{0.1, 0.05, 0.3}, {kHalfPi, 0.2, 0}},
+                                   {{0.03, 0, 0.1}, {-kHalfPi, 0, 0}},
+                                   {{0.05, 0.02, 0.1}, {kHalfPi, 0, 0}}};
+  const world::TestFolder folder;
+  auto sliding = skew;
+  sliding[0].type = "prismatic";
+  for (const auto& [name, rows] : {std::pair{"skew", skew}, std::pair{"sliding", sliding}}) {
+    auto model = RobotModel::load(serial_robot(folder, name, rows, {0, 0, 0.1}, 2.5)).value();
+    EXPECT_EQ(model.inverse_method(), RobotModel::InverseMethod::kIteration) << name;
+    Random random(16);
+    int solved = 0;
+    for (int i = 0; i < 500; ++i) {
+      AxisVector q(6), seed(6);
+      for (auto& angle : q) angle = random.uniform(-2.5, 2.5);
+      for (Eigen::Index axis = 0; axis < 6; ++axis) seed[axis] = q[axis] + random.uniform(-0.2, 0.2);
+      const Pose target = model.world_from_tip(q);
+      const auto found = model.inverse(target, seed.cwiseMax(-2.5).cwiseMin(2.5), Among::kAllBranches);
+      if (!found) continue;
+      ++solved;
+      ASSERT_TRUE(model.world_from_tip(*found).isApprox(target, 2e-6)) << name;
+    }
+    EXPECT_GE(solved, 495) << name;
   }
 }
 

@@ -10,9 +10,12 @@
 #include <pinocchio/multibody.hpp>
 #include <pinocchio/parsers/urdf.hpp>
 
+#include <array>
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -57,7 +60,7 @@ pinocchio::Inertia point_mass(double mass_kg, const Vector3& com_m) {
 }  // namespace
 
 // Vectors are dynamic although AxisVector would do: Pinocchio's libraries are compiled for them.
-struct RobotModel::Impl final : Chain {
+struct RobotModel::Impl {
   world::Robot robot;
   pinocchio::Model model;
   pinocchio::Data data;
@@ -67,6 +70,7 @@ struct RobotModel::Impl final : Chain {
   pinocchio::Inertia last_inertia;  // last link and tool, without payload
   std::vector<pinocchio::FrameIndex> capsule_frames;
   Eigen::VectorXd q, v, a;
+  std::optional<InverseKinematics> inverse;
 
   Impl(world::Robot robot_in, const pinocchio::Model& model_in)
       : robot(std::move(robot_in)), model(model_in), data(model) {
@@ -82,6 +86,7 @@ struct RobotModel::Impl final : Chain {
     for (const auto& capsule : robot.capsules)
       capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
     q = v = a = Eigen::VectorXd::Zero(model.nv);
+    inverse.emplace(chain());
   }
 
   // Copies what was set up and makes its own scratch pad.
@@ -96,9 +101,10 @@ struct RobotModel::Impl final : Chain {
         capsule_frames(other.capsule_frames),
         q(other.q),
         v(other.v),
-        a(other.a) {}
+        a(other.a),
+        inverse(other.inverse) {}
   Impl& operator=(const Impl&) = delete;
-  ~Impl() override = default;
+  ~Impl() = default;
 
   // The payload joins the inertia of the last moving link.
   void carry(const Payload& payload) PONS_NONBLOCKING {
@@ -111,12 +117,11 @@ struct RobotModel::Impl final : Chain {
     model.inertias[last_joint] += last_joint_from_flange.act(pinocchio::Inertia(payload.mass_kg, com, cube));
   }
 
-  void evaluate(const AxisVector& at, Pose& world_from_tip, Jacobian& jacobian) override {
+  Jacobian tip_jacobian(const AxisVector& at) {
     q = at;
     pinocchio::computeJointJacobians(model, data, q);
     const pinocchio::SE3 base_from_tip = data.oMi[last_joint] * last_joint_from_tip;
-    world_from_tip = robot.world_from_base * pose_of(base_from_tip);
-    jacobian.resize(6, model.nv);
+    Jacobian jacobian(6, model.nv);
     const Eigen::Matrix3d turn = robot.world_from_base.linear();
     for (Eigen::Index axis = 0; axis < model.nv; ++axis) {
       // data.J holds each axis's twist at the base origin, in base axes; move it to the tip, turn it to the world.
@@ -125,8 +130,22 @@ struct RobotModel::Impl final : Chain {
       jacobian.col(axis).head<3>() = turn * linear;
       jacobian.col(axis).tail<3>() = turn * angular;
     }
+    return jacobian;
   }
-  const AxisLimits& limits() const override { return robot.limits; }
+
+  // What inverse kinematics needs of the model: the axes with every joint at zero.
+  Chain chain() {
+    const Jacobian at_zero = tip_jacobian(AxisVector::Zero(model.nv));
+    std::array<Joint, kMaxAxes> joints;
+    for (Eigen::Index axis = 0; axis < model.nv; ++axis) {
+      Joint& joint = joints[static_cast<std::size_t>(axis)];
+      joint.revolute = at_zero.col(axis).tail<3>().squaredNorm() > 0.5;
+      joint.axis = joint.revolute ? at_zero.col(axis).tail<3>() : at_zero.col(axis).head<3>();
+      joint.point = robot.world_from_base * data.oMi[static_cast<std::size_t>(axis) + 1].translation();
+    }
+    const Pose tip = robot.world_from_base * pose_of(data.oMi[last_joint] * last_joint_from_tip);
+    return {std::span(joints).first(static_cast<std::size_t>(model.nv)), tip, robot.limits};
+  }
 };
 
 RobotModel::RobotModel(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -213,22 +232,32 @@ Pose RobotModel::world_from_tip(const AxisVector& q) {
   return impl_->robot.world_from_base * pose_of(impl_->data.oMi[impl_->last_joint] * impl_->last_joint_from_tip);
 }
 
-Jacobian RobotModel::tip_jacobian(const AxisVector& q) {
-  Pose tip;
-  Jacobian jacobian;
-  impl_->evaluate(q, tip, jacobian);
-  return jacobian;
+Jacobian RobotModel::tip_jacobian(const AxisVector& q) { return impl_->tip_jacobian(q); }
+
+RobotModel::InverseMethod RobotModel::inverse_method() const {
+  const auto& closed_form = impl_->inverse->closed_form();
+  if (!closed_form) return InverseMethod::kIteration;
+  return closed_form->structure() == ClosedForm::Structure::kThreeParallel ? InverseMethod::kThreeParallelAxes
+                                                                           : InverseMethod::kSphericalWrist;
 }
 
-Expected<AxisVector> RobotModel::inverse(const Pose& world_from_tip, const AxisVector& seed) {
+Expected<AxisVector> RobotModel::inverse(const Pose& world_from_tip, const AxisVector& seed, Among among) const {
   if (seed.size() != axes() || !seed.allFinite() || !world_from_tip.matrix().allFinite()) {
     return fail("pose or seed is not finite, or the seed has another number of axes", impl_->robot.name);
   }
-  if (const auto q = solve_inverse(*impl_, world_from_tip, seed)) return *q;
+  if (const auto q = impl_->inverse->nearest(world_from_tip, seed, among)) return *q;
   const Vector3& p = world_from_tip.translation();
   return fail(fmt::format("the tip cannot reach ({:.3f}, {:.3f}, {:.3f}) m in that orientation", p.x(), p.y(), p.z()),
               impl_->robot.name, "choose a pose inside the arm's reach");
 }
+
+void RobotModel::inverse_all(const Pose& world_from_tip, const AxisVector& seed, BranchSolutions& found) const {
+  found.clear();
+  if (seed.size() != axes() || !seed.allFinite() || !world_from_tip.matrix().allFinite()) return;
+  impl_->inverse->all(world_from_tip, seed, found);
+}
+
+Branch RobotModel::branch(const AxisVector& q) const { return impl_->inverse->branch(q); }
 
 void RobotModel::place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules) {
   impl_->q = q;

@@ -10,11 +10,11 @@
 #include "pons/core/error.hpp"
 #include "pons/core/pose.hpp"
 #include "pons/core/realtime.hpp"
+#include "pons/model/branch.hpp"
+#include "pons/model/chain.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::model {
-
-using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, static_cast<int>(kMaxAxes)>;
 
 // What the tool carries, rigid to the flange. Its own rotational inertia is taken for that of a cube of 600 kg/m³:
 // denser than parcels are, because too much inertia in the model makes the loop nervous, too little only softer.
@@ -44,11 +44,25 @@ class RobotModel {
 
   // Forward kinematics of the tool tip. q in rad.
   [[nodiscard]] Pose world_from_tip(const AxisVector& q);
-  // d(tip)/dq: linear rows first (m/rad), then angular, both along world axes, at the tip.
+  // d(tip)/dq there.
   [[nodiscard]] Jacobian tip_jacobian(const AxisVector& q);
-  // The solution of the seed's branch nearest to the seed, inside position limits (turns of 2π considered); damped
-  // Gauss-Newton. Error when none is found to 1e-6 m and 1e-6 rad.
-  [[nodiscard]] Expected<AxisVector> inverse(const Pose& world_from_tip, const AxisVector& seed);
+
+  // Inverse kinematics, inside position limits, whole turns of 2π considered. A closed form where the arm's axes allow
+  // one (axes 2, 3, 4 parallel, or 4, 5, 6 through a point; exact to about 1e-12), otherwise iteration (to 1e-10 as a
+  // rule, 1e-6 at worst; m and rad). These calls may be made from any thread, and allocate nothing but errors.
+  enum class InverseMethod { kThreeParallelAxes, kSphericalWrist, kIteration };
+  [[nodiscard]] InverseMethod inverse_method() const;
+  // The solution nearest to the seed (least square sum of joint differences), among those of the seed's branch or all.
+  // By iteration a solution near the seed, not surely the nearest; of kAllBranches the first one found. Where the pose
+  // leaves an axis free (a straight wrist), one of the solutions near the seed. Error when none is found.
+  [[nodiscard]] Expected<AxisVector> inverse(const Pose& world_from_tip, const AxisVector& seed,
+                                             Among among = Among::kBranchOfSeed) const;
+  // Every solution, each with its branch and in the turn nearest to the seed. Of an arm without closed form one at
+  // most. None when seed or pose is not finite, or the seed has another number of axes.
+  void inverse_all(const Pose& world_from_tip, const AxisVector& seed, BranchSolutions& found) const;
+  // The branch that q is on; all zero for an arm without closed form.
+  [[nodiscard]] Branch branch(const AxisVector& q) const;
+
   // The robot's self-filter capsules, tool included, at q.
   void place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules);
 
