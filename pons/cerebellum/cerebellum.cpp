@@ -68,8 +68,13 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
                     sensors.speed.allFinite() && (!seen_ || sensors.stamp > measured_stamp_);
   if (good) {
     const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(limits().speed_rad_s);
-    statistics_.measured_speed = std::max(statistics_.measured_speed, share.maxCoeff());
-    if (share.maxCoeff() > 1) ++statistics_.measured_overspeed;
+    Eigen::Index fastest = 0;
+    const double most = share.maxCoeff(&fastest);
+    statistics_.measured_speed = std::max(statistics_.measured_speed, most);
+    if (most > 1) ++statistics_.measured_overspeed;
+    if (most > 1 && !is_too_fast_)
+      log_.write(now, "axis {} measured at {:.1f} % of its speed limit", fastest + 1, 100 * most);
+    is_too_fast_ = most > 1;
     if (seen_) {
       const AxisVector rate = (sensors.speed - measured_speed_) / to_s(sensors.stamp - measured_stamp_);
       statistics_.measured_acceleration = std::max(

@@ -121,7 +121,7 @@ class Cerebellum {
   bool seen_ = false;
   Time measured_stamp_, fresh_at_;
   AxisVector measured_position_, measured_speed_, position_now_, speed_now_;
-  bool is_still_ = false;
+  bool is_still_ = false, is_too_fast_ = false;
   Time still_since_;
   bool strays_ = false;
   Time strays_since_;

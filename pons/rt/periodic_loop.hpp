@@ -28,7 +28,7 @@ class PeriodicLoop {
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }
-  [[nodiscard]] std::uint64_t woken() const { return woken_; }             // ticks that the word asked for
+  [[nodiscard]] std::uint64_t woken() const { return woken_; }  // ticks that the word asked for
   // How late this tick's thread was woken; 0 for one that the word asked for. What a clock on a leash stood still is
   // not the thread's lateness.
   [[nodiscard]] Duration late() const { return late_; }
