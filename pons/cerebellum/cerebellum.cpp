@@ -20,6 +20,8 @@ using link::StopResult;
 constexpr int kCommandsPerTick = 64;
 // Armed a little outside its limits (by sagging or by hand), the arm is taken to stand on the limit.
 constexpr double kArmTolerance = 0.01;  // rad
+// Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
+constexpr double kTooFast = 1.01;
 
 AxisState at_rest(const AxisVector& position) {
   return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
@@ -72,9 +74,9 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     const double most = share.maxCoeff(&fastest);
     statistics_.measured_speed = std::max(statistics_.measured_speed, most);
     if (most > 1) ++statistics_.measured_overspeed;
-    if (most > 1 && !is_too_fast_)
+    if (most > kTooFast && !is_too_fast_)
       log_.write(now, "axis {} measured at {:.1f} % of its speed limit", fastest + 1, 100 * most);
-    is_too_fast_ = most > 1;
+    is_too_fast_ = most > kTooFast;
     if (seen_) {
       const AxisVector rate = (sensors.speed - measured_speed_) / to_s(sensors.stamp - measured_stamp_);
       statistics_.measured_acceleration = std::max(
