@@ -3,34 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
-#include <new>
 #include <utility>
 
 #include "pons/core/random.hpp"
+#include "pons/core/test_allocations.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/model/test_arms.hpp"
 #include "pons/model/test_robots.hpp"
-
-namespace {
-// Counted on this thread while switched on. The other tests of this program are not affected.
-thread_local bool counting = false;
-thread_local std::uint64_t allocations = 0;
-void* counted(std::size_t size) {
-  if (counting) ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-}  // namespace
-
-// NOLINTBEGIN: replacing the global operators is how allocations are seen.
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
-// NOLINTEND
 
 namespace pons::model {
 namespace {
@@ -356,12 +335,12 @@ TEST(ClosedForm, InverseAllocatesNothing) {
       AxisVector seed = q;
       seed.array() += 0.1;
       const Pose target = model.world_from_tip(q);
-      allocations = 0;
-      counting = true;
-      const bool near = model.inverse(target, seed).has_value();
-      const bool any = model.inverse(target, seed, Among::kAllBranches).has_value();
-      model.inverse_all(target, seed, all);
-      counting = false;
+      bool near = false, any = false;
+      const std::uint64_t allocations = test_allocations::allocations_in([&] {
+        near = model.inverse(target, seed).has_value();
+        any = model.inverse(target, seed, Among::kAllBranches).has_value();
+        model.inverse_all(target, seed, all);
+      });
       if (!near || !any) continue;  // the text of an error may allocate
       ++solved;
       worst = std::max(worst, allocations);

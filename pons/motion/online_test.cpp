@@ -4,32 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <vector>
 
 #include "pons/core/random.hpp"
-
-namespace {
-// Counted on this thread while switched on. The other tests of this program are not affected.
-thread_local bool counting = false;
-thread_local std::uint64_t allocations = 0;
-void* counted(std::size_t size) {
-  if (counting) ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-}  // namespace
-
-// NOLINTBEGIN: replacing the global operators is how allocations are seen.
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
-// NOLINTEND
+#include "pons/core/test_allocations.hpp"
 
 namespace pons::motion {
 namespace {
@@ -325,17 +304,16 @@ TEST(Online, AllocatesNothing) {
        {Synchronization::kTime, Synchronization::kPhase, Synchronization::kNone}) {
     const Tasks tasks = draw(random, kMostTasks);
     Profiles profiles(kMostTasks);
-    allocations = 0, counting = true;
-    const bool planned = plan_positions(tasks, {.synchronization = synchronization}, profiles) &&
-                         plan_speeds(tasks, {.synchronization = synchronization, .least_s = 1}, profiles);
-    counting = false;
+    bool planned = false;
+    EXPECT_EQ(test_allocations::allocations_in([&] {
+                planned = plan_positions(tasks, {.synchronization = synchronization}, profiles) &&
+                          plan_speeds(tasks, {.synchronization = synchronization, .least_s = 1}, profiles);
+              }),
+              0U);
     EXPECT_TRUE(planned);
-    EXPECT_EQ(allocations, 0U);
   }
-  counting = true;
-  const Profiles counted(1);  // that it would be seen
-  counting = false;
-  EXPECT_EQ(allocations, 1U);
+  Profiles seen;
+  EXPECT_EQ(test_allocations::allocations_in([&] { seen.resize(1); }), 1U);
 }
 
 TEST(Online, SaysWhatIsWrong) {
