@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
 #include "pons/skills/set_down.hpp"
@@ -32,9 +33,11 @@ constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a n
 constexpr double kElsewhere_m = 0.015;  // and by so much, when it is too late for one, another try
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
-constexpr double kLifted_m_s2 = 5.0;
+constexpr double kLifted_m_s2 = 7.0;
 constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
+constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
+constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
 constexpr double kRetreat_m = 0.08;
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
@@ -356,22 +359,36 @@ class Pick final : public task::Skill {
     }
     if (height < kLifted_m) return {};
     scale_.add(cell_);
-    const std::optional<double> weighed = scale_.mass_kg(cell_);
+    const std::optional<Weight> weighed = scale_.weigh(cell_);
     const bool at_rest = now >= lift_end_ + (weighed ? kWeighAtRest : kWeighAtMost);
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
-    const bool heavy = weighed && *weighed > (1 - kNearLimit) * limit;
-    if ((!weighed || heavy) && !at_rest) return {};
+    const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
+    const bool lopsided = weighed && hangs_beside(*weighed);
+    if ((!weighed || heavy || lopsided) && !at_rest) return {};
     if (target_.crowded && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
-    const double mass = weighed.value_or(kUnweighable * limit);
+    const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * cell_.held->load.size_m.z()));
     if (mass > limit) {
       return begin_put_back(now, overweight(mass));
     }
+    if (lopsided) {
+      cell_.missed = Miss{code_, now};
+      return begin_put_back(now, {Status::kRetry, "another hangs on it: its weight is felt beside it", {}});
+    }
     return success(now);
+  }
+
+  // No parcel is so uneven that its weight hangs near its edge or beyond: then another came along.
+  [[nodiscard]] bool hangs_beside(const Weight& weight) const {
+    const Load& load = cell_.held->load;
+    const Eigen::Vector2d beside =
+        Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
+    const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
+    return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
   }
 
   // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along.

@@ -20,6 +20,15 @@ double pull_n(Cell& cell) {
   return -(world_from_flange.linear() * Vector3(force[0], force[1], force[2])).z();
 }
 
+// About the tip, across its axis, tip frame.
+Eigen::Vector2d moment_nm(const Cell& cell) {
+  const link::State& state = cell.arm.state();
+  const Eigen::Map<const Vector3> force(state.wrist_force_n.data()), torque(state.wrist_torque_nm.data());
+  const Pose& flange_from_tip = cell.world.robot.tool.flange_from_tip;
+  const Vector3 about_tip = torque - flange_from_tip.translation().cross(force);
+  return (flange_from_tip.linear().transpose() * about_tip).head<2>();
+}
+
 }  // namespace
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }
@@ -28,22 +37,28 @@ void Scale::add(Cell& cell) {
   const link::State& state = cell.arm.state();
   if (!readings_.empty() && state.stamp.s() <= readings_.back().time_s) return;
   const double speed_m_s = (cell.model.tip_jacobian(state.position) * state.speed)(2);
-  readings_.push_back({state.stamp.s(), pull_n(cell), speed_m_s});
+  readings_.push_back({state.stamp.s(), pull_n(cell), speed_m_s, moment_nm(cell)});
 }
 
-// Of tool and load together, by the trapezoidal rule.
-double Scale::mass_kg(std::size_t first, std::size_t last) const {
-  double impulse = 0;
+// By the trapezoidal rule.
+template <typename Value>
+Value Scale::impulse(Value Reading::* felt, std::size_t first, std::size_t last) const {
+  Value sum = 0 * readings_[first].*felt;
   for (std::size_t i = first; i < last; ++i) {
-    impulse +=
-        0.5 * (readings_[i].force_n + readings_[i + 1].force_n) * (readings_[i + 1].time_s - readings_[i].time_s);
+    const double step_s = readings_[i + 1].time_s - readings_[i].time_s;
+    sum += 0.5 * step_s * (readings_[i].*felt + readings_[i + 1].*felt);
   }
+  return sum;
+}
+
+// Of tool and load together.
+double Scale::mass_kg(std::size_t first, std::size_t last) const {
   const double span_s = readings_[last].time_s - readings_[first].time_s;
   const double per_kg = kGravity_m_s2 * span_s + readings_[last].speed_m_s - readings_[first].speed_m_s;
-  return impulse / std::max(per_kg, 0.1 * kGravity_m_s2 * span_s);
+  return impulse(&Reading::force_n, first, last) / std::max(per_kg, 0.1 * kGravity_m_s2 * span_s);
 }
 
-std::optional<double> Scale::mass_kg(const Cell& cell) const {
+std::optional<Weight> Scale::weigh(const Cell& cell) const {
   const double tool_kg = cell.world.robot.tool.mass_kg;
   if (readings_.size() < 3) return std::nullopt;
   const std::size_t last = readings_.size() - 1;
@@ -57,7 +72,11 @@ std::optional<double> Scale::mass_kg(const Cell& cell) const {
   const double whole_kg = mass_kg(first, last) - tool_kg;
   const double change_kg = std::abs(mass_kg(first, middle) - mass_kg(middle, last));
   if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
-  return whole_kg;
+  // The tool hangs straight below the flange, so its own weight has no moment there.
+  const double pull_ns = impulse(&Reading::force_n, first, last) * whole_kg / (whole_kg + tool_kg);
+  if (pull_ns <= 0) return Weight{whole_kg};
+  const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, first, last);
+  return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
 }
 
 }  // namespace pons::skills

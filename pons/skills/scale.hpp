@@ -1,6 +1,7 @@
-// Weighs what hangs on the cups from the wrist's force while the arm moves.
+// Weighs what hangs on the cups from the wrist's force and moment while the arm moves.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <vector>
 
@@ -8,20 +9,29 @@
 
 namespace pons::skills {
 
+struct Weight {
+  double mass_kg = 0;                  // tool taken off
+  Eigen::Vector2d beside_tip_m{0, 0};  // of its centre of mass, tip frame: how far from the tip's axis
+};
+
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
-// ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed.
+// ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same
+// swing, tells where it hangs.
 class Scale {
  public:
   // Call once a bridge tick while nothing supports the load.
   void add(Cell& cell);
-  // Mass of the load over the latest readings, kg, tool taken off; nothing until they span a swing and their halves
-  // agree: until then something may still bear a part of it.
-  [[nodiscard]] std::optional<double> mass_kg(const Cell& cell) const;
+  // Of the load over the latest readings; nothing until they span a swing and their halves agree: until then something
+  // may still bear a part of it.
+  [[nodiscard]] std::optional<Weight> weigh(const Cell& cell) const;
 
  private:
   struct Reading {
     double time_s, force_n, speed_m_s;
+    Eigen::Vector2d moment_nm;  // about the tip, tip frame, across its axis
   };
+  template <typename Value>
+  [[nodiscard]] Value impulse(Value Reading::* felt, std::size_t first, std::size_t last) const;
   [[nodiscard]] double mass_kg(std::size_t first, std::size_t last) const;
 
   std::vector<Reading> readings_;

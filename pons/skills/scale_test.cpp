@@ -38,7 +38,7 @@ class SwingingLoad {
 
 struct Reading {
   double time_s = 0, now_kg = 0;
-  std::optional<double> mass_kg;
+  std::optional<Weight> weight;
 };
 
 class ScaleTest : public ::testing::Test {
@@ -61,7 +61,8 @@ class ScaleTest : public ::testing::Test {
 
   // What the wrist feels, and the bridge's tick that weighs it, until the way ends. Before `free_s` a neighbour
   // bears half of the load.
-  std::vector<Reading> weigh(SwingingLoad load, const motion::Trajectory& way, double free_s = 0) {
+  std::vector<Reading> weigh(SwingingLoad load, const motion::Trajectory& way, double free_s = 0,
+                             const Vector3& hangs_in_tip_m = Vector3::Zero()) {
     constexpr int kSubsteps = 40;
     const double dt_s = to_s(kTick) / kSubsteps;
     Scale scale;
@@ -77,23 +78,31 @@ class ScaleTest : public ::testing::Test {
         load.step(flange_m_s2, time_s < free_s ? 0.5 : 0, dt_s);
       }
       last_speed_m_s = speed_m_s;
-      hear(now, arm, load.pull_n() + world_.robot.tool.mass_kg * (kGravity_m_s2 + flange_m_s2));
+      hear(now, arm, {load.pull_n(), world_.robot.tool.mass_kg * (kGravity_m_s2 + flange_m_s2)}, hangs_in_tip_m);
       scale.add(cell_);
-      readings.push_back({since_s, weigh_now(cell_), scale.mass_kg(cell_)});
+      readings.push_back({since_s, weigh_now(cell_), scale.weigh(cell_)});
     }
     return readings;
   }
 
-  void hear(Time now, const AxisState& arm, double pull_n) {
-    const Pose world_from_flange =
-        cell_.model.world_from_tip(arm.position) * world_.robot.tool.flange_from_tip.inverse();
-    const Vector3 in_flange_n = world_from_flange.linear().transpose() * Vector3(0, 0, -pull_n);
+  struct Pull {
+    double load_n, tool_n;
+  };
+
+  void hear(Time now, const AxisState& arm, const Pull& pull, const Vector3& hangs_in_tip_m) {
+    const Pose& flange_from_tip = world_.robot.tool.flange_from_tip;
+    const Pose world_from_flange = cell_.model.world_from_tip(arm.position) * flange_from_tip.inverse();
+    const Vector3 down = world_from_flange.linear().transpose() * Vector3(0, 0, -1);
+    const Vector3 in_flange_n = (pull.load_n + pull.tool_n) * down;
+    const Vector3 moment_nm = (flange_from_tip * hangs_in_tip_m).cross(pull.load_n * down) +
+                              world_.robot.tool.com_m.cross(pull.tool_n * down);
     link::State state;
     state.stamp = now;
     state.safety = link::SafetyState::kOperational;
     state.commanded = arm;
     state.position = arm.position, state.speed = arm.speed;
     state.wrist_force_n = {in_flange_n.x(), in_flange_n.y(), in_flange_n.z()};
+    state.wrist_torque_nm = {moment_nm.x(), moment_nm.y(), moment_nm.z()};
     cerebellum_.publish(state);
     cell_.refresh(now, {});
     for (link::Command command; cerebellum_.receive(command);) continue;
@@ -103,8 +112,8 @@ class ScaleTest : public ::testing::Test {
     int read = 0;
     for (const Reading& reading : readings) {
       if (reading.time_s < from_s || reading.time_s > to_s) continue;
-      ASSERT_TRUE(reading.mass_kg) << mass_kg << " kg after " << reading.time_s << " s";
-      EXPECT_NEAR(*reading.mass_kg, mass_kg, 0.05 * mass_kg) << "after " << reading.time_s << " s";
+      ASSERT_TRUE(reading.weight) << mass_kg << " kg after " << reading.time_s << " s";
+      EXPECT_NEAR(reading.weight->mass_kg, mass_kg, 0.05 * mass_kg) << "after " << reading.time_s << " s";
       ++read;
     }
     EXPECT_GT(read, 5);
@@ -136,11 +145,23 @@ TEST_F(ScaleTest, WhileTheArmSpeedsUpAndSlowsDownTheMassStaysRight) {
   }
 }
 
+TEST_F(ScaleTest, FeelsWhereTheLoadHangs) {
+  for (const Vector3& hangs_m : {Vector3(0, 0, 0.1), Vector3(0.06, 0, 0.05), Vector3(-0.04, 0.15, 0.2)}) {
+    int read = 0;
+    for (const Reading& reading : weigh({1.0, 0.8, kHardlyDamped_n_s_m}, lift(0.1), 0, hangs_m)) {
+      if (!reading.weight) continue;
+      EXPECT_LT((reading.weight->beside_tip_m - hangs_m.head<2>()).norm(), 0.003) << "after " << reading.time_s << " s";
+      ++read;
+    }
+    EXPECT_GT(read, 5);
+  }
+}
+
 TEST_F(ScaleTest, SaysNothingBeforeASwingIsOver) {
   int early = 0;
   for (const Reading& reading : weigh({1.0, 1, kDamping_n_s_m}, lift(0.1))) {
     if (reading.time_s > kSpan_s - 0.001) continue;
-    EXPECT_FALSE(reading.mass_kg) << "after " << reading.time_s << " s";
+    EXPECT_FALSE(reading.weight) << "after " << reading.time_s << " s";
     ++early;
   }
   EXPECT_EQ(early, 15);
@@ -153,7 +174,7 @@ TEST_F(ScaleTest, SaysNothingWhileANeighbourBoreHalfOfItInTheFirstHalf) {
   for (const Reading& reading : readings) {
     // The window is 0.15 to 0.16 s long, and its middle lies in the neighbour's last or the load's first moments.
     if (reading.time_s < kSpan_s - 0.001 || reading.time_s > kSpan_s + 0.021) continue;
-    EXPECT_FALSE(reading.mass_kg) << *reading.mass_kg << " kg after " << reading.time_s << " s";
+    EXPECT_FALSE(reading.weight) << reading.weight->mass_kg << " kg after " << reading.time_s << " s";
     ++doubtful;
   }
   EXPECT_GE(doubtful, 2);
