@@ -1,12 +1,14 @@
 #include "pons/model/collision.hpp"
 
-#include <coal/distance.h>
+#include <coal/distance_func_matrix.h>
+#include <coal/narrowphase/narrowphase.h>
 #include <coal/shape/geometric_shapes.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -17,6 +19,7 @@ namespace pons::model {
 namespace {
 
 constexpr std::uint64_t kProbeSeed = 1;
+constexpr double kTolerance_m = 1e-6;             // of coal's distances
 constexpr double kWidest_rad = std::numbers::pi;  // of an axis' range, from zero, that is probed
 constexpr std::size_t kBodies = kMaxAxes + 1;
 
@@ -51,11 +54,23 @@ double least_distance(const Shape& a, const Shape& b) {
   return (apart - a.half_m - b.half_m).cwiseMax(0).norm();
 }
 
-double distance(const Shape& a, const Shape& b) {
-  static const coal::DistanceRequest request(false, false);
-  coal::DistanceResult result;
-  return coal::distance(a.geometry.get(), a.world_from_shape, b.geometry.get(), b.world_from_shape, request, result);
-}
+// coal's own entry makes a solver for each question, which costs more than the answer.
+class Ruler {
+ public:
+  // Below zero where they touch, by no more than the tolerance; m.
+  double distance(const Shape& a, const Shape& b) {
+    const auto function = table_.distance_matrix[a.geometry->getNodeType()][b.geometry->getNodeType()];
+    coal::DistanceResult result;
+    return function(a.geometry.get(), a.world_from_shape, b.geometry.get(), b.world_from_shape, &solver_, request_,
+                    result) -
+           kTolerance_m;
+  }
+
+ private:
+  coal::DistanceFunctionMatrix table_;
+  coal::DistanceRequest request_{false, false};  // neither nearest points nor depth
+  coal::GJKSolver solver_{request_};
+};
 
 }  // namespace
 
@@ -70,7 +85,7 @@ struct CollisionModel::Impl {
   std::optional<Shape> load;
   CarriedBox carried;
   std::size_t axes;
-  std::pair<std::string, std::string> closest;  // of the last look with names
+  Ruler ruler;
 
   Impl(RobotModel robot, const CollisionMargins& kept)
       : model(std::move(robot)), margins(kept), axes(static_cast<std::size_t>(model.axes())) {
@@ -133,7 +148,9 @@ struct CollisionModel::Impl {
                               std::min(limits.position_max[i], kWidest_rad));
       }
       place_at(q);
-      const auto apart = [&](const auto& pair) { return distance(capsules[pair.first], capsules[pair.second]) > 0; };
+      const auto apart = [&](const auto& pair) {
+        return ruler.distance(capsules[pair.first], capsules[pair.second]) > 0;
+      };
       const auto kept = std::partition(touching.begin(), touching.end(), apart);
       pairs.insert(pairs.end(), touching.begin(), kept);
       touching.erase(touching.begin(), kept);
@@ -144,9 +161,9 @@ struct CollisionModel::Impl {
   }
 
   // Lowers `least` to the distance of these two beyond `margin_m` where it is lower.
-  static bool lower(double& least, const Shape& a, const Shape& b, double margin_m) {
+  bool lower(double& least, const Shape& a, const Shape& b, double margin_m) {
     if (least_distance(a, b) - margin_m >= least) return false;
-    const double apart = distance(a, b) - margin_m;
+    const double apart = ruler.distance(a, b) - margin_m;
     if (apart >= least) return false;
     least = apart;
     return true;
@@ -186,17 +203,36 @@ struct CollisionModel::Impl {
 
   [[nodiscard]] bool apart(const PerBody& least) const {
     return std::all_of(least.begin() + 1, least.begin() + static_cast<std::ptrdiff_t>(axes) + 1,
-                       [](double m) { return m >= 0; });
+                       [](double m) { return m > 0; });
   }
-  bool clear(const AxisVector& a, const PerBody& at_a, const AxisVector& b, const PerBody& at_b) {
-    bool out_of_touch = true;
-    for (std::size_t body = 1; body <= axes && out_of_touch; ++body) {
-      out_of_touch = at_a[body] + at_b[body] >= way_of(body, a, b);
+  struct Looked {
+    AxisVector q;
+    PerBody least;
+  };
+  // No pair of bodies can touch between these two.
+  [[nodiscard]] bool out_of_touch(const Looked& a, const Looked& b) const {
+    for (std::size_t body = 1; body <= axes; ++body) {
+      if (a.least[body] + b.least[body] < way_of(body, a.q, b.q)) return false;
     }
-    if (out_of_touch || travel(a, b) <= kStep_m) return true;
-    const AxisVector middle = 0.5 * (a + b);
-    const PerBody at_middle = distances(middle);
-    return apart(at_middle) && clear(a, at_a, middle, at_middle) && clear(middle, at_middle, b, at_b);
+    return true;
+  }
+  // Halves all that is open before it halves anything twice: what is in the way shows early so.
+  bool clear(const AxisVector& a, const AxisVector& b) {
+    std::vector<Looked> seen{{a, distances(a)}};
+    if (!apart(seen[0].least)) return false;
+    seen.push_back({b, distances(b)});
+    if (!apart(seen[1].least)) return false;
+    std::deque<std::pair<std::size_t, std::size_t>> open{{0, 1}};
+    for (; !open.empty(); open.pop_front()) {
+      const auto [from, to] = open.front();
+      if (out_of_touch(seen[from], seen[to]) || travel(seen[from].q, seen[to].q) <= kStep_m) continue;
+      const AxisVector middle = 0.5 * (seen[from].q + seen[to].q);
+      seen.push_back({middle, distances(middle)});
+      if (!apart(seen.back().least)) return false;
+      open.emplace_back(from, seen.size() - 1);
+      open.emplace_back(seen.size() - 1, to);
+    }
+    return true;
   }
 };
 
@@ -230,31 +266,27 @@ double CollisionModel::clearance(const AxisVector& q) {
 
 bool CollisionModel::clear(const AxisVector& q) { return impl_->apart(impl_->distances(q)); }
 
-bool CollisionModel::clear(const AxisVector& a, const AxisVector& b) {
-  const PerBody at_a = impl_->distances(a);
-  if (!impl_->apart(at_a)) return false;
-  const PerBody at_b = impl_->distances(b);
-  return impl_->apart(at_b) && impl_->clear(a, at_a, b, at_b);
-}
+bool CollisionModel::clear(const AxisVector& a, const AxisVector& b) { return impl_->clear(a, b); }
 
 std::string CollisionModel::touching(const AxisVector& q) {
   impl_->place_at(q);
   const auto link = [&](std::size_t i) { return impl_->model.robot().capsules[i].link; };
   const auto& shapes = impl_->capsules;
   for (const auto& [a, b] : impl_->pairs) {
-    if (distance(shapes[a], shapes[b]) < impl_->margins.self_m) return link(a) + " and " + link(b);
+    if (impl_->ruler.distance(shapes[a], shapes[b]) <= impl_->margins.self_m) return link(a) + " and " + link(b);
   }
   for (std::size_t k = 0; k < impl_->boxes.size(); ++k) {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
-      if (impl_->bodies[i] == 0 || distance(shapes[i], impl_->boxes[k]) >= impl_->margins.scene_m) continue;
+      if (impl_->bodies[i] == 0 || impl_->ruler.distance(shapes[i], impl_->boxes[k]) > impl_->margins.scene_m) continue;
       return fmt::format("{} and box {}", link(i), k + 1);
     }
-    if (impl_->load && distance(*impl_->load, impl_->boxes[k]) < impl_->margins.scene_m) {
+    if (impl_->load && impl_->ruler.distance(*impl_->load, impl_->boxes[k]) <= impl_->margins.scene_m) {
       return fmt::format("the load and box {}", k + 1);
     }
   }
   for (std::size_t i = 0; impl_->load && i < shapes.size(); ++i) {
-    if (impl_->bodies[i] >= impl_->axes || distance(shapes[i], *impl_->load) >= impl_->margins.load_m) continue;
+    if (impl_->bodies[i] >= impl_->axes || impl_->ruler.distance(shapes[i], *impl_->load) > impl_->margins.load_m)
+      continue;
     return link(i) + " and the load";
   }
   return {};

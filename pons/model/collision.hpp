@@ -62,7 +62,8 @@ class CollisionModel {
   // What it was that did not keep its margin at q: "forearm_link and box 3"; empty where all is clear.
   [[nodiscard]] std::string touching(const AxisVector& q);
 
-  // The least distance beyond its margin of any pair, m; never more than kFar_m. Below zero some margin is not kept.
+  // The least distance beyond its margin of any pair, m; never more than kFar_m. Not above zero: some margin is not
+  // kept.
   static constexpr double kFar_m = 0.5;
   [[nodiscard]] double clearance(const AxisVector& q);
   // How far any point of the robot moves at most on the straight line from a to b, m.
