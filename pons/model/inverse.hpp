@@ -19,6 +19,7 @@ class InverseKinematics {
  public:
   explicit InverseKinematics(const Chain& chain);
 
+  [[nodiscard]] const Chain& chain() const { return chain_; }
   [[nodiscard]] const std::optional<ClosedForm>& closed_form() const { return closed_form_; }
   // As RobotModel::inverse(). The seed is as long as the chain; all values are finite.
   [[nodiscard]] std::optional<AxisVector> nearest(const Pose& world_from_tip, const AxisVector& seed,

@@ -259,6 +259,16 @@ void RobotModel::inverse_all(const Pose& world_from_tip, const AxisVector& seed,
 
 Branch RobotModel::branch(const AxisVector& q) const { return impl_->inverse->branch(q); }
 
+const Chain& RobotModel::chain() const { return impl_->inverse->chain(); }
+
+std::vector<int> RobotModel::capsule_axes() const {
+  std::vector<int> axes;
+  for (const pinocchio::FrameIndex frame : impl_->capsule_frames) {
+    axes.push_back(static_cast<int>(impl_->model.frames[frame].parentJoint));  // joint 0 is the world
+  }
+  return axes;
+}
+
 void RobotModel::place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules) {
   impl_->q = q;
   pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);

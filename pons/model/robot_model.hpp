@@ -63,7 +63,11 @@ class RobotModel {
   // The branch that q is on; all zero for an arm without closed form.
   [[nodiscard]] Branch branch(const AxisVector& q) const;
 
-  // The robot's self-filter capsules, tool included, at q.
+  // Its axes when all of them are at zero.
+  [[nodiscard]] const Chain& chain() const;
+  // Of each of the robot file's capsules, how many axes move it: 0 for what stands still.
+  [[nodiscard]] std::vector<int> capsule_axes() const;
+  // The robot's capsules, tool included, at q, in the order of the robot file.
   void place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules);
 
   // Torques (N·m) for the asked acceleration at (q, speed), tool and payload included: recursive Newton-Euler.

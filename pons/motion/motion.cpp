@@ -12,7 +12,10 @@ namespace pons::motion {
 
 static_assert(kMaxAxes <= kMostTasks);
 
-Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits) {
+namespace {
+
+Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits,
+                          Synchronization synchronization) {
   if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
   if (auto ok = check_waypoint(end, "end", limits); !ok) return std::unexpected(ok.error());
   const auto axes = static_cast<std::size_t>(start.position.size());
@@ -27,12 +30,35 @@ Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, 
   }
   std::array<AxisProfile, kMaxAxes> profiles;
   const std::span<AxisProfile> used(profiles.data(), axes);
-  const auto duration_s = plan_positions(std::span(tasks).first(axes), {.grid_s = 1e-9}, used);
+  const auto duration_s = plan_positions(std::span(tasks).first(axes), {synchronization, 0, 1e-9}, used);
   if (!duration_s) return fail(text(duration_s.error()), "motion", "choose another start or end");
   if (auto ok = check_way(used, limits); !ok) return std::unexpected(ok.error());
   Trajectory trajectory;
   append(used, at, std::max(ceil_ns(*duration_s), Duration{1}), trajectory);
   return trajectory;
+}
+
+}  // namespace
+
+Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits) {
+  return move(start, at, end, limits, Synchronization::kTime);
+}
+
+Expected<Trajectory> move_straight(const AxisVector& start, Time at, std::span<const AxisVector> points,
+                                   const AxisLimits& limits) {
+  if (points.empty()) return fail("no points to move along", "path", "give at least one");
+  Trajectory whole;
+  AxisVector from = start;
+  for (const AxisVector& to : points) {
+    const AxisVector still = AxisVector::Zero(from.size());
+    const auto line =
+        move({from, still, still}, at, {to, AxisVector::Zero(to.size())}, limits, Synchronization::kPhase);
+    if (!line) return line;
+    whole.insert(whole.end(), line->begin(), line->end());
+    at = whole.back().end();
+    from = to;
+  }
+  return whole;
 }
 
 Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& limits) {

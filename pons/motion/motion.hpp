@@ -27,6 +27,11 @@ struct Waypoint {
 [[nodiscard]] Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<const AxisVector> vias,
                                                 const Waypoint& end, const AxisLimits& limits);
 
+// From rest along the straight lines in joint space between `points`, with a halt at each: on each line all axes keep
+// to it exactly, and the slowest sets the pace. Errors: as move()'s; no points.
+[[nodiscard]] Expected<Trajectory> move_straight(const AxisVector& start, Time at, std::span<const AxisVector> points,
+                                                 const AxisLimits& limits);
+
 // To standstill as soon as the limits allow, axes together.
 [[nodiscard]] Expected<Trajectory> stop(const AxisState& start, Time at, const AxisLimits& limits);
 

@@ -1,5 +1,7 @@
 #include "pons/skills/move_to.hpp"
 
+#include "pons/motion/line.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -7,11 +9,12 @@ using task::Progress;
 using task::Status;
 
 constexpr double kAbove_m = 0.15;
-constexpr std::string_view kHome = "home";
+constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 
 class MoveTo final : public task::Skill {
  public:
-  MoveTo(Cell& cell, std::string place) : cell_(cell), place_(std::move(place)) {}
+  MoveTo(Cell& cell, std::string place, std::string path)
+      : cell_(cell), place_(std::move(place)), path_(std::move(path)) {}
 
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
@@ -20,12 +23,15 @@ class MoveTo final : public task::Skill {
     }
     if (moving_) {
       if (now < arrives_) return {};
-      return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{Status::kSucceeded, {}, {}};
+      return cancelled_ ? Progress{Status::kFailed, "cancelled", {}}
+                        : Progress{Status::kSucceeded, {}, {{"place", place_}, {"path", path_}, {"way_s", way_s_}}};
     }
-    const auto way = cell_.held ? cell_.carry(now, [&](const AxisVector& from) { return target(from); }) : empty(now);
+    if (path_ == kLine && now < cell_.arm.motion_end()) return {};  // a line begins at rest
+    const auto way = plan(now);
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
+    way_s_ = to_s(arrives_ - way->front().start);
     moving_ = true;
     return {};
   }
@@ -37,6 +43,12 @@ class MoveTo final : public task::Skill {
   }
 
  private:
+  Expected<motion::Trajectory> plan(Time now) {
+    if (path_ == kLine) return line(now);
+    if (cell_.held) return cell_.carry(now, [&](const AxisVector& from) { return target(from); });
+    return empty(now);
+  }
+
   Expected<AxisVector> target(const AxisVector& from) {
     if (place_ == kHome) return cell_.world.robot.home;
     const world::Place* place = cell_.world.place(place_);
@@ -54,9 +66,27 @@ class MoveTo final : public task::Skill {
                               cell_.limits_empty());
   }
 
+  Expected<motion::Trajectory> line(Time now) {
+    if (cell_.held)
+      return fail("a line is for empty cups", "move_to", "leave out \"path\": the way is chosen for what is held");
+    const Time from = cell_.arm.splice_time(now);
+    const AxisVector start = cell_.arm.planned(from).position;
+    const auto q = target(start);
+    if (!q) return std::unexpected(q.error());
+    auto line = motion::move_line(cell_.model, start, from, cell_.model.world_from_tip(*q), cell_.limits_empty(), {});
+    if (!line) return std::unexpected(line.error());
+    motion::Trajectory& way = line->trajectory;
+    if (!cell_.router.clear(way, from, way.back().end(), nullptr, cell_.objects())) {
+      return fail("the line to " + place_ + " is not clear", "move_to",
+                  "leave out \"path\": a way round is looked for");
+    }
+    return std::move(way);
+  }
+
   Cell& cell_;
-  std::string place_;
+  std::string place_, path_;
   Time arrives_;
+  double way_s_ = 0;
   bool moving_ = false, cancelled_ = false;
 };
 
@@ -68,14 +98,15 @@ task::SkillType move_to(Cell& cell) {
   return {.name = "move_to",
           .summary = "Bring the tool over a place, or home",
           .schema = {{"type", "object"},
-                     {"properties", {{"place", {{"enum", places}}}}},
+                     {"properties", {{"place", {{"enum", places}}}, {"path", {{"enum", {kJoints, kLine}}}}}},
                      {"required", {"place"}},
                      {"additionalProperties", false}},
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
           .start = [&cell](const task::Json& arguments, Time) {
-            return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>());
+            return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
+                                            arguments.value("path", std::string(kJoints)));
           }};
 }
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "pons/motion/axis_profile.hpp"
-#include "pons/world/view.hpp"
 
 namespace pons::skills {
 namespace {
@@ -23,9 +22,7 @@ constexpr double kStill_rad_s = 1e-3;
 constexpr double kSink_m = 0.005;  // what comes from between others may leave as low as it is
 constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
-constexpr double kSwing_rad = 0.06;      // how far a load may swing out of level
 constexpr double kUsualHeight_m = 0.20;  // of what stands on the belt: a way over it is tried first
-constexpr double kFront_m = 0.05;        // of what comes into view, so much must show
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 
 // Points of tool or load that come lowest.
@@ -44,17 +41,6 @@ std::vector<Vector3> probes(const Load* load) {
                           turn * Vector3(x * load->size_m.x(), y * load->size_m.y(), load->size_m.z() + lower_m));
     }
   return points;
-}
-
-// Upstream of it something may lie on the belt that no camera has shown yet.
-double unseen_end_m(const world::World& world) {
-  double end_m = std::numeric_limits<double>::infinity();
-  for (const world::CameraSpec& camera : world.cameras) {
-    const auto seen = world::seen_of_belt(camera, world.belt);
-    const double unseen_s = camera.period_s + camera.latency_s;
-    if (seen) end_m = std::min(end_m, seen->from_m + kFront_m + unseen_s * world.belt.speed_m_s);
-  }
-  return std::isfinite(end_m) ? end_m : world.belt.x_start_m;
 }
 
 // Of an object's top face over (x, y), at its own lean; nothing beside its footprint grown by `grow_m`.
@@ -95,14 +81,6 @@ double highest_m(const ObjectBelief& object) {
          0.5 * std::abs(axes(2, 1)) * object.size_m.y();
 }
 
-double rims_z_m(const world::World& world) {
-  double highest = 0;
-  for (const world::Place& place : world.places) {
-    if (place.kind == world::PlaceKind::kChute) highest = std::max(highest, place.center_m.z());
-  }
-  return highest;
-}
-
 }  // namespace
 
 AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
@@ -123,7 +101,8 @@ Router::Router(const world::World& world, model::RobotModel model)
       unseen_end_m_(unseen_end_m(world)),
       rims_z_m_(rims_z_m(world)),
       tool_m_(world.robot.tool.flange_from_tip.translation().norm()),
-      model_(std::move(model)) {}
+      model_(std::move(model)),
+      detour_(world, model_) {}
 
 // What a point over (x, y) must stay above at `time` but for objects, when the way was planned at `begin`.
 double Router::floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const {
@@ -216,7 +195,7 @@ double Router::worst_clearance(const motion::Trajectory& way, Time from, Time un
 
 bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
                    std::span<const ObjectBelief> obstacles) {
-  return worst_clearance(way, from, until, kObjectGrow_m, load, obstacles) >= 0;
+  return worst_clearance(way, from, until, kObjectGrow_m, load, obstacles) >= 0 && detour_.keeps_off(way, load);
 }
 
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
@@ -233,23 +212,31 @@ Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
 Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
                                            const Load* load, std::span<const ObjectBelief> obstacles,
                                            const AxisLimits& limits) {
-  auto way = route(start, at, end, load, obstacles, limits, kEndGrow_m);
+  const AxisLimits wider = covering(limits, start);
+  auto way = over(start, at, end, load, obstacles, wider, kEndGrow_m);
   // Packed in as it is, it leaves as it can: to stay would be worse.
-  if (!way) way = route(start, at, end, load, obstacles, limits, kObjectGrow_m);
+  if (!way) way = over(start, at, end, load, obstacles, wider, kObjectGrow_m);
+  // The search takes longer than a tick may: only worlds that name an obstacle pay for it.
+  if (way || !detour_.has_obstacles()) return way;
+  auto round = detour_.plan(start, at, end, load, obstacles, wider);
+  if (!round) {
+    way.error().what += ", and none round it: " + round.error().line();
+  } else if (clear(*round, at, round->back().end(), load, obstacles)) {
+    return round;
+  }
   return way;
 }
 
-Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
-                                           const Load* load, std::span<const ObjectBelief> obstacles,
-                                           const AxisLimits& wanted, double close_m) {
-  const AxisLimits limits = covering(wanted, start);
+Expected<motion::Trajectory> Router::over(const AxisState& start, Time at, const motion::Waypoint& end,
+                                          const Load* load, std::span<const ObjectBelief> obstacles,
+                                          const AxisLimits& limits, double close_m) {
   auto direct = motion::move(start, at, end, limits);
   if (!direct) return direct;
   const auto clearance_of = [&](const motion::Trajectory& way) {
     return worst_clearance(way, way.front().start, way.back().end(), close_m, load, obstacles);
   };
   const double clearance = clearance_of(*direct);
-  if (clearance >= 0) return direct;
+  if (clearance >= 0 && detour_.keeps_off(*direct, load)) return direct;
 
   const AxisVector middle = 0.5 * (start.position + end.position);
   double depth = 0;  // of the load's lowest point below the tip
@@ -281,7 +268,7 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
         continue;
       }
       if (best && candidate->back().end() >= best->back().end()) continue;
-      if (clearance_of(*candidate) < 0) continue;
+      if (clearance_of(*candidate) < 0 || !detour_.keeps_off(*candidate, load)) continue;
       best = std::move(candidate);
     }
     if (best) return best;

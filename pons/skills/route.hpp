@@ -1,5 +1,5 @@
 // Finds a fast way over the cell: the arm hangs from above, so a way is clear when the tool, and what it carries, pass
-// high enough over everything that stands below.
+// high enough over everything that stands below. Where no way over is clear, it goes round.
 #pragma once
 
 #include <functional>
@@ -10,16 +10,11 @@
 #include "pons/core/error.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/motion/motion.hpp"
+#include "pons/skills/detour.hpp"
+#include "pons/skills/scenery.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::skills {
-
-// What the tool drags along: a box below the tip, its top face at the tip.
-struct Load {
-  Vector3 size_m = Vector3::Zero();           // along its own axes
-  double yaw_in_tip_rad = 0;                  // of its x axis, about the tip's z
-  Vector3 offset_in_tip_m = Vector3::Zero();  // of the middle of its top face from the tip
-};
 
 // Limits that a motion from `start` can keep: tightened in the middle of a motion, they may lie below what it does now.
 [[nodiscard]] AxisLimits covering(const AxisLimits& limits, const AxisState& start);
@@ -30,7 +25,8 @@ class Router {
   Router(const world::World& world, model::RobotModel model);
 
   // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims: with a margin,
-  // close to both ends without. Errors: no clear way found, or an end that cannot be reached.
+  // close to both ends without. Straight, else over what is in the way by one or two via points, else round it on a
+  // path that is found by sampling (detour.hpp). Errors: no clear way found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits);
@@ -46,9 +42,9 @@ class Router {
  private:
   [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const;
   using Positions = std::function<AxisVector(Time)>;
-  [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
-                                                   const Load* load, std::span<const ObjectBelief> obstacles,
-                                                   const AxisLimits& wanted, double close_m);
+  [[nodiscard]] Expected<motion::Trajectory> over(const AxisState& start, Time at, const motion::Waypoint& end,
+                                                  const Load* load, std::span<const ObjectBelief> obstacles,
+                                                  const AxisLimits& limits, double close_m);
   [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
                                        const Load* load, std::span<const ObjectBelief> obstacles);
   [[nodiscard]] double worst_clearance(const motion::Trajectory& way, Time from, Time until, double close_m,
@@ -62,6 +58,7 @@ class Router {
   double rims_z_m_;      // of the highest chute
   double tool_m_;        // from flange to tip
   model::RobotModel model_;
+  Detour detour_;
   std::vector<model::PlacedCapsule> capsules_;  // scratch
 };
 

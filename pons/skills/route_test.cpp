@@ -332,6 +332,36 @@ TEST_F(RouteTest, NoWayThroughAWallIsNamed) {
   EXPECT_FALSE(way.error().mend.empty());
 }
 
+// Too tall to go over: the way leads round it, and what the collision model says of it holds at every moment.
+TEST_F(RouteTest, ATallPostIsGoneRound) {
+  world::World world = parcel_cell();
+  world.places.push_back({"post", world::PlaceKind::kObstacle, {0.02, 0.08, 1.15}, {0.06, 0.06, 0.5}});
+  Router router(world, model_.copy());
+  model::CollisionModel collision(model_.copy(), {});
+  collision.surround(standing(world));
+  const Load load{.size_m = {0.12, 0.1, 0.08}};
+  const auto touches = [&](const motion::Trajectory& way, const Load* carries) {
+    collision.carry(carried(carries));
+    for (Time time = way.front().start; time <= way.back().end(); time += std::chrono::milliseconds(4)) {
+      if (collision.clearance(motion::sample(way, time, model_.axes()).position) < 0.01) return true;
+    }
+    return false;
+  };
+  for (const Load* const carries : {static_cast<const Load*>(nullptr), &load}) {
+    const AxisVector from = over(-0.3, 0.05, 1.12), to = over(0.35, 0.05, 1.12);
+    const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
+    ASSERT_TRUE(direct);
+    ASSERT_TRUE(touches(*direct, carries)) << "the direct way must be blocked";
+    const auto way = router.route(rest(from), kBegin, halt(to), carries, {}, limits_);
+    expect_leads(way, from, to);
+    ASSERT_TRUE(way);
+    EXPECT_FALSE(touches(*way, carries));
+    const auto again = router.route(rest(from), kBegin, halt(to), carries, {}, limits_);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->back().end(), way->back().end());
+  }
+}
+
 TEST_F(RouteTest, LimitsCoverWhatTheArmAlreadyDoes) {
   AxisState start = rest(world_.robot.home);
   start.acceleration[1] = -8;

@@ -57,7 +57,8 @@ PlaceKind read_place_kind(const YamlValue& value) {
   if (word == "exception") return PlaceKind::kException;
   if (word == "tray") return PlaceKind::kTray;
   if (word == "region") return PlaceKind::kRegion;
-  value.refuse(fmt::format("'{}' is no kind of place", printable(word)), "write chute, exception, tray or region");
+  if (word == "obstacle") return PlaceKind::kObstacle;
+  value.refuse(fmt::format("'{}' is no kind of place", printable(word)), "write chute, exception, tray, region or obstacle");
 }
 
 bool mouths_overlap(const Place& a, const Place& b) {
@@ -225,7 +226,9 @@ const Place* World::place(std::string_view place_name) const {
 
 std::vector<std::string> World::place_names() const {
   std::vector<std::string> names;
-  for (const Place& known : places) names.push_back(known.name);
+  for (const Place& known : places) {
+    if (known.kind != PlaceKind::kObstacle) names.push_back(known.name);
+  }
   return names;
 }
 

@@ -49,9 +49,10 @@ struct Robot {
   std::vector<Capsule> capsules;
 };
 
-enum class PlaceKind : std::uint8_t { kChute, kException, kTray, kRegion };
+enum class PlaceKind : std::uint8_t { kChute, kException, kTray, kRegion, kObstacle };
 
 // A named box of space. For a chute `center` is the middle of its mouth, at the rim, and size z the depth to its floor.
+// An obstacle is what the arm must not touch; nothing is brought there.
 struct Place {
   std::string name;
   PlaceKind kind = PlaceKind::kRegion;
@@ -127,6 +128,7 @@ struct World {
 
   // nullptr when there is none of that name.
   [[nodiscard]] const Place* place(std::string_view place_name) const;
+  // Where something may be brought: all but obstacles.
   [[nodiscard]] std::vector<std::string> place_names() const;
 };
 

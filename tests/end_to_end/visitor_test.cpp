@@ -51,6 +51,29 @@ TEST_F(Visitor, HearsOfANameThatIsNotThere) {
   });
 }
 
+// Straight through the air, there and back; what cannot be gone straight is told.
+TEST_F(Visitor, HasTheToolGoAlongALine) {
+  during_a_run([&] {
+    EXPECT_EQ(submit(R"({"id":"line","priority":90,"steps":[
+      {"skill":"move_to","arguments":{"place":"home"}},
+      {"skill":"move_to","arguments":{"place":"north","path":"line"}},
+      {"skill":"move_to","arguments":{"place":"home","path":"line"}}]})")
+                  .out,
+              "line: accepted\n");
+    EXPECT_EQ(submit(R"({"id":"far","priority":90,"steps":[
+      {"skill":"move_to","arguments":{"place":"exception","path":"line"}}]})")
+                  .out,
+              "far: accepted\n");
+    EXPECT_THAT(submit(R"({"id":"x","steps":[{"skill":"move_to","arguments":{"place":"home","path":"arc"}}]})").err,
+                HasSubstr("/steps/0/arguments/path"));
+  });
+  const std::string told = show("line").out;
+  EXPECT_THAT(told, HasSubstr("SUCCEEDED"));
+  EXPECT_THAT(told, HasSubstr(R"("path":"line")"));
+  EXPECT_THAT(show("far").out, HasSubstr("FAILED"));
+  EXPECT_EQ(report_["limits"]["violations"], 0);
+}
+
 // The brain asks for its parcels under their own names. One that is taken costs it a try, not the parcel.
 TEST_F(Visitor, MayTakeAnIdThatTheBrainWantedItself) {
   during_a_run([&] {

@@ -1,0 +1,40 @@
+// A way round what no way over leads past: planned in joint space, against all that stands and lies there.
+#pragma once
+
+#include <span>
+
+#include "pons/model/collision.hpp"
+#include "pons/motion/motion.hpp"
+#include "pons/skills/scenery.hpp"
+
+namespace pons::skills {
+
+class Detour {
+ public:
+  // `world` must outlive it.
+  Detour(const world::World& world, const model::RobotModel& model);
+
+  // From `start` at `at` to `end`: halts where it is in motion, rises where it is too close to something, goes round on
+  // a path found by sampling (motion/path.hpp), and comes down the same way. The path keeps off what `objects` sweep
+  // over in the next kHorizon; rising and coming down are for the caller to check. The same task, the same way.
+  // Errors: start or end in touch with what is named, or no path.
+  [[nodiscard]] Expected<motion::Trajectory> plan(const AxisState& start, Time at, const motion::Waypoint& end,
+                                                  const Load* load, std::span<const ObjectBelief> objects,
+                                                  const AxisLimits& limits);
+
+  [[nodiscard]] bool has_obstacles() const { return !standing(world_).empty(); }
+  // Whether a motion keeps off the world's own obstacles; where there are none, it does.
+  [[nodiscard]] bool keeps_off(const motion::Trajectory& way, const Load* load);
+
+ private:
+  [[nodiscard]] bool clear(const motion::Trajectory& way);
+  [[nodiscard]] Expected<AxisVector> lifted(const AxisVector& q);
+  [[nodiscard]] Expected<motion::Trajectory> round(const AxisVector& from, Time at, const AxisVector& to,
+                                                   const AxisLimits& limits);
+
+  const world::World& world_;
+  model::RobotModel model_;
+  model::CollisionModel collision_;
+};
+
+}  // namespace pons::skills
