@@ -29,26 +29,84 @@ Expected<void> check_resources(const task::SkillRegistry& skills, const world::W
 // On a computer shared with others a bridge tick comes late by tens of milliseconds.
 constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
+constexpr std::string_view kAttached = "attached";  // a bridge to a body; in the journal
+
+bridge::Resumption resumption(skills::TakeUp::Fate fate) {
+  using Fate = skills::TakeUp::Fate;
+  switch (fate) {
+    case Fate::kGoesOn:
+      return {};
+    case Fate::kDone:
+      return {task::Outcome::kSucceeded, {}};
+    case Fate::kLost:
+      return {task::Outcome::kFailed, "lost from the cups while no bridge lived"};
+    case Fate::kBroken:
+      return {task::Outcome::kFailed, "its bridge was ended in the middle of it"};
+  }
+  return {task::Outcome::kFailed, "unknown"};
+}
+
+// That of the body whose last bridge wrote this journal; empty in one that no bridge of such a body has opened.
+Expected<std::string> body_in(const bridge::Journal& journal) {
+  const auto events = journal.events("");
+  if (!events) return std::unexpected(events.error());
+  std::string body;
+  for (const bridge::Event& event : *events) {
+    if (event.kind == kAttached) body = event.detail.value("body", std::string{});
+  }
+  return body;
+}
+
 }  // namespace
 
-Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
-                                                    const AssemblyOptions& options) {
-  std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
-  auto model = model::RobotModel::load(self->world.robot);
+// ---- below the link ----
+
+Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, const world::Manifest& manifest,
+                                                    std::uint64_t seed, const Meeting& meeting) {
+  if (world.cameras.size() > link::kMaxCameras) {
+    return fail(fmt::format("has {} cameras", world.cameras.size()), (world.folder / "world.yaml").string(),
+                fmt::format("the link has places for {}", link::kMaxCameras));
+  }
+  std::unique_ptr<BodyHalf> self(new BodyHalf(meeting.link));
+  auto model = model::RobotModel::load(world.robot);
   if (!model) return std::unexpected(model.error());
-  auto simulation = sim::Simulation::create(self->world, manifest, options.seed);
+  auto simulation = sim::Simulation::create(world, manifest, seed);
   if (!simulation) return std::unexpected(simulation.error());
   self->simulation = std::move(*simulation);
-  const bool realtime = options.pace == runner::Pace::kRealTime;
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(std::move(*model), cerebellum::Settings{}, Time{});
+  self->photographer = std::make_unique<runner::Photographer>(world, self->simulation->cameras(), meeting.frames,
+                                                              meeting.pages, meeting.pixels, meeting.pace);
+  return self;
+}
+
+runner::BodyParts BodyHalf::parts() {
+  return {.plant = {.body = &simulation->body(),
+                    .cameras = simulation->cameras(),
+                    .advance = [this](Time now) { simulation->advance_to(now); },
+                    .finished = [this] { return simulation->finished(); },
+                    .health = [this] { return simulation->health(); }},
+          .cerebellum = cerebellum.get(),
+          .link = &end,
+          .photographer = photographer.get()};
+}
+
+// ---- above it ----
+
+Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& world, const world::Manifest& manifest,
+                                                        const BridgeOptions& options, const Meeting& meeting) {
+  std::unique_ptr<BridgeHalf> self(new BridgeHalf(meeting.link));
+  auto model = model::RobotModel::load(world.robot);
+  if (!model) return std::unexpected(model.error());
+  const bool realtime = meeting.pace == runner::Pace::kRealTime;
   self->perception = std::make_unique<perception::Perception>(
-      self->world, model->copy(),
+      world, model->copy(),
       [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
-  self->cell = std::make_unique<skills::Cell>(self->bridge_end, self->world, std::move(*model),
+  self->cell = std::make_unique<skills::Cell>(self->end, world, std::move(*model),
                                               realtime ? kRealTimeLead : skills::kSpliceLead);
   self->rest = std::make_unique<skills::Rest>(*self->cell);
+  self->take_up = std::make_unique<skills::TakeUp>(*self->cell);
   skills::add_skills(self->registry, *self->cell);
-  if (auto good = check_resources(self->registry, self->world); !good) return std::unexpected(good.error());
+  if (auto good = check_resources(self->registry, world); !good) return std::unexpected(good.error());
 
   // Before the journal: a run that is refused leaves none behind.
   std::unique_ptr<gate::LocalSocket> socket;
@@ -57,21 +115,13 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
     if (!listening) return std::unexpected(listening.error());
     socket = std::move(*listening);
   }
-  auto journal = bridge::Journal::open(options.journal);
-  if (!journal) return std::unexpected(journal.error());
-  const auto counts = (*journal)->counts();
-  if (!counts) return std::unexpected(counts.error());
-  if (counts->accepted > 0) {
-    return fail("holds an earlier run", options.journal.string(),
-                "name another file for --journal, or move this one away");
-  }
-  self->journal = std::move(*journal);
-  self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, self->world);
-  self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), self->world);
+  if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
+  self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
+  self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
 
   if (socket) self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal);
-  self->crew =
-      std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
+  self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
+                                                      meeting.pixels, meeting.pace);
   std::function<void(Time)> visitors;
   if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
   self->bridge_side =
@@ -79,24 +129,55 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   return self;
 }
 
-runner::SkillPort Assembly::skill_port() {
+Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
+  auto opened = bridge::Journal::open(options.journal);
+  if (!opened) return std::unexpected(opened.error());
+  const auto counts = (*opened)->counts();
+  if (!counts) return std::unexpected(counts.error());
+  const auto earlier = body_in(**opened);
+  if (!earlier) return std::unexpected(earlier.error());
+  const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
+  const bool taken_up = options.body && *earlier == body;
+  if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
+    return fail(options.body ? "holds a run of another body" : "holds an earlier run", options.journal.string(),
+                "name another file for --journal, or move this one away");
+  }
+  journal = std::move(*opened);
+  if (!options.body) return {};
+  if (auto noted = journal->event("", Time{}, kAttached, {{"body", body}}); !noted) return noted;
+  return journal->commit();
+}
+
+runner::SkillPort BridgeHalf::skill_port() {
   return {.refresh = [this](Time now, std::vector<ObjectBelief> objects) { cell->refresh(now, std::move(objects)); },
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
           .arm = [this](Time now) { cell->arm.arm(now); },
-          .rest = [this](Time now) { rest->tick(now); }};
+          .rest = [this](Time now) { rest->tick(now); },
+          .halt = [this] { cell->arm.halt(); },
+          .carries = [this] { return take_up->carries(); },
+          .restore = [this](const task::Json& carried) { take_up->restore(carried); },
+          .resume = [this](const task::Task& task, std::size_t done) { return resumption(take_up->fate(task, done)); },
+          .settle = [this] { take_up->settle(); }};
+}
+
+// ---- both ----
+
+Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
+                                                    const AssemblyOptions& options) {
+  std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
+  const Meeting meeting{self->link, self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(), options.pace};
+  auto body = BodyHalf::build(self->world, manifest, options.seed, meeting);
+  if (!body) return std::unexpected(body.error());
+  self->body = std::move(*body);
+  auto above = BridgeHalf::build(self->world, manifest, {options.journal, options.socket, std::nullopt}, meeting);
+  if (!above) return std::unexpected(above.error());
+  self->above = std::move(*above);
+  return self;
 }
 
 runner::Parts Assembly::parts() {
-  return {.plant = {.body = &simulation->body(),
-                    .cameras = simulation->cameras(),
-                    .advance = [this](Time now) { simulation->advance_to(now); },
-                    .finished = [this] { return simulation->finished(); },
-                    .health = [this] { return simulation->health(); }},
-          .cerebellum = cerebellum.get(),
-          .link = &cerebellum_end,
-          .bridge_side = bridge_side.get(),
-          .crew = crew.get()};
+  return {.body = body->parts(), .bridge_side = above->bridge_side.get(), .observer = above->observer.get()};
 }
 
 }  // namespace pons::apps

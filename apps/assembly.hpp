@@ -1,4 +1,5 @@
 // Puts one cell together: world, simulated body, cerebellum, link, perception, bridge, skills, brain. Nothing runs yet.
+// What lies below the link and what lies above it are put together apart, for they may live in two processes.
 #pragma once
 
 #include <cstdint>
@@ -12,58 +13,112 @@
 #include "pons/bridge/bridge.hpp"
 #include "pons/cerebellum/cerebellum.hpp"
 #include "pons/core/error.hpp"
+#include "pons/link/frames.hpp"
 #include "pons/link/link.hpp"
 #include "pons/perception/perception.hpp"
 #include "pons/runner/bridge_side.hpp"
-#include "pons/runner/camera_crew.hpp"
+#include "pons/runner/darkroom.hpp"
 #include "pons/runner/helper.hpp"
 #include "pons/runner/lockstep.hpp"
+#include "pons/runner/observer.hpp"
+#include "pons/runner/photographer.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/cell.hpp"
 #include "pons/skills/rest.hpp"
 #include "pons/skills/skills.hpp"
+#include "pons/skills/take_up.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::apps {
 
-struct AssemblyOptions {
+// Where both halves meet, and at whose pace. Everything outlives them.
+struct Meeting {
+  link::Link& link;
+  link::Frames& frames;
+  const link::FramePages& pages;
+  std::byte* pixels;
+  runner::Pace pace;
+};
+
+// Members stand in the order in which they need each other.
+class BodyHalf {
+ public:
+  // `world` must outlive it. Errors: whatever a part says about its files; more cameras than the link has places.
+  [[nodiscard]] static Expected<std::unique_ptr<BodyHalf>> build(const world::World& world,
+                                                                 const world::Manifest& manifest, std::uint64_t seed,
+                                                                 const Meeting& meeting);
+  [[nodiscard]] runner::BodyParts parts();
+
+  std::unique_ptr<sim::Simulation> simulation;
+  link::CerebellumEnd end;
+  std::unique_ptr<cerebellum::Cerebellum> cerebellum;
+  std::unique_ptr<runner::Photographer> photographer;
+
+ private:
+  explicit BodyHalf(link::Link& link) : end(link) {}
+};
+
+struct BridgeOptions {
   std::filesystem::path journal;                // ":memory:" for none on disk
   std::optional<std::filesystem::path> socket;  // where visitors may ask
+  // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
+  // holds something is refused. Without: each such.
+  std::optional<std::uint64_t> body;
+};
+
+class BridgeHalf {
+ public:
+  // `world` must outlive it. Errors: whatever a part says about its files. Nothing is left half-written.
+  [[nodiscard]] static Expected<std::unique_ptr<BridgeHalf>> build(const world::World& world,
+                                                                   const world::Manifest& manifest,
+                                                                   const BridgeOptions& options,
+                                                                   const Meeting& meeting);
+
+  link::BridgeEnd end;
+  std::unique_ptr<bridge::Journal> journal;
+  runner::Helper helper;  // perception's
+  std::unique_ptr<perception::Perception> perception;
+  std::unique_ptr<skills::Cell> cell;
+  std::unique_ptr<skills::Rest> rest;
+  std::unique_ptr<skills::TakeUp> take_up;
+  task::SkillRegistry registry;
+  std::unique_ptr<bridge::Bridge> bridge;
+  std::unique_ptr<brain::Dispatcher> dispatcher;
+  std::unique_ptr<Desk> desk;
+  std::unique_ptr<runner::Observer> observer;
+  std::unique_ptr<runner::BridgeSide> bridge_side;
+
+ private:
+  explicit BridgeHalf(link::Link& link) : end(link) {}
+  [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
+  [[nodiscard]] runner::SkillPort skill_port();
+};
+
+struct AssemblyOptions {
+  std::filesystem::path journal;                // as in BridgeOptions
+  std::optional<std::filesystem::path> socket;  // likewise
   std::uint64_t seed = 1;
   runner::Pace pace = runner::Pace::kLockstep;
 };
 
-// Members stand in the order in which they need each other.
+// Both halves in this process.
 class Assembly {
  public:
-  // Errors: whatever a part says about its files. Nothing is left half-written.
+  // Errors: those of the halves.
   [[nodiscard]] static Expected<std::unique_ptr<Assembly>> build(world::World world, const world::Manifest& manifest,
                                                                  const AssemblyOptions& options);
 
   [[nodiscard]] runner::Parts parts();
 
   world::World world;
-  std::unique_ptr<sim::Simulation> simulation;
-  std::unique_ptr<bridge::Journal> journal;
   link::Link link;
-  link::BridgeEnd bridge_end{link};
-  link::CerebellumEnd cerebellum_end{link};
-  std::unique_ptr<cerebellum::Cerebellum> cerebellum;
-  runner::Helper helper;  // perception's
-  std::unique_ptr<perception::Perception> perception;
-  std::unique_ptr<skills::Cell> cell;
-  std::unique_ptr<skills::Rest> rest;
-  task::SkillRegistry registry;
-  std::unique_ptr<bridge::Bridge> bridge;
-  std::unique_ptr<brain::Dispatcher> dispatcher;
-  std::unique_ptr<Desk> desk;
-  std::unique_ptr<runner::CameraCrew> crew;
-  std::unique_ptr<runner::BridgeSide> bridge_side;
+  runner::Darkroom darkroom{world};
+  std::unique_ptr<BodyHalf> body;
+  std::unique_ptr<BridgeHalf> above;
 
  private:
   explicit Assembly(world::World w) : world(std::move(w)) {}
-  [[nodiscard]] runner::SkillPort skill_port();
 };
 
 }  // namespace pons::apps

@@ -13,11 +13,14 @@ namespace pons::apps {
 inline constexpr int kExitGood = 0;
 inline constexpr int kExitBadRun = 1;    // parcels lost or missorted, a limit broken, a part failed
 inline constexpr int kExitBadInput = 2;  // what was asked cannot be done: one line says why
+inline constexpr int kExitBodyGone = 3;  // pons bridge: its body has died or was ended
 inline constexpr int kExitInterrupted = 130;
 
 using Chosen = std::function<int()>;  // returns the exit code
 
 void add_run(CLI::App& app, Chosen& chosen);
+void add_body(CLI::App& app, Chosen& chosen);
+void add_bridge(CLI::App& app, Chosen& chosen);
 void add_worlds(CLI::App& app, Chosen& chosen);
 void add_skills(CLI::App& app, Chosen& chosen);
 void add_task(CLI::App& app, Chosen& chosen);

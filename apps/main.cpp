@@ -40,6 +40,8 @@ int run_command_line(int argc, char** argv) {
   app.footer("Start with: pons run parcel_cell");
   Chosen chosen;
   add_run(app, chosen);
+  add_body(app, chosen);
+  add_bridge(app, chosen);
   add_worlds(app, chosen);
   add_skills(app, chosen);
   add_task(app, chosen);

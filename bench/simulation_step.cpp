@@ -61,12 +61,12 @@ struct Rehearsal {
 
 Rehearsal rehearse(const world::World& world, const world::Manifest& manifest, std::uint64_t seed) {
   const auto cell = must(apps::Assembly::build(world, manifest, {.journal = ":memory:", .socket = {}, .seed = seed}));
-  sim::Simulation& simulation = *cell->simulation;
+  sim::Simulation& simulation = *cell->body->simulation;
   Listener listener(simulation.body(), world.robot.home.size());
   Rehearsal rehearsal;
   runner::Parts parts = cell->parts();
-  parts.plant.body = &listener;
-  parts.plant.advance = [&](Time now) {
+  parts.body.plant.body = &listener;
+  parts.body.plant.advance = [&](Time now) {
     rehearsal.told.push_back(listener.told());
     simulation.advance_to(now);
   };

@@ -44,7 +44,8 @@ class Body {
 };
 
 // A camera: begin() opens the shutter, finish() waits for the picture. begin is called by whoever advances the body;
-// finish may be called by another thread. At most one frame is under way.
+// finish may be called by another thread. At most one frame is under way. Its pixels are written where the frame's
+// arrays lie, when these have the camera's size.
 class Camera {
  public:
   virtual ~Camera() = default;

@@ -43,6 +43,8 @@ double left_s(const ObjectBelief& belief, const world::Belt& belt) {
   return (belt.pick_x_max_m - belief.world_from_top.translation().x()) / speed_m_s(belief, belt);
 }
 
+std::string id_of(const std::string& code, int tries) { return tries == 1 ? code : code + "." + std::to_string(tries); }
+
 bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
   return std::any_of(all.begin(), all.end(),
                      [&](const ObjectBelief& other) { return lies_on(other, belief) || is_part(other, belief); });
@@ -65,6 +67,32 @@ bool Dispatcher::heard(std::string_view id, task::Outcome outcome) {
   ++tally_.settled;
   if (known.sorted) ++tally_.sorted;
   return true;
+}
+
+void Dispatcher::recall(const task::Task& task, std::optional<task::Outcome> outcome) {
+  if (task.steps.empty() || task.steps.front().skill != "pick") return;
+  const std::string code = task.steps.front().arguments.value("object", std::string{});
+  if (!orders_.contains(code)) return;
+  Known& known = known_[code];
+  int number = known.tries + 1;  // one that was refused is in no journal
+  while (number <= kMostTries && task.id != id_of(code, number)) ++number;
+  if (number > kMostTries) return;
+  if (known.tries > 0 || known.rode) --tally_.settled;
+  known.tries = number;
+  known.asked = true;
+  known.failed = false;
+  asked_.emplace(task.id, code);
+  if (outcome) heard(task.id, *outcome);
+}
+
+void Dispatcher::recall_ride(std::string_view code) {
+  if (code.empty()) {
+    ++tally_.settled;
+    return;
+  }
+  Known& known = known_[std::string(code)];
+  if (known.tries == 0 && !known.rode) ++tally_.settled;
+  known.rode = true;
 }
 
 Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now) {
@@ -165,7 +193,7 @@ Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tr
   // slack, too, is the same for all: what a belt that slows down may add.
   const double nominal_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
   const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s * (1 / (1 - belt.speed_variation) - 1);
-  return {{"id", tries == 1 ? belief.code : belief.code + "." + std::to_string(tries)},
+  return {{"id", id_of(belief.code, tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
           {"deadline_s", now.s() + nominal_s + slack_s},
           {"steps",

@@ -66,6 +66,11 @@ class Dispatcher {
   [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now);
   // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
   bool heard(std::string_view id, task::Outcome outcome);
+  // What an earlier dispatcher asked for in this run, and what became of it, in that order, before the first observe():
+  // nothing when it is still open. Tasks that no dispatcher asked for are passed over.
+  void recall(const task::Task& task, std::optional<task::Outcome> outcome);
+  // What it let ride; `code` may be empty.
+  void recall_ride(std::string_view code);
   [[nodiscard]] const Tally& tally() const { return tally_; }
 
   // Orders that nothing was decided about, in their order.

@@ -288,6 +288,28 @@ TEST_F(DispatcherTest, WhatDoesNotPassItsChuteRides) {
   EXPECT_EQ(only_reason({.rides = decided.rides}), kRideTooLarge);
 }
 
+// What an earlier dispatcher did, told to the next.
+TEST_F(DispatcherTest, RecallsWhatWasAskedForAndWhatBecameOfIt) {
+  const auto task = [](const std::string& id, const std::string& code) {
+    return task::Task{.id = id, .steps = {{"pick", {{"object", code}}}, {"place", {{"object", code}}}}};
+  };
+  dispatcher_.recall(task("P1", "P1"), task::Outcome::kSucceeded);
+  dispatcher_.recall(task("P2", "P2"), task::Outcome::kFailed);
+  dispatcher_.recall(task("P3", "P3"), std::nullopt);
+  dispatcher_.recall(task("visitor", "P3"), std::nullopt);
+  dispatcher_.recall_ride("");
+  EXPECT_EQ(dispatcher_.tally().sorted, 1);
+  EXPECT_EQ(dispatcher_.tally().settled, 3);
+  EXPECT_TRUE(dispatcher_.unseen().empty());
+  EXPECT_TRUE(dispatcher_.observe({parcel(1, 0, "P2"), parcel(2, -0.3, "P3")}, at(1)).tasks.empty());
+  const Decisions later = dispatcher_.observe({parcel(1, 0.4, "P2"), parcel(2, 0.1, "P3")}, at(2));
+  ASSERT_EQ(later.tasks.size(), 1U) << "P3's task is still open";
+  EXPECT_EQ(later.tasks[0].at("id"), "P2.2") << "an id comes once in a run";
+  EXPECT_TRUE(dispatcher_.heard("P3", task::Outcome::kSucceeded));
+  EXPECT_FALSE(dispatcher_.heard("P1", task::Outcome::kSucceeded)) << "it has been heard";
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(4, 0.6, "P1")}, at(3))), kRideTwice);
+}
+
 TEST_F(DispatcherTest, WithoutALabelCameraTheReachIsTheEnd) {
   world::World blind = small_world();
   blind.cameras.clear();

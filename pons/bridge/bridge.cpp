@@ -11,6 +11,9 @@
 namespace pons::bridge {
 namespace {
 
+// Before whatever a brain may ask for: it holds what the next one would need.
+constexpr int kResumedPriority = 101;
+
 // Events between the durable moments of a task may wait this long for the disk.
 constexpr Duration kCommitPeriod = std::chrono::seconds(5);
 
@@ -41,6 +44,7 @@ std::string_view word(task::Status status) {
 struct Bridge::Open {
   task::Task task;
   Time accepted;
+  std::size_t done = 0;     // steps that an earlier bridge has seen succeed
   tree::Observer observer;  // the tree refers to it
   tree::NodePtr root;       // empty while queued
   Time give_up_at;          // by then every step has had its timeout, and grace to leave the world safe
@@ -88,18 +92,73 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   return Admission{std::move(id), *accepted};
 }
 
-void Bridge::enqueue(task::Task task, Time now) {
+std::vector<std::string> Bridge::resources_of(const task::Task& task) const {
   std::vector<std::string> resources;
   for (const task::Step& step : task.steps) {
     const auto& needs = skills_.find(step.skill)->resources;
     resources.insert(resources.end(), needs.begin(), needs.end());
   }
-  arbiter_.add(task.id, task.priority, task.deadline, resources);
+  return resources;
+}
+
+void Bridge::enqueue(task::Task task, Time now) {
+  arbiter_.add(task.id, task.priority, task.deadline, resources_of(task));
   auto open = std::make_unique<Open>();
   open->accepted = now;
   std::string id = task.id;
   open->task = std::move(task);
   open_.emplace(std::move(id), std::move(open));
+}
+
+// ---- after another bridge ----
+
+Expected<void> Bridge::recover(const Resume& resume, Time now) {
+  const auto tasks = journal_.tasks();
+  if (!tasks) return std::unexpected(tasks.error());
+  for (const TaskRecord& record : *tasks) {
+    if (record.outcome) continue;
+    // Its skills and places are those of the program and the world that run now.
+    if (auto good = review_.check(record.task, record.accepted); !good) {
+      finish_unopened(record.task.id, task::Outcome::kFailed, good.error().line(), now);
+    } else if (!record.started) {
+      enqueue(record.task, record.accepted);
+    } else if (auto taken = take_up(record.task, resume, now); !taken) {
+      return taken;
+    }
+  }
+  keep_notes(now);
+  if (fault_) return std::unexpected(*fault_);
+  return {};
+}
+
+Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Time now) {
+  const auto events = journal_.events(task.id);
+  if (!events) return std::unexpected(events.error());
+  std::size_t done = 0;
+  for (const Event& event : *events) {
+    if (event.kind == "attempt_ended" && event.detail.value("status", std::string{}) == word(task::Status::kSucceeded))
+      done = std::max(done, event.detail.value("step", std::size_t{0}) + 1);
+  }
+  done = std::min(done, task.steps.size());
+  const Resumption what = done == task.steps.size() ? Resumption{task::Outcome::kSucceeded, {}} : resume(task, done);
+  if (what.outcome) {
+    finish_unopened(task.id, *what.outcome, what.reason, now);
+    return {};
+  }
+  keep(journal_.event(task.id, now, "resumed", {{"step", done}}));
+  arbiter_.add(task.id, kResumedPriority, std::nullopt, resources_of(task));
+  auto open = std::make_unique<Open>();
+  open->accepted = now;
+  open->done = done;
+  open->task = task;
+  open_.emplace(task.id, std::move(open));
+  return {};
+}
+
+void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now) {
+  const auto written = journal_.outcome(id, outcome, reason, now);
+  keep(written);
+  if (written) outcomes_.push_back({id, outcome, reason, Json::object()});
 }
 
 Expected<void> Bridge::cancel(std::string_view id, Time now, std::string_view reason) {
@@ -139,10 +198,7 @@ void Bridge::tick(Time now) {
   tick_trees(running(), now);
   expire(now);
   tick_trees(start_granted(now), now);
-  if (now - last_commit_ >= kCommitPeriod) {
-    last_commit_ = now;
-    keep(journal_.commit());
-  }
+  if (now - last_commit_ >= kCommitPeriod) keep_notes(now);
   if (!fault_) return;
   for (auto& [id, open] : open_) cancel_running(*open, now, "the bridge has stopped: " + fault_->what);
   for (const std::string& id : arbiter_.queue()) {
@@ -165,13 +221,14 @@ std::vector<std::string> Bridge::start_granted(Time now) {
     Open& open = *open_.find(id)->second;
     keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
     open.observer = [this, id](const tree::Attempt& attempt, Time when) { journal_attempt(id, attempt, when); };
-    open.root = tree::from_steps(open.task.steps, skills_, open.observer);
+    const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
+                                       open.task.steps.end());
+    open.root = tree::from_steps(left, skills_, open.observer);
     open.give_up_at = now;
     for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
   }
   // Before anything moves: after a crash nobody may take these for tasks that have not begun.
-  last_commit_ = now;
-  keep(journal_.commit());
+  keep_notes(now);
   return granted;
 }
 
@@ -224,7 +281,7 @@ void Bridge::finish(const std::string& id, task::Outcome outcome, std::string re
 
 void Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {
   Open& open = *open_.find(id)->second;
-  Json detail{{"step", attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};
+  Json detail{{"step", open.done + attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};
   if (attempt.ended == nullptr) {
     ++open.attempts;
     if (attempt.number > 1) ++retries_;
@@ -242,6 +299,11 @@ void Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt
 // ---- out ----
 
 void Bridge::note(std::string_view kind, const Json& detail, Time now) { keep(journal_.event("", now, kind, detail)); }
+
+void Bridge::keep_notes(Time now) {
+  last_commit_ = now;
+  keep(journal_.commit());
+}
 
 std::vector<OutcomeReport> Bridge::take_outcomes() { return std::exchange(outcomes_, {}); }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -40,6 +41,14 @@ struct OutcomeReport {
   Json detail = Json::object();  // {"attempts":…, "steps":[{"skill":…,"detail":…}]}
 };
 
+// What shall become of a task that a bridge which is no more had begun.
+struct Resumption {
+  std::optional<task::Outcome> outcome;  // nothing: it goes on
+  std::string reason;                    // of the outcome
+};
+// `done`: so many of its first steps have succeeded.
+using Resume = std::function<Resumption(const task::Task& task, std::size_t done)>;
+
 class Bridge {
  public:
   // All three must outlive it; `skills` must not change.
@@ -51,6 +60,10 @@ class Bridge {
   // Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge is stopping, or
   // the journal cannot be written. An error leaves nothing behind.
   [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);
+  // Takes up what the journal's last owner left open, before the first tick. Tasks not begun wait again; of those
+  // begun, `resume` says which go on, with the first step that is not known to have succeeded and before all others,
+  // and which end, and how. Error: the journal cannot be read or written.
+  [[nodiscard]] Expected<void> recover(const Resume& resume, Time now);
   void tick(Time now);
   // Queued: ends as CANCELLED at once. Running: the skill leaves the world safe first. Error: no such open task.
   [[nodiscard]] Expected<void> cancel(std::string_view id, Time now, std::string_view reason);
@@ -62,6 +75,8 @@ class Bridge {
 
   // A journal entry of no task.
   void note(std::string_view kind, const Json& detail, Time now);
+  // Makes all that was noted so far durable.
+  void keep_notes(Time now);
 
   // Since the last call, in the order of their writing.
   [[nodiscard]] std::vector<OutcomeReport> take_outcomes();
@@ -82,7 +97,9 @@ class Bridge {
   struct Open;  // an accepted task without an outcome
 
   [[nodiscard]] Expected<Admission> admit(std::string_view json, Time now);
+  [[nodiscard]] std::vector<std::string> resources_of(const task::Task& task) const;
   void enqueue(task::Task task, Time now);
+  [[nodiscard]] Expected<void> take_up(const task::Task& task, const Resume& resume, Time now);
   void expire(Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
@@ -90,6 +107,7 @@ class Bridge {
   void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
   void cancel_running(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
+  void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now);
   void journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
   void keep(const Expected<void>& written);
   void set_fault(Error error);

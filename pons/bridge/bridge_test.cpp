@@ -86,6 +86,51 @@ TEST_F(BridgeTest, RunsATaskFromSubmissionToOutcome) {
   EXPECT_TRUE(bridge_->idle());
 }
 
+// A bridge is ended while its second step runs; the next one opens the journal.
+TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
+  const auto task = [](const std::string& id) {
+    return fmt::format(R"({{"id":"{}","steps":[{{"skill":"pick"}},{{"skill":"slow"}}]}})", id);
+  };
+  ASSERT_TRUE(bridge_->submit(task("begun"), now_));
+  for (int i = 0; i < 20; ++i) bridge_->tick(now_ += from_s(0.01));
+  bridge_->keep_notes(now_);
+  ASSERT_TRUE(submit("waits", "pick"));
+  reopen();
+  std::vector<std::pair<std::string, std::size_t>> asked;
+  ASSERT_TRUE(bridge_->recover(
+      [&](const task::Task& begun, std::size_t done) -> Resumption {
+        asked.emplace_back(begun.id, done);
+        return {};
+      },
+      now_));
+  EXPECT_EQ(asked, (std::vector<std::pair<std::string, std::size_t>>{{"begun", 1}}));
+  EXPECT_EQ(bridge_->queue(), (std::vector<std::string>{"begun", "waits"})) << "what was begun goes first";
+  const std::size_t picks = pick_.log.started.size(), slows = slow_.log.started.size();
+  bridge_->tick(now_);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"begun"});
+  EXPECT_EQ(pick_.log.started.size(), picks) << "not done twice";
+  EXPECT_EQ(slow_.log.started.size(), slows + 1);
+  const auto events = journal_->events("begun").value();
+  EXPECT_EQ(events.back().detail.at("step"), 1) << "counted from the task's first";
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2U);
+  EXPECT_EQ(reports[1].outcome, Outcome::kSucceeded);
+}
+
+TEST_F(BridgeTest, WhatCannotGoOnEndsWhenAnotherBridgeComes) {
+  ASSERT_TRUE(submit("a", "slow"));
+  bridge_->tick(now_);
+  reopen();
+  ASSERT_TRUE(bridge_->recover(
+      [](const task::Task&, std::size_t) { return Resumption{Outcome::kFailed, "nothing held"}; }, now_));
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_EQ(recorded("a")->outcome, Outcome::kFailed);
+  EXPECT_EQ(recorded("a")->reason, "nothing held");
+  const auto reports = bridge_->take_outcomes();
+  ASSERT_EQ(reports.size(), 1U);
+  EXPECT_EQ(reports[0].id, "a");
+}
+
 TEST_F(BridgeTest, OneTaskHoldsTheArmAndTheNextStartsInTheTickThatFreesIt) {
   ASSERT_TRUE(submit("a", "pick"));
   ASSERT_TRUE(submit("b", "pick"));

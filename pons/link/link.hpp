@@ -1,7 +1,9 @@
-// The link inside one process: the only way from the bridge to the cerebellum. Commands go down through a ring (all of
-// them, in order), states come up through a triple buffer (the newest), and one word stops everything.
+// The link, inside one process or in memory that two share: the only way from the bridge to the cerebellum. Commands go
+// down through a ring (all of them, in order), states come up through a triple buffer (the newest), and one word stops
+// everything.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 
 #include "pons/core/realtime.hpp"
@@ -12,7 +14,8 @@
 
 namespace pons::link {
 
-// Some 600 KiB: keep it on the heap. Outlives both ends.
+// Some 600 KiB: keep it on the heap. Outlives both ends. No pointer is in it, and either side may be killed at any
+// instant: the other sees whole commands and states only.
 class Link {
  public:
   static constexpr std::size_t kCommands = 1024;
@@ -27,14 +30,18 @@ class Link {
   friend class BridgeEnd;
   friend class CerebellumEnd;
   rt::SpscRing<Command, kCommands> commands_;
+  std::atomic<std::size_t> first_{0};  // command of the present bridge's end; what stands before is a dead one's
   rt::TripleBuffer<State> states_;
   rt::WakeWord emergency_;
 };
 
-// The bridge's end. One thread.
+// The bridge's end. One thread, and one at a time: what the one before it had sent and the cerebellum has not yet taken
+// in, is never taken in.
 class BridgeEnd {
  public:
-  explicit BridgeEnd(Link& link) : link_(link) {}
+  explicit BridgeEnd(Link& link) : link_(link) {
+    link_.first_.store(link_.commands_.take_over(), std::memory_order_release);
+  }
 
   // False when the ring is full (the cerebellum does not take commands): nothing was sent.
   [[nodiscard]] bool send(const Command& command) PONS_NONBLOCKING { return link_.commands_.push(command); }
@@ -57,7 +64,10 @@ class CerebellumEnd {
   explicit CerebellumEnd(Link& link) : link_(link) {}
 
   // False when there is none.
-  [[nodiscard]] bool receive(Command& command) PONS_NONBLOCKING { return link_.commands_.pop(command); }
+  [[nodiscard]] bool receive(Command& command) PONS_NONBLOCKING {
+    link_.commands_.drop_before(link_.first_.load(std::memory_order_acquire));
+    return link_.commands_.pop(command);
+  }
   void publish(const State& state) PONS_NONBLOCKING { link_.states_.write(state); }
   [[nodiscard]] bool emergency_stop_raised() const PONS_NONBLOCKING { return link_.emergency_stop_raised(); }
   // What the loop sleeps on: it changes with raise_ and clear_emergency_stop().

@@ -31,6 +31,27 @@ TEST(Link, CommandsGoDownInOrderAndRefuseWhenFull) {
   EXPECT_FALSE(cerebellum.receive(command));
 }
 
+TEST(Link, ANewBridgesEndLeavesItsPredecessorsCommandsBehind) {
+  const auto link = std::make_unique<Link>();
+  CerebellumEnd cerebellum(*link);
+  Command command;
+  {
+    BridgeEnd dead(*link);
+    for (command.sequence = 0; command.sequence < Link::kCommands - 1; ++command.sequence)
+      ASSERT_TRUE(dead.send(command));
+  }
+  ASSERT_TRUE(cerebellum.receive(command));
+  EXPECT_EQ(command.sequence, 0U);
+  BridgeEnd bridge(*link);
+  EXPECT_FALSE(cerebellum.receive(command)) << "what was queued by one that is no more moves nothing";
+  EXPECT_EQ(bridge.room(), Link::kCommands);
+  for (command.sequence = 5000; bridge.send(command); ++command.sequence) {
+  }
+  EXPECT_EQ(command.sequence, 5000 + Link::kCommands) << "and takes no room";
+  ASSERT_TRUE(cerebellum.receive(command));
+  EXPECT_EQ(command.sequence, 5000U);
+}
+
 TEST(Link, TheNewestStateComesUp) {
   const auto link = std::make_unique<Link>();
   BridgeEnd bridge(*link);

@@ -69,6 +69,24 @@ TEST(SpscRing, EveryElementArrivesOnceInOrderBetweenThreads) {
   EXPECT_FALSE(ring->pop(got));
 }
 
+TEST(SpscRing, WhatADeadProducerPushedCanBeDropped) {
+  SpscRing<int, 4> ring;
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(ring.push(i));
+  int value = -1;
+  EXPECT_TRUE(ring.pop(value));
+  const std::size_t mark = ring.take_over();
+  EXPECT_TRUE(ring.push(10));
+  EXPECT_FALSE(ring.push(11)) << "until the consumer drops them, they take room";
+  ring.drop_before(mark);
+  EXPECT_TRUE(ring.pop(value));
+  EXPECT_EQ(value, 10);
+  EXPECT_FALSE(ring.pop(value));
+  ring.drop_before(mark);
+  EXPECT_TRUE(ring.push(12));
+  EXPECT_TRUE(ring.pop(value));
+  EXPECT_EQ(value, 12) << "once is enough";
+}
+
 TEST(TripleBuffer, ReadsTheNewestAndKeepsIt) {
   TripleBuffer<int> buffer(7);
   EXPECT_EQ(buffer.read(), 7);

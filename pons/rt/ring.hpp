@@ -1,4 +1,5 @@
-// A stream from one thread to one other: every element arrives, once, in order. Wait-free on both sides.
+// A stream from one thread to one other, of this process or another: every element arrives, once, in order. Wait-free
+// on both sides.
 #pragma once
 
 #include <array>
@@ -11,6 +12,9 @@ namespace pons::rt {
 
 // Lamport's single-producer single-consumer queue (1983) with each side's last view of the other cached, so that a push
 // or pop touches the other side's cache line only when it must. T is copied; give it a copy that cannot throw.
+//
+// In shared memory a producer may be killed at any instant: half an element is never seen, and the next producer begins
+// with take_over(). A consumer that is killed in pop() leaves an element that its successor would get once more.
 template <typename T, std::size_t Capacity>
 class SpscRing {
   static_assert(Capacity > 0 && (Capacity & (Capacity - 1)) == 0, "a power of two");
@@ -40,6 +44,19 @@ class SpscRing {
     value = slots_[head % Capacity];
     head_.store(head + 1, std::memory_order_release);
     return true;
+  }
+
+  // A new producer's first call, when the one before it is dead: goes on where that one's last whole element ended, and
+  // says where that is. What that one pushed stays, unless the consumer is told to drop_before() there.
+  [[nodiscard]] std::size_t take_over() PONS_NONBLOCKING {
+    head_seen_ = head_.load(std::memory_order_acquire);
+    return tail_.load(std::memory_order_relaxed);
+  }
+  // Consumer only: what was pushed before `position`, which take_over() has said, is never popped.
+  void drop_before(std::size_t position) PONS_NONBLOCKING {
+    if (head_.load(std::memory_order_relaxed) >= position) return;
+    if (tail_seen_ < position) tail_seen_ = position;
+    head_.store(position, std::memory_order_release);
   }
 
   // Producer only: how many elements push() is sure to take now.

@@ -153,6 +153,14 @@ Expected<SharedMemory> SharedMemory::open(const std::string& name, const Layout&
   return memory;
 }
 
+bool SharedMemory::is_owned(const std::string& name) {
+  const int file = check_name(name) ? ::open(path_of(name).c_str(), O_RDWR | O_CLOEXEC) : -1;
+  if (file < 0) return false;
+  const bool owned = is_taken(file, Role::kOwner);
+  close(file);
+  return owned;
+}
+
 bool SharedMemory::other_lives() const {
   return file_ >= 0 && is_taken(file_, role_ == Role::kOwner ? Role::kUser : Role::kOwner);
 }

@@ -41,6 +41,9 @@ class SharedMemory {
   // Errors: a bad name, nobody owns it, its owner has died, another user has it, of another version, not whole.
   [[nodiscard]] static Expected<SharedMemory> open(const std::string& name, const Layout& layout);
 
+  // Whether a living owner has published something under that name: open() may still refuse it.
+  [[nodiscard]] static bool is_owned(const std::string& name);
+
   [[nodiscard]] std::byte* data() const { return bytes_; }
   // Whether the other side lives and has it open. A system call: not inside a tick.
   [[nodiscard]] bool other_lives() const;
@@ -62,11 +65,13 @@ class Shared {
   static_assert(std::is_trivially_destructible_v<T>);
 
  public:
-  [[nodiscard]] static Expected<Shared> make(const std::string& name) {
+  // The object is made from `arguments` before anybody sees it.
+  template <typename... Arguments>
+  [[nodiscard]] static Expected<Shared> make(const std::string& name, const Arguments&... arguments) {
     auto memory = SharedMemory::make(name, layout());
     if (!memory) return std::unexpected(memory.error());
     Shared shared(std::move(*memory), nullptr);
-    shared.object_ = std::construct_at(reinterpret_cast<T*>(shared.memory_.data()));
+    shared.object_ = std::construct_at(reinterpret_cast<T*>(shared.memory_.data()), arguments...);
     if (auto published = shared.memory_.publish(); !published) return std::unexpected(published.error());
     return shared;
   }

@@ -6,12 +6,15 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <functional>
 
 #include "pons/rt/ring.hpp"
+#include "pons/rt/triple_buffer.hpp"
 #include "pons/rt/wake_word.hpp"
 
 namespace pons::rt {
@@ -112,6 +115,66 @@ TEST_F(SharedMemoryTest, EachSideSeesTheOtherDieAndAnotherUserMayFollow) {
   }
   EXPECT_FALSE(next->other_lives());
   EXPECT_EQ((*next)->word.value(), 1U) << "the user keeps its pages";
+}
+
+// Every word of an element repeats its number.
+struct Element {
+  std::array<std::uint64_t, 64> words{};
+  [[nodiscard]] bool whole() const {
+    return std::ranges::all_of(words, [&](std::uint64_t word) { return word == words[0]; });
+  }
+  static Element of(std::uint64_t number) {
+    Element element;
+    element.words.fill(number);
+    return element;
+  }
+};
+struct Both {
+  static constexpr std::uint64_t kVersion = 9;
+  SpscRing<Element, 64> down;
+  std::atomic<std::size_t> first{0};
+  TripleBuffer<Element> up;
+  std::atomic<std::uint64_t> torn{0};
+};
+
+// The user is killed again and again wherever it is in a push or read; the next one goes on.
+TEST_F(SharedMemoryTest, AUserThatIsKilledLeavesItsChannelsUsable) {
+  constexpr int kKills = 40;
+  const auto owner = Shared<Both>::make(name_);
+  ASSERT_TRUE(owner) << owner.error().line();
+  Both& both = **owner;
+  const auto work = [this](std::uint64_t sender) {
+    const auto user = Shared<Both>::open(name_);
+    if (!user) return 1;
+    (*user)->first.store((*user)->down.take_over());
+    std::uint64_t last = 0;
+    for (std::uint64_t i = 1;; ++i) {
+      (void)(*user)->down.push(Element::of((sender << 32U) + i));
+      const Element& state = (*user)->up.read();
+      if (!state.whole() || state.words[0] < last) (*user)->torn.fetch_add(1);
+      last = state.words[0];
+    }
+  };
+  std::uint64_t written = 0, newest = 0, popped = 0;
+  for (std::uint64_t sender = 1; sender <= kKills; ++sender) {
+    const pid_t child = in_a_process([&] { return work(sender); });
+    Element got;
+    for (std::uint64_t of_this = 0; of_this < 500 + 37 * sender;) {
+      both.up.write(Element::of(++written));
+      both.down.drop_before(both.first.load());
+      if (!both.down.pop(got)) continue;
+      ASSERT_TRUE(got.whole());
+      ASSERT_GT(got.words[0], newest);
+      newest = got.words[0];
+      of_this += newest >> 32U == sender ? 1 : 0;
+      ++popped;
+    }
+    kill(child, SIGKILL);
+    ASSERT_EQ(wait_for(child), -SIGKILL);
+  }
+  EXPECT_GT(popped, 20'000U);
+  EXPECT_EQ(both.torn.load(), 0U);
+  EXPECT_EQ(both.up.read().words[0], written);
 }
 
 TEST_F(SharedMemoryTest, AnOwnerThatWasKilledLeavesNothingInTheWayOfTheNext) {

@@ -9,11 +9,25 @@
 
 namespace pons::rt {
 
-void WakeWord::set(std::uint32_t value) {
+namespace {
+
+void wake_all(std::atomic<std::uint32_t>& word) {
   const int before = errno;  // a signal handler must leave it as it was
-  word_.store(value, std::memory_order_release);
-  syscall(SYS_futex, &word_, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
+  // Not the private kind: who sleeps may be another process.
+  syscall(SYS_futex, &word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
   errno = before;
+}
+
+}  // namespace
+
+void WakeWord::set(std::uint32_t value) {
+  word_.store(value, std::memory_order_release);
+  wake_all(word_);
+}
+
+void WakeWord::bump() {
+  word_.fetch_add(1, std::memory_order_acq_rel);
+  wake_all(word_);
 }
 
 WakeWord::Woken WakeWord::wait(std::uint32_t seen, const timespec& deadline) const {

@@ -21,6 +21,9 @@ class WakeWord {
   // which never blocks.
   void set(std::uint32_t value);
 
+  // The same, to a value that it did not have: for words that only say that something has changed.
+  void bump();
+
   // Sleeps while the word is `seen`, until CLOCK_MONOTONIC is at `deadline` (absolute). kChanged whenever the word is
   // another, also when it was so before.
   [[nodiscard]] Woken wait(std::uint32_t seen, const timespec& deadline) const;

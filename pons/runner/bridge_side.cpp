@@ -25,10 +25,29 @@ BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, Sk
                        std::function<void(Time)> visitors)
     : bridge_(bridge), dispatcher_(dispatcher), skills_(std::move(skills)), visitors_(std::move(visitors)) {}
 
-Expected<void> BridgeSide::tick(Time now, CameraCrew& crew) {
-  auto snapshot = crew.collect(now, std::exchange(forgotten_, {}));
-  if (!snapshot) return std::unexpected(snapshot.error());
-  if (*snapshot) take_in(**snapshot, now);
+Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
+  const auto tasks = journal.tasks();
+  if (!tasks) return std::unexpected(tasks.error());
+  for (const bridge::TaskRecord& record : *tasks) {
+    dispatcher_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
+    if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
+  }
+  const auto events = journal.events("");
+  if (!events) return std::unexpected(events.error());
+  for (const bridge::Event& event : *events) {
+    if (event.kind == "ride") dispatcher_.recall_ride(event.detail.value("code", std::string{}));
+    if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
+  }
+  skills_.refresh(now, {});
+  took_over_ = true;
+  yielding_ = skills_.state().safety == SafetyState::kOperational;
+  if (yielding_) skills_.halt();
+  skills_.restore(carried_);
+  return bridge_.recover(skills_.resume, now);
+}
+
+Expected<void> BridgeSide::tick(Time now, Observer& observer) {
+  if (const auto snapshot = observer.collect(now, std::exchange(forgotten_, {}))) take_in(*snapshot, now);
 
   const double belt_travel_m = skills_.state().belt_travel_m;
   const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
@@ -42,6 +61,7 @@ Expected<void> BridgeSide::tick(Time now, CameraCrew& crew) {
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
   if (bridge_.running().empty()) skills_.rest(now);
+  note_carried(now);
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
@@ -94,9 +114,23 @@ void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   }
 }
 
+// Durable at once: a bridge that comes after this one must know what hangs there.
+void BridgeSide::note_carried(Time now) {
+  Json carries = skills_.carries();
+  if (carries == carried_) return;
+  carried_ = std::move(carries);
+  bridge_.note("carries", {{"load", carried_}}, now);
+  bridge_.keep_notes(now);
+}
+
 void BridgeSide::look_after_arm(Time now) {
   const link::State& state = skills_.state();
-  const bool operational = state.safety == SafetyState::kOperational;
+  yielding_ = yielding_ && state.safety == SafetyState::kOperational;
+  const bool operational = state.safety == SafetyState::kOperational && !yielding_;
+  if (operational && took_over_) {
+    skills_.settle();
+    took_over_ = false;
+  }
   bridge_.hold(operational ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
   if (was_operational_ && !operational) {
     ++stops_;

@@ -12,7 +12,7 @@
 #include "pons/brain/dispatcher.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/link/message.hpp"
-#include "pons/runner/camera_crew.hpp"
+#include "pons/runner/observer.hpp"
 
 namespace pons::runner {
 
@@ -26,6 +26,13 @@ struct SkillPort {
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
   std::function<void(Time)> arm;                               // one step out of a stop, towards operational
   std::function<void(Time)> rest;                              // once a period while no skill runs
+  std::function<void()> halt;                                  // a protective stop
+  std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is
+  // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
+  // begun; and, once the arm is armed, lets go of what nobody knows.
+  std::function<void(const bridge::Json&)> restore;
+  bridge::Resume resume;
+  std::function<void()> settle;
 };
 
 class BridgeSide {
@@ -34,8 +41,11 @@ class BridgeSide {
   BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills,
              std::function<void(Time)> visitors);
 
-  // One period. Error: a camera or the journal failed; the run cannot go on.
-  [[nodiscard]] Expected<void> tick(Time now, CameraCrew& crew);
+  // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
+  // that one told it to, and takes up what is open; nothing starts before the arm was armed anew. Error: the journal.
+  [[nodiscard]] Expected<void> take_over(const bridge::Journal& journal, Time now);
+  // One period. Error: the journal failed; the run cannot go on.
+  [[nodiscard]] Expected<void> tick(Time now, Observer& observer);
   // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
   void stop(Time now, const std::string& reason);
   [[nodiscard]] bool idle() const;
@@ -43,6 +53,7 @@ class BridgeSide {
   void close(Time now);
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
+  [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const { return stops_; }
 
  private:
@@ -51,6 +62,7 @@ class BridgeSide {
                                                     double belt_travel_m) const;
   void ask_brain(const std::vector<ObjectBelief>& objects, Time now);
   void look_after_arm(Time now);
+  void note_carried(Time now);
 
   bridge::Bridge& bridge_;
   brain::Dispatcher& dispatcher_;
@@ -59,10 +71,13 @@ class BridgeSide {
   Snapshot seen_;
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
+  bridge::Json carried_;                  // as last noted
   std::optional<Time> stopped_since_;
   Time last_outcome_;
   std::int64_t stops_ = 0, unlabelled_ = 0;
   bool stopping_ = false, was_operational_ = false;
+  bool took_over_ = false;  // and the arm has not been armed since
+  bool yielding_ = false;   // it still moves as it was told before
 };
 
 }  // namespace pons::runner

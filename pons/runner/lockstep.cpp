@@ -14,21 +14,22 @@ Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
   Ending ending(watch, *parts.bridge_side);
   RunResult result;
   for (Time now = Time(kControlPeriod);; now += kControlPeriod) {
-    parts.plant.advance(now);
-    parts.plant.body->read(sensors);
-    parts.crew->open_shutters(now, sensors);
+    parts.body.plant.advance(now);
+    parts.body.plant.body->read(sensors);
+    parts.body.photographer->open_shutters(now, sensors);
 
     const Time before = clock.now();
-    parts.cerebellum->step(now, sensors, *parts.link, set_points);
+    parts.body.cerebellum->step(now, sensors, *parts.body.link, set_points);
     step_time.record(clock.now() - before);
-    parts.plant.body->write(set_points);
+    parts.body.plant.body->write(set_points);
     ++result.loop.ticks;
 
     if (now.ns() % kBridgePeriod.count() != 0) continue;
-    if (auto ticked = parts.bridge_side->tick(now, *parts.crew); !ticked) return std::unexpected(ticked.error());
-    pass_on_events(parts, watch);
-    if (auto healthy = parts.plant.health(); !healthy) return std::unexpected(healthy.error());
-    if (!ending.check(now, parts.plant.finished())) continue;
+    if (auto ticked = parts.bridge_side->tick(now, *parts.observer); !ticked) return std::unexpected(ticked.error());
+    pass_on_events(parts.body, watch);
+    if (auto healthy = parts.body.plant.health(); !healthy) return std::unexpected(healthy.error());
+    if (auto healthy = parts.body.photographer->health(); !healthy) return std::unexpected(healthy.error());
+    if (!ending.check(now, parts.body.plant.finished())) continue;
     parts.bridge_side->close(now);
     result.end = now;
     break;

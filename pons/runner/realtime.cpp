@@ -1,142 +1,51 @@
 #include "pons/runner/realtime.hpp"
 
-#include <algorithm>
-#include <atomic>
-#include <mutex>
-#include <optional>
-#include <thread>
-
-#include "pons/rt/clock.hpp"
 #include "pons/rt/grant.hpp"
-#include "pons/rt/guard.hpp"
 #include "pons/rt/periodic_loop.hpp"
-#include "pons/rt/triple_buffer.hpp"
+#include "pons/runner/body_side.hpp"
 #include "pons/runner/ending.hpp"
 
 namespace pons::runner {
 namespace {
 
-// Below the loop's: it must not wait for either.
-constexpr int kBodyPriority = 60, kBridgePriority = 10;
-
-// Neither the body nor the run's clock goes further than this past the last set-points. A real arm falls on while its
-// loop is held up; a simulated one need not, and what a busy computer does to it would say nothing about a robot.
-constexpr Duration kLeash = 4 * kControlPeriod;
-
-// A loop that was woken so late is told of: libfranka's robots stop after twenty missed packets in a row.
-constexpr Duration kStall = 20 * kControlPeriod;
-
-// Measurements and set-points change hands without either side waiting.
-struct Exchange {
-  struct Asked {
-    Time at;
-    body::SetPoints set_points;
-  };
-  rt::TripleBuffer<body::Sensors> measured;
-  rt::TripleBuffer<Asked> asked;
-};
-
-// The threads' common end.
-struct Shared {
-  std::atomic<bool> running{true};
-  std::atomic<bool> finished{false};
-  std::mutex mutex;
-  std::optional<Error> error;
-
-  void fail(const Error& what) {
-    const std::lock_guard lock(mutex);
-    if (!error) error = what;
-    running.store(false);
-  }
-};
-
-// Ends the other threads on every way out.
-struct Leaving {
-  Shared& shared;
-  ~Leaving() { shared.running.store(false); }
-};
-
-void run_body(Parts& parts, rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
-  // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
-  (void)rt::make_realtime({.priority = kBodyPriority});
-  body::Sensors sensors;
-  const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
-  rt::PeriodicLoop loop(own, kControlPeriod);
-  Time reached;
-  loop.run([&](Time) {
-    const Exchange::Asked& asked = exchange.asked.read();
-    const bool controlled = asked.set_points.torque_nm.size() > 0;
-    if (controlled) parts.plant.body->write(asked.set_points);
-    // Until the loop has begun, the clock must go on for it to begin. What passed during its first tick stays passed:
-    // the loop has gone by it, and would wait for ever on a clock that went back.
-    reached = std::max(reached, controlled ? std::min(clock.now(), asked.at + kLeash) : clock.now());
-    const Time now = reached;
-    parts.plant.advance(now);
-    clock.reach(now);
-    parts.plant.body->read(sensors);
-    exchange.measured.write(sensors);
-    parts.crew->open_shutters(now, sensors);
-    shared.finished.store(parts.plant.finished());
-    if (auto healthy = parts.plant.health(); !healthy) shared.fail(healthy.error());
-    return shared.running.load();
-  });
-  clock.let_go();
-}
-
-LoopFigures run_loop(Parts& parts, const rt::MonotonicClock& clock, Exchange& exchange, Shared& shared) {
-  const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
-  Exchange::Asked asked;
-  rt::PeriodicLoop loop(clock, kControlPeriod, parts.link->emergency_word());
-  loop.run([&](Time now) {
-    const rt::InTick in_tick;
-    if (loop.late() >= kStall)
-      parts.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
-                                    1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));
-    const body::Sensors& sensors = exchange.measured.read();
-    if (sensors.position.size() > 0) {
-      parts.cerebellum->step(now, sensors, *parts.link, asked.set_points);
-      asked.at = now;
-      exchange.asked.write(asked);
-    }
-    return shared.running.load();
-  });
-  const auto late_us = [&](double percent) { return 1e6 * to_s(loop.lateness().percentile(percent)); };
-  return {.ticks = loop.ticks(),
-          .missed = loop.missed() + static_cast<std::uint64_t>(clock.stood_still() / kControlPeriod),
-          .p50_us = 1e6 * to_s(loop.execution().percentile(50)),
-          .p99_us = 1e6 * to_s(loop.execution().percentile(99)),
-          .late = Lateness{late_us(50), late_us(99), 1e6 * to_s(loop.lateness().max())},
-          .degraded = grant.refused};
-}
+constexpr int kBridgePriority = 10;  // below loop and body: neither must wait for it
 
 }  // namespace
 
+Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body, const Watch& watch) {
+  (void)rt::make_realtime({.priority = kBridgePriority});
+  RunResult result;
+  Expected<void> good;
+  Ending ending(watch, bridge_side);
+  rt::PeriodicLoop loop(*body.clock, kBridgePeriod, *body.gone);
+  loop.run([&](Time now) {
+    result.end = now;
+    good = body.health();
+    if (good) good = bridge_side.tick(now, observer);
+    if (!good) return false;
+    if (!ending.check(now, body.finished())) return true;
+    bridge_side.close(now);
+    return false;
+  });
+  if (!good) return std::unexpected(good.error());
+  result.complete = !ending.broken_off();
+  return result;
+}
+
 Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
   rt::MonotonicClock clock(kLeash);
-  Exchange exchange;
-  Shared shared;
-  RunResult result;
-  Ending ending(watch, *parts.bridge_side);
-  {
-    std::jthread body_thread([&] { run_body(parts, clock, exchange, shared); });
-    std::jthread loop_thread([&] { result.loop = run_loop(parts, clock, exchange, shared); });
-    const Leaving leaving{shared};  // also by an exception: both threads are waited for
-    (void)rt::make_realtime({.priority = kBridgePriority});
-    rt::PeriodicLoop loop(clock, kBridgePeriod);
-    loop.run([&](Time now) {
-      if (auto ticked = parts.bridge_side->tick(now, *parts.crew); !ticked) {
-        shared.fail(ticked.error());
-      } else if (ending.check(now, shared.finished.load())) {
-        parts.bridge_side->close(now);
-        shared.running.store(false);
-      }
-      pass_on_events(parts, watch);
-      result.end = now;
-      return shared.running.load();
-    });
-  }
-  if (shared.error) return std::unexpected(*shared.error);
-  result.complete = !ending.broken_off();
+  BodySide body(parts.body, clock);
+  const rt::WakeWord gone;  // not while this process lives
+  Watch both = watch;
+  both.progress = [&](Time now) {
+    if (watch.progress) watch.progress(now);
+    pass_on_events(parts.body, watch);
+  };
+  auto result = run_bridge(*parts.bridge_side, *parts.observer,
+                           {&clock, &gone, [&] { return body.finished(); }, [&] { return body.health(); }}, both);
+  if (!result) return result;
+  result->loop = body.end();
+  pass_on_events(parts.body, watch);
   return result;
 }
 

@@ -1,12 +1,25 @@
-// Wall-clock pace: the cerebellum on a thread of its own with real-time priority where it is granted, the body's
-// physics on another, vision on a third, the bridge on the caller's.
+// Wall-clock pace: the body's side on threads of its own, vision on another, the bridge on the caller's.
 #pragma once
 
+#include "pons/rt/clock.hpp"
+#include "pons/rt/wake_word.hpp"
 #include "pons/runner/run.hpp"
 
 namespace pons::runner {
 
-// Error: body, camera or journal failed. Either way every thread has ended when it returns.
+// Both sides in this process. Error: body, camera or journal failed. Either way every thread has ended when it returns.
 [[nodiscard]] Expected<RunResult> run_realtime(Parts& parts, const Watch& watch);
+
+// What the bridge's side knows of a body that moves elsewhere. All are asked once a period.
+struct BodyView {
+  const rt::MonotonicClock* clock = nullptr;  // the run's
+  const rt::WakeWord* gone = nullptr;         // changes when no body paces the clock any more
+  std::function<bool()> finished;             // nothing more will come
+  std::function<Expected<void>()> health;     // an error ends the run
+};
+
+// The bridge's side alone, on the caller's thread; the loop's figures stay empty. Error: the body's, or the journal's.
+[[nodiscard]] Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body,
+                                             const Watch& watch);
 
 }  // namespace pons::runner

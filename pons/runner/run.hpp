@@ -12,19 +12,26 @@
 #include "pons/core/time.hpp"
 #include "pons/link/link.hpp"
 #include "pons/runner/bridge_side.hpp"
-#include "pons/runner/camera_crew.hpp"
+#include "pons/runner/observer.hpp"
+#include "pons/runner/photographer.hpp"
 #include "pons/runner/plant.hpp"
 
 namespace pons::runner {
 
 inline constexpr Duration kControlPeriod = std::chrono::milliseconds(1);
 
-struct Parts {
+// On the robot's side of the link.
+struct BodyParts {
   Plant plant;
   cerebellum::Cerebellum* cerebellum = nullptr;
   link::CerebellumEnd* link = nullptr;
+  Photographer* photographer = nullptr;
+};
+
+struct Parts {
+  BodyParts body;
   BridgeSide* bridge_side = nullptr;
-  CameraCrew* crew = nullptr;
+  Observer* observer = nullptr;
 };
 
 // How the run is broken off and watched. All are called in every bridge period, on the bridge's thread; may be empty.
@@ -54,8 +61,8 @@ struct RunResult {
 };
 
 // Tells the watch what the control loop has said since the last time.
-inline void pass_on_events(Parts& parts, const Watch& watch) {
-  if (watch.said) parts.cerebellum->log().drain(watch.said);
+inline void pass_on_events(BodyParts& body, const Watch& watch) {
+  if (watch.said) body.cerebellum->log().drain(watch.said);
 }
 
 }  // namespace pons::runner

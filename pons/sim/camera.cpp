@@ -103,7 +103,7 @@ Expected<void> SimCamera::finish(RgbdFrame& frame) {
   return {};
 }
 
-void SimCamera::measure_depth(std::vector<float>& depth_m) const {
+void SimCamera::measure_depth(PixelArray<float>& depth_m) const {
   const auto columns = static_cast<std::size_t>(spec_.width), rows = static_cast<std::size_t>(spec_.height);
   depth_m.resize(columns * rows);
   const auto near = static_cast<float>(renderer_->near_m());

@@ -25,7 +25,7 @@ class SimCamera final : public body::Camera {
 
  private:
   SimCamera() = default;
-  void measure_depth(std::vector<float>& depth_m) const;
+  void measure_depth(PixelArray<float>& depth_m) const;
 
   world::CameraSpec spec_;
   Intrinsics intrinsics_;

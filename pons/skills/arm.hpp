@@ -45,6 +45,8 @@ class Arm {
   [[nodiscard]] int sealed_cups() const;
   [[nodiscard]] bool all_cups_open() const;
 
+  // A protective stop, whatever moves it.
+  void halt() { (void)send({.kind = link::CommandKind::kProtectiveStop}); }
   // Leaves a stop (when it may) and arms from standstill. Moves nothing.
   void arm(Time now);
 

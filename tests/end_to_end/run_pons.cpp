@@ -87,6 +87,30 @@ Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
   return finished;
 }
 
+Running::Running(const std::filesystem::path& folder, const std::string& name,
+                 const std::vector<std::string>& arguments)
+    : out_(folder / (name + ".out")), err_(folder / (name + ".err")), child_(fork()) {
+  if (child_ != 0) return;
+  become(PONS_BINARY, arguments, {}, open(out_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600),
+         open(err_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0600));
+}
+
+Running::~Running() {
+  if (child_ <= 0) return;
+  kill(child_, SIGKILL);
+  (void)exit_code(child_);
+}
+
+void Running::signal(int number) const { kill(child_, number); }
+
+Finished Running::wait() {
+  const int code = exit_code(child_);
+  child_ = -1;
+  return {code, read_text(out_), read_text(err_)};
+}
+
+std::string Running::err() const { return read_text(err_); }
+
 Folder::Folder() {
   std::string pattern = (std::filesystem::temp_directory_path() / "pons-test-XXXXXX").string();
   if (mkdtemp(pattern.data()) == nullptr) std::abort();

@@ -29,6 +29,24 @@ struct Finished {
 [[nodiscard]] Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
                                     const std::function<void(pid_t)>& meanwhile);
 
+// The program at work beside the test, its words in files of `folder`; killed, if need be, when this goes.
+class Running {
+ public:
+  Running(const std::filesystem::path& folder, const std::string& name, const std::vector<std::string>& arguments);
+  ~Running();
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+  void signal(int number) const;
+  // How it ended; code is the signal's number, negated, where one killed it.
+  [[nodiscard]] Finished wait();
+  [[nodiscard]] std::string err() const;  // so far
+
+ private:
+  std::filesystem::path out_, err_;
+  pid_t child_ = -1;
+};
+
 // A folder of its own for one test, gone with it.
 class Folder {
  public:

@@ -1,7 +1,5 @@
 // The camera crew with the real cameras of a simulated cell and the real perception behind it.
 
-#include "pons/runner/camera_crew.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +13,9 @@
 #include <vector>
 
 #include "pons/core/digest.hpp"
+#include "pons/runner/darkroom.hpp"
+#include "pons/runner/observer.hpp"
+#include "pons/runner/photographer.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/world/manifest.hpp"
 
@@ -57,7 +58,8 @@ struct Scene {
     for (body::Camera* const camera : simulation->cameras()) cameras.emplace_back(*camera);
     std::vector<body::Camera*> counted;
     for (CountingCamera& camera : cameras) counted.push_back(&camera);
-    crew.emplace(world, counted, *perception, pace);
+    photographer.emplace(world, counted, room.frames, room.pages, room.memory(), pace);
+    observer.emplace(world, *perception, room.frames, room.pages, room.memory(), pace);
   }
 
   // A bridge period of physics and shutters, then what the crew has to say.
@@ -67,18 +69,19 @@ struct Scene {
       simulation->advance_to(now);
       simulation->body().read(sensors);
       travel_m[now] = sensors.belt_travel_m;
-      crew->open_shutters(now, sensors);
+      photographer->open_shutters(now, sensors);
     }
-    auto collected = crew->collect(now, forgotten);
-    EXPECT_TRUE(collected) << collected.error().line();
-    return collected ? std::move(*collected) : std::nullopt;
+    EXPECT_TRUE(photographer->health());
+    return observer->collect(now, forgotten);
   }
 
   world::World world = load();
   std::unique_ptr<sim::Simulation> simulation;
   std::optional<perception::Perception> perception;
   std::deque<CountingCamera> cameras;  // in the world's order
-  std::optional<CameraCrew> crew;
+  Darkroom room{world};
+  std::optional<Photographer> photographer;
+  std::optional<Observer> observer;
   body::Sensors sensors;
   std::map<Time, double> travel_m;
   Time now;
@@ -184,18 +187,20 @@ TEST(CameraCrew, InRealTimeABusyCameraSkipsAFrameAndAFailedOneEndsTheRun) {
   world.cameras.resize(1);
   SlowCamera camera;
   perception::Perception perception(world, model::RobotModel::load(world.robot).value());
-  CameraCrew crew(world, {&camera}, perception, Pace::kRealTime);
+  Darkroom room(world);
+  Photographer photographer(world, {&camera}, room.frames, room.pages, room.memory(), Pace::kRealTime);
+  Observer observer(world, perception, room.frames, room.pages, room.memory(), Pace::kRealTime);
   const Time first(from_s(world.cameras[0].phase_s)), second = first + from_s(world.cameras[0].period_s);
-  crew.open_shutters(first, {});
-  crew.open_shutters(second, {});
+  photographer.open_shutters(first, {});
+  photographer.open_shutters(second, {});
   EXPECT_EQ(camera.begun, 1) << "the second frame was skipped, and nobody waited";
-  const auto nothing = crew.collect(second, {});
-  EXPECT_TRUE(nothing && !*nothing);
+  EXPECT_FALSE(observer.collect(second, {}));
 
+  EXPECT_TRUE(photographer.health());
   camera.develop.count_down();
-  Expected<std::optional<Snapshot>> collected = std::nullopt;
-  while (collected) collected = crew.collect(second, {});
-  EXPECT_EQ(collected.error().what, "the lens is off");
+  while (photographer.health()) {
+  }
+  EXPECT_EQ(photographer.health().error().what, "the lens is off");
 }
 
 }  // namespace

@@ -35,13 +35,13 @@ class EndingTest : public ::testing::Test {
     return std::nullopt;
   }
   void submit(const char* id) {
-    const auto admitted = cell_->bridge->submit(
+    const auto admitted = cell_->above->bridge->submit(
         std::string(R"({"id":")") + id + R"(","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})", now_);
     ASSERT_TRUE(admitted) << admitted.error().line();
   }
   std::vector<std::string> shutdowns() const {
     std::vector<std::string> reasons;
-    const auto events = cell_->journal->events("");
+    const auto events = cell_->above->journal->events("");
     EXPECT_TRUE(events);
     for (const bridge::Event& event : *events) {
       if (event.kind == "shutdown") reasons.push_back(event.detail.at("reason"));
@@ -55,15 +55,15 @@ class EndingTest : public ::testing::Test {
 
 TEST_F(EndingTest, QuietIsNotTheEndWhileParcelsMayCome) {
   const Watch watch;
-  Ending ending(watch, *cell_->bridge_side);
-  ASSERT_TRUE(cell_->bridge_side->idle());
+  Ending ending(watch, *cell_->above->bridge_side);
+  ASSERT_TRUE(cell_->above->bridge_side->idle());
   EXPECT_FALSE(over(ending, Time(from_s(10)), false));
   EXPECT_FALSE(ending.broken_off());
 }
 
 TEST_F(EndingTest, ComesSomeTimeAfterTheLastOutcome) {
   const Watch watch;
-  Ending ending(watch, *cell_->bridge_side);
+  Ending ending(watch, *cell_->above->bridge_side);
   EXPECT_FALSE(over(ending, Time(from_s(1)), false));
   const Time quiet = now_;
   EXPECT_EQ(over(ending, Time(from_s(10)), true), quiet + kAfterwards);
@@ -73,11 +73,11 @@ TEST_F(EndingTest, ComesSomeTimeAfterTheLastOutcome) {
 
 TEST_F(EndingTest, WaitsForATaskThatIsOpen) {
   const Watch watch;
-  Ending ending(watch, *cell_->bridge_side);
+  Ending ending(watch, *cell_->above->bridge_side);
   EXPECT_FALSE(over(ending, Time(from_s(1)), true));
   submit("late");  // it waits for the arm, which nobody has armed
   EXPECT_FALSE(over(ending, Time(from_s(10)), true));
-  ASSERT_TRUE(cell_->bridge->cancel("late", now_, "no longer wanted"));
+  ASSERT_TRUE(cell_->above->bridge->cancel("late", now_, "no longer wanted"));
   const Time quiet = now_;
   EXPECT_EQ(over(ending, Time(from_s(20)), true), quiet + kAfterwards) << "counted from the last outcome anew";
 }
@@ -86,7 +86,7 @@ TEST_F(EndingTest, AnInterruptCancelsAndStillSeesWhatWasLetGoLand) {
   bool interrupted = false;
   int shown = 0;
   const Watch watch{.interrupted = [&] { return interrupted; }, .progress = [&](Time) { ++shown; }, .limit = Time{}};
-  Ending ending(watch, *cell_->bridge_side);
+  Ending ending(watch, *cell_->above->bridge_side);
   submit("open");
   EXPECT_FALSE(over(ending, Time(from_s(1)), false));
   EXPECT_EQ(shown, 101) << "once a period";
@@ -95,14 +95,14 @@ TEST_F(EndingTest, AnInterruptCancelsAndStillSeesWhatWasLetGoLand) {
   EXPECT_EQ(over(ending, Time(from_s(10)), false), quiet + kAfterwards) << "parcels on the belt do not hold it up";
   EXPECT_TRUE(ending.broken_off());
   EXPECT_EQ(shutdowns(), std::vector<std::string>{"interrupted"}) << "once, however long the button is held";
-  const auto history = cell_->journal->task("open");
+  const auto history = cell_->above->journal->task("open");
   ASSERT_TRUE(history && *history);
   EXPECT_EQ((*history)->record.outcome.value().outcome, task::Outcome::kCancelled);
 }
 
 TEST_F(EndingTest, ARunThatTakesTooLongIsBrokenOff) {
   const Watch watch{.interrupted = {}, .progress = {}, .limit = Time(from_s(3))};
-  Ending ending(watch, *cell_->bridge_side);
+  Ending ending(watch, *cell_->above->bridge_side);
   EXPECT_FALSE(over(ending, Time(from_s(3)), false));
   EXPECT_FALSE(ending.broken_off());
   const Time quiet = now_;

@@ -1,0 +1,127 @@
+// pons bridge: perception, journal, bridge, skills and dispatcher, in a process of their own, for a body in another.
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "apps/assembly.hpp"
+#include "apps/commands.hpp"
+#include "apps/meeting.hpp"
+#include "apps/paths.hpp"
+#include "apps/progress.hpp"
+#include "apps/run_kit.hpp"
+#include "pons/runner/processes.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct BridgeCommandOptions {
+  std::string world, link;
+  ParcelOptions parcels;
+  fs::path journal, socket;
+  double wait_s = 10;
+  bool quiet = false;
+};
+
+// Both failures end the run; only one is the body's.
+int failed(const Error& error) {
+  (void)bad_run(error);
+  return error.what == runner::kBodyGone ? kExitBodyGone : kExitBadRun;
+}
+
+int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
+               const MeetingPlace& place) {
+  link::Border& border = place.border();
+  const BridgeOptions half_options{options.journal, options.socket.empty() ? default_socket() : options.socket,
+                                   border.body};
+  auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
+  if (!half) return bad_input(half.error());
+  if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
+  const runner::Crossing crossing = place.crossing({});
+  if (auto begun = runner::await_begin(crossing, interrupted); !begun) return failed(begun.error());
+  if (interrupted()) return kExitInterrupted;
+  auto taken = (*half)->bridge_side->take_over(*(*half)->journal, border.clock.now());
+  if (!taken) return bad_run(taken.error());
+
+  const auto total = static_cast<std::int64_t>(manifest.size());
+  Progress progress(stderr, total);
+  const runner::Watch watch{
+      .interrupted = interrupted,
+      .progress =
+          [&](Time now) {
+            const auto& [sorted, settled] = (*half)->dispatcher->tally();
+            if (options.quiet) return;
+            progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
+          },
+      .said = {},
+      .limit = border.clock.now() + slowest(manifest.size())};
+  const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);
+  progress.finish();
+  const brain::Tally tally = (*half)->dispatcher->tally();
+  // Said at once; what perception is in the middle of may take its time to end.
+  const int code = result ? kExitGood : failed(result.error());
+  half->reset();  // the journal is closed: the body may read it
+  if (!result) return code;
+  const bool asked = border.now_at() == link::Stage::kEnding;
+  say(stdout, fmt::format("{}: {} of {} parcels settled, {} sorted; journal: {}\n",
+                          result->complete ? "complete" : "broken off", std::min(tally.settled, total), total,
+                          tally.sorted, options.journal.string()));
+  // A bridge that a person ends leaves its body to the next one.
+  if (interrupted() && !asked) return kExitInterrupted;
+  border.closing.store(result->complete ? link::Closing::kComplete : link::Closing::kBrokenOff);
+  if (result->complete) return kExitGood;
+  if (asked) return kExitInterrupted;
+  say(stderr, "pons: broken off: it ran too long; the journal keeps what happened\n");
+  return kExitBadRun;
+}
+
+int bridge(const BridgeCommandOptions& options) {
+  watch_interrupts();
+  const std::array<FileOption, 3> files{
+      {{"--manifest", options.parcels.manifest}, {"--journal", options.journal}, {"--socket", options.socket}}};
+  if (auto possible = check_files(files, {}); !possible) return bad_input(possible.error());
+  if (options.journal.empty())
+    return bad_input(
+        {"no journal is named", "pons bridge", "name a file with --journal: the next bridge goes on from it"});
+  const auto world = world_named(options.world, "pons bridge");
+  if (!world) return bad_input(world.error());
+  const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
+  if (!manifest) return bad_input(manifest.error());
+
+  const std::string name = options.link.empty() ? default_link(world->name) : options.link;
+  if (!rt::SharedMemory::is_owned(name) && !options.quiet)
+    say(stderr,
+        fmt::format("{}: waiting up to {:.0f} s for a body: pons body {}\n", name, options.wait_s, world->name));
+  runner::await_body(name, from_s(options.wait_s), interrupted);
+  if (interrupted()) return kExitInterrupted;
+  const auto place = MeetingPlace::join(name, *world, identity_of(*world, *manifest));
+  if (!place) return bad_input(place.error());
+  return run_bridge(options, *world, *manifest, *place);
+}
+
+}  // namespace
+
+void add_bridge(CLI::App& app, Chosen& chosen) {
+  auto options = std::make_shared<BridgeCommandOptions>();
+  CLI::App* command =
+      app.add_subcommand("bridge", "Perception, tasks and skills for a body that another process runs (pons body)");
+  command->add_option("world", options->world, "A world's name; `pons worlds` lists them");
+  add_parcel_options(*command, options->parcels);
+  command->add_option("--link", options->link,
+                      "Where bridge and body meet: a name (the world's, and the user's number)");
+  command->add_option(
+      "--journal", options->journal,
+      "SQLite file that keeps tasks and outcomes; that of an earlier bridge of the same body is taken up");
+  command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
+  command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
+      ->check(CLI::Range(0.0, 86400.0));
+  command->add_flag("--quiet", options->quiet, "No progress");
+  refuse_empty(*command);
+  command->callback([options, &chosen] { chosen = [options] { return bridge(*options); }; });
+}
+
+}  // namespace pons::apps

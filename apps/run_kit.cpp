@@ -1,0 +1,209 @@
+#include "apps/run_kit.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <climits>
+#include <csignal>
+#include <cstring>
+
+#include "apps/commands.hpp"
+#include "apps/paths.hpp"
+#include "pons/core/digest.hpp"
+#include "pons/record/file.hpp"
+#include "pons/sim/truth.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSlowest_s = 12.0;  // simulated, a parcel
+constexpr double kSlowestStart_s = 60.0;
+
+constexpr std::size_t kPartOfName = 24;  // a file is written under a longer name first
+
+volatile std::sig_atomic_t interrupts = 0;
+
+// The first Ctrl-C stops the robot in a controlled way; a third one ends the process at once.
+void on_interrupt(int) {
+  interrupts = interrupts + 1;
+  if (interrupts >= 3) _exit(kExitInterrupted);
+}
+
+fs::path absolute_of(const fs::path& file) {
+  std::error_code error;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
+  return error ? file : whole;
+}
+
+std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) {
+  Digest digest;
+  digest.add(body.simulation->state_digest());
+  for (const sim::ParcelTruth& parcel : sim::Truth(*body.simulation).parcels()) {
+    digest.add(parcel.parcel_id);
+    digest.add(parcel.place);
+    digest.add(parcel.arrived.ns());
+  }
+  digest.add(verdict.sorted);
+  return digest.value();
+}
+
+const CLI::Validator not_empty([](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
+
+// The parser's own conversion clamps what does not fit.
+const CLI::Validator whole_number(
+    [](const std::string& text) {
+      std::uint64_t number = 0;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      if (error == std::errc() && end == text.data() + text.size()) return std::string();
+      return fmt::format("'{}' is not a whole number from 0 to {}", text, UINT64_MAX);
+    },
+    "");
+
+}  // namespace
+
+void watch_interrupts() {
+  struct sigaction action{};
+  action.sa_handler = on_interrupt;
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, &action, nullptr);
+}
+
+bool interrupted() { return interrupts > 0; }
+
+void add_parcel_options(CLI::App& command, ParcelOptions& options) {
+  auto* parcels =
+      command.add_option("--parcels", options.parcels, "How many parcels; 1 to 1000000 (200)")->check(whole_number);
+  command.add_option("--manifest", options.manifest, "CSV file of parcels, instead of drawing them from the seed");
+  command.add_option("--seed", options.seed, "What is drawn: parcels, arrivals, noise; 0 or more (1)")
+      ->check(whole_number);
+  command.parse_complete_callback([&options, parcels] { options.parcels_given = parcels->count() > 0; });
+}
+
+Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world,
+                                      const std::string& command) {
+  if (options.manifest.empty()) return world::draw_manifest(world, options.parcels, options.seed);
+  auto manifest = world::read_manifest(options.manifest, world);
+  if (manifest && options.parcels_given) {
+    if (options.parcels < 1)
+      return fail("--parcels is " + std::to_string(options.parcels), command, "ask for at least 1");
+    if (manifest->size() > static_cast<std::size_t>(options.parcels))
+      manifest->resize(static_cast<std::size_t>(options.parcels));
+  }
+  return manifest;
+}
+
+Expected<world::World> world_named(const std::string& name, const std::string& command) {
+  if (!name.empty()) return world::load(worlds_folder(), name);
+  const auto names = world::list(worlds_folder());
+  return fail("no world is named", command, fmt::format("choose from {}", fmt::join(names, ", ")));
+}
+
+Duration slowest(std::size_t parcels) { return from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(parcels)); }
+
+void refuse_empty(CLI::App& command) {
+  for (CLI::Option* option : command.get_options()) {
+    if (option->get_items_expected_max() > 0) option->check(not_empty);
+  }
+}
+
+Expected<void> check_files(std::span<const FileOption> files, std::span<const fs::path> written) {
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto& [option, file] = files[i];
+    if (file.empty()) continue;
+    if (file.filename().string().size() > NAME_MAX - kPartOfName)
+      return fail("the name is too long", option, "choose a shorter one");
+    if (file == ":memory:" && std::string_view(option) == "--journal")
+      return fail("is no file", "--journal :memory:", "name a file, or leave --journal away");
+    for (std::size_t j = 0; j < i; ++j) {
+      if (files[j].second.empty() || absolute_of(files[j].second) != absolute_of(file)) continue;
+      return fail(fmt::format("is also named for {}", files[j].first), fmt::format("{} {}", option, file.string()),
+                  "name another file");
+    }
+  }
+  for (const fs::path& file : written) {
+    if (file.empty()) continue;
+    if (auto possible = record::check_writable(file); !possible) return possible;
+  }
+  return {};
+}
+
+Expected<void> LoopLog::open(const fs::path& path) {
+  if (path.empty()) return {};
+  file_.reset(std::fopen(path.c_str(), "w"));
+  if (!file_) return fail(std::strerror(errno), path.string(), "name a file that can be written");
+  return {};
+}
+
+void LoopLog::say(Time at, std::string_view text) {
+  if (!file_) return;
+  apps::say(file_.get(), fmt::format("{:12.6f} {}\n", at.s(), text));
+  std::fflush(file_.get());
+}
+
+bool Reckoning::good() const {
+  return verdict.lost == 0 && verdict.missorted == 0 && verdict.duplicated == 0 && report.limits.violations == 0;
+}
+
+Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
+                           const RunFigures& figures) {
+  const sim::Truth truth(*body.simulation);
+  const runner::RunResult& result = figures.result;
+  auto verdict =
+      referee::judge(truth.parcels(), truth.arm(), journal, {world.rules.max_press_n, world.rules.max_drop_m},
+                     result.complete ? referee::RunEnd::kComplete : referee::RunEnd::kBrokenOff);
+  if (!verdict) return std::unexpected(verdict.error());
+  record::Report report;
+  report.seed = figures.seed;
+  report.world = world.name;
+  report.parcels = {.offered = verdict->offered,
+                    .sorted = verdict->sorted,
+                    .missorted = verdict->missorted,
+                    .lost = verdict->lost,
+                    .duplicated = verdict->duplicated,
+                    .exceptions = {verdict->deserved, verdict->undeserved},
+                    .damaged = verdict->damaged};
+  Time first = result.end;
+  for (const sim::ParcelTruth& parcel : truth.parcels()) {
+    if (parcel.where != sim::Whereabouts::kNotOffered) first = std::min(first, parcel.offered);
+  }
+  report.throughput = record::throughput(to_s(figures.last_outcome - first), verdict->sorted);
+  report.retries = figures.retries;
+  const cerebellum::Statistics& loop = body.cerebellum->statistics();
+  report.limits = {.violations = static_cast<std::int64_t>(verdict->violations + loop.violations),
+                   .worst_ratio = std::max({verdict->worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
+                                            loop.commanded.jerk, loop.commanded.torque})};
+  report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
+                 .missed = static_cast<std::int64_t>(result.loop.missed),
+                 .p50_us = result.loop.p50_us,
+                 .p99_us = result.loop.p99_us,
+                 .degraded = result.loop.degraded};
+  if (const auto& late = result.loop.late) {
+    report.loop.late_p50_us = late->p50_us;
+    report.loop.late_p99_us = late->p99_us;
+    report.loop.late_max_us = late->max_us;
+  }
+  report.sim_seconds = result.end.s();
+  report.wall_seconds = figures.wall_s;
+  report.state_hash = state_hash(body, *verdict);
+  return Reckoning{std::move(*verdict), std::move(report)};
+}
+
+Expected<void> tell(const Reckoning& reckoning, Explain explain, const fs::path& file) {
+  say(stdout, record::summary(reckoning.report));
+  if (explain == Explain::kFindings) {
+    for (const std::string& finding : reckoning.verdict.findings) say(stdout, fmt::format("  {}\n", finding));
+  }
+  if (file.empty()) return {};
+  if (auto written = record::write(reckoning.report, file); !written) return written;
+  say(stdout, fmt::format("report: {}\n", file.string()));
+  return {};
+}
+
+}  // namespace pons::apps

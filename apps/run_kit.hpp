@@ -1,0 +1,103 @@
+// What the commands that run a world share: their parcels, their files, Ctrl-C, and the reckoning at the end.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "apps/assembly.hpp"
+#include "pons/bridge/journal/journal.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
+#include "pons/record/report.hpp"
+#include "pons/referee/referee.hpp"
+#include "pons/runner/run.hpp"
+#include "pons/world/manifest.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::apps {
+
+// ---- Ctrl-C ----
+
+// From here on the first SIGINT, SIGTERM or SIGHUP is counted, and the third ends the process at once.
+void watch_interrupts();
+[[nodiscard]] bool interrupted();
+
+// ---- what is to be sorted ----
+
+struct ParcelOptions {
+  std::int64_t parcels = 200;
+  std::filesystem::path manifest;
+  std::uint64_t seed = 1;
+  bool parcels_given = false;
+};
+void add_parcel_options(CLI::App& command, ParcelOptions& options);
+[[nodiscard]] Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world,
+                                                    const std::string& command);
+
+// Error: none is named, or there is no such world.
+[[nodiscard]] Expected<world::World> world_named(const std::string& name, const std::string& command);
+
+// The longest that a run of so many parcels takes (run time): one that takes longer hangs.
+[[nodiscard]] Duration slowest(std::size_t parcels);
+
+// Refuses an option that was given an empty text, most often a variable of a script that was never set.
+void refuse_empty(CLI::App& command);
+
+// ---- files ----
+
+// A command's files by option. Refused now rather than after the work: one file for two things, and among `written`
+// those that cannot be.
+using FileOption = std::pair<const char*, std::filesystem::path>;
+[[nodiscard]] Expected<void> check_files(std::span<const FileOption> files,
+                                         std::span<const std::filesystem::path> written);
+
+// What the control loop says, line by line, so that a run that dies leaves what led there.
+class LoopLog {
+ public:
+  // No file: nothing is kept.
+  [[nodiscard]] Expected<void> open(const std::filesystem::path& path);
+  void say(Time at, std::string_view text);
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+// ---- the end ----
+
+// What a run came to, as far as the referee does not see it.
+struct RunFigures {
+  std::uint64_t seed = 1;
+  runner::RunResult result;
+  Time last_outcome;  // of a task that the brain asked for
+  std::int64_t retries = 0;
+  double wall_s = 0;
+};
+
+struct Reckoning {
+  referee::Verdict verdict;
+  record::Report report;
+  // Nothing was lost, missorted or done twice, and no limit broken.
+  [[nodiscard]] bool good() const;
+};
+
+// Holds the simulation's truth against the journal. Error: the journal cannot be read.
+[[nodiscard]] Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
+                                         const RunFigures& figures);
+
+// Prints the summary and, explained, a line for each parcel that was not sorted; writes the report unless `file` is
+// empty. Error: it cannot be written.
+enum class Explain : std::uint8_t { kNothing, kFindings };
+[[nodiscard]] Expected<void> tell(const Reckoning& reckoning, Explain explain, const std::filesystem::path& file);
+
+}  // namespace pons::apps

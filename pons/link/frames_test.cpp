@@ -1,0 +1,103 @@
+#include "pons/link/frames.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+#include <memory>
+#include <new>
+
+#include "pons/link/border.hpp"
+
+namespace pons::link {
+namespace {
+
+Time at(double seconds) { return Time(from_s(seconds)); }
+
+TEST(Frames, APlaceGoesFromHandToHand) {
+  Frames frames;
+  EXPECT_TRUE(frames.is_free(0));
+  EXPECT_FALSE(frames.oldest());
+  frames.open(0, {at(1), AxisVector::Constant(6, 0.5), 2.0});
+  EXPECT_FALSE(frames.is_free(0));
+  EXPECT_TRUE(frames.under_way(0, at(1)));
+  EXPECT_FALSE(frames.under_way(0, at(0.9)));
+  EXPECT_FALSE(frames.oldest()) << "not developed";
+  const std::uint32_t before = frames.handed_over().value();
+  frames.hand_over(0);
+  EXPECT_NE(frames.handed_over().value(), before);
+  ASSERT_EQ(frames.oldest(), 0U);
+  EXPECT_EQ(frames.shot(0).belt_travel_m, 2.0);
+  EXPECT_FALSE(frames.is_free(0)) << "as long as it is looked at";
+  frames.give_back(0);
+  EXPECT_TRUE(frames.is_free(0));
+}
+
+TEST(Frames, TheOldestComesFirst) {
+  Frames frames;
+  frames.open(2, {at(1), {}, 0});
+  frames.open(0, {at(1.5), {}, 0});
+  frames.hand_over(2);
+  frames.hand_over(0);
+  EXPECT_EQ(frames.oldest(), 2U);
+  frames.give_back(2);
+  EXPECT_EQ(frames.oldest(), 0U);
+}
+
+TEST(Frames, ANewBridgeGivesBackWhatADeadOneHeldAndNoMore) {
+  Frames frames;
+  frames.open(0, {at(1), {}, 0});
+  frames.hand_over(0);
+  frames.open(1, {at(1), {}, 0});
+  frames.want_labels(true);
+  frames.take_over();
+  EXPECT_TRUE(frames.is_free(0));
+  EXPECT_FALSE(frames.is_free(1)) << "the body still develops it";
+  EXPECT_FALSE(frames.wants_labels());
+  frames.hand_over(1);
+  EXPECT_EQ(frames.oldest(), 1U);
+}
+
+TEST(FramePages, EveryCameraHasPagesOfItsOwn) {
+  const std::array<Intrinsics, 2> cameras{Intrinsics{.width = 100, .height = 50}, Intrinsics{.width = 31, .height = 7}};
+  const FramePages pages(cameras);
+  EXPECT_EQ(pages.bytes(), 4U * 4096 + 5 * 4096 + 4096 + 4096);
+  const std::unique_ptr<std::byte[]> memory(new std::byte[pages.bytes()]);
+  std::memset(memory.get(), 0, pages.bytes());
+  std::array<RgbdFrame, 2> frames;
+  for (std::size_t i = 0; i < 2; ++i) {
+    pages.lay(frames[i], i, memory.get());
+    const auto pixels = static_cast<std::size_t>(cameras[i].width * cameras[i].height);
+    frames[i].rgb.resize(3 * pixels);
+    frames[i].depth_m.resize(pixels);
+    std::memset(frames[i].rgb.data(), 1 + static_cast<int>(i), 3 * pixels);
+    std::fill_n(frames[i].depth_m.data(), pixels, 0.5F);
+  }
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(memory.get());
+  EXPECT_EQ(bytes[3 * 5000 - 1], 1) << "written where the pages lie, not in memory of its own";
+  EXPECT_EQ(frames[0].rgb[3 * 5000 - 1], 1);
+  EXPECT_EQ(frames[1].rgb[0], 2);
+  RgbdFrame copy = frames[1];
+  copy.rgb.data()[0] = 9;
+  EXPECT_EQ(frames[1].rgb[0], 2) << "a copy is one";
+}
+
+TEST(Border, AnotherWorldCellOrDayIsRefusedByName) {
+  Identity body;
+  std::string_view("parcel_cell").copy(body.world.data(), 64);
+  body.cell = 1;
+  body.orders = 2;
+  EXPECT_TRUE(check_same(body, body, "x"));
+  Identity other = body;
+  other.world[0] = 'q';
+  EXPECT_EQ(check_same(body, other, "x").error().what, "the body runs the world 'parcel_cell', not 'qarcel_cell'");
+  other = body;
+  other.cell = 7;
+  EXPECT_EQ(check_same(body, other, "x").error().what, "the body's 'parcel_cell' has another robot, belt or cameras");
+  other = body;
+  other.orders = 7;
+  EXPECT_EQ(check_same(body, other, "x").error().what, "the body was started with other parcels");
+}
+
+}  // namespace
+}  // namespace pons::link

@@ -1,0 +1,100 @@
+#include "pons/runner/body_side.hpp"
+
+#include <algorithm>
+
+#include "pons/rt/grant.hpp"
+#include "pons/rt/guard.hpp"
+#include "pons/rt/periodic_loop.hpp"
+
+namespace pons::runner {
+namespace {
+
+// Below the loop's: it must not wait for the body.
+constexpr int kBodyPriority = 60;
+
+// A loop that was woken so late is told of: libfranka's robots stop after twenty missed packets in a row.
+constexpr Duration kStall = 20 * kControlPeriod;
+
+}  // namespace
+
+BodySide::BodySide(BodyParts& parts, rt::MonotonicClock& clock) : parts_(parts), clock_(clock) {
+  body_ = std::jthread([this] { run_body(); });
+  loop_ = std::jthread([this] { run_loop(); });
+}
+
+BodySide::~BodySide() { running_.store(false); }
+
+LoopFigures BodySide::end() {
+  running_.store(false);
+  body_.join();
+  loop_.join();
+  return figures_;
+}
+
+Expected<void> BodySide::health() const {
+  const std::lock_guard lock(mutex_);
+  if (error_) return std::unexpected(*error_);
+  return {};
+}
+
+void BodySide::fail(const Error& what) {
+  const std::lock_guard lock(mutex_);
+  if (!error_) error_ = what;
+  running_.store(false);
+}
+
+void BodySide::run_body() {
+  // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
+  (void)rt::make_realtime({.priority = kBodyPriority});
+  body::Sensors sensors;
+  const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
+  rt::PeriodicLoop loop(own, kControlPeriod);
+  Time reached;
+  loop.run([&](Time) {
+    const Asked& asked = asked_.read();
+    const bool controlled = asked.set_points.torque_nm.size() > 0;
+    if (controlled) parts_.plant.body->write(asked.set_points);
+    // Until the loop has begun, the clock must go on for it to begin. What passed during its first tick stays passed:
+    // the loop has gone by it, and would wait for ever on a clock that went back.
+    reached = std::max(reached, controlled ? std::min(clock_.now(), asked.at + kLeash) : clock_.now());
+    const Time now = reached;
+    parts_.plant.advance(now);
+    clock_.reach(now);
+    parts_.plant.body->read(sensors);
+    measured_.write(sensors);
+    parts_.photographer->open_shutters(now, sensors);
+    finished_.store(parts_.plant.finished());
+    if (auto healthy = parts_.plant.health(); !healthy) fail(healthy.error());
+    if (auto healthy = parts_.photographer->health(); !healthy) fail(healthy.error());
+    return running_.load();
+  });
+  clock_.let_go();
+}
+
+void BodySide::run_loop() {
+  const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
+  Asked asked;
+  rt::PeriodicLoop loop(clock_, kControlPeriod, parts_.link->emergency_word());
+  loop.run([&](Time now) {
+    const rt::InTick in_tick;
+    if (loop.late() >= kStall)
+      parts_.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
+                                     1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));
+    const body::Sensors& sensors = measured_.read();
+    if (sensors.position.size() > 0) {
+      parts_.cerebellum->step(now, sensors, *parts_.link, asked.set_points);
+      asked.at = now;
+      asked_.write(asked);
+    }
+    return running_.load();
+  });
+  const auto late_us = [&](double percent) { return 1e6 * to_s(loop.lateness().percentile(percent)); };
+  figures_ = {.ticks = loop.ticks(),
+              .missed = loop.missed() + static_cast<std::uint64_t>(clock_.stood_still() / kControlPeriod),
+              .p50_us = 1e6 * to_s(loop.execution().percentile(50)),
+              .p99_us = 1e6 * to_s(loop.execution().percentile(99)),
+              .late = Lateness{late_us(50), late_us(99), 1e6 * to_s(loop.lateness().max())},
+              .degraded = grant.refused};
+}
+
+}  // namespace pons::runner

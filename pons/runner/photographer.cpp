@@ -1,0 +1,78 @@
+#include "pons/runner/photographer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace pons::runner {
+namespace {
+
+constexpr timespec kNever{.tv_sec = 1'000'000'000, .tv_nsec = 0};
+
+}  // namespace
+
+Photographer::Photographer(const world::World& world, std::vector<body::Camera*> cameras, link::Frames& frames,
+                           const link::FramePages& pages, std::byte* memory, Pace pace)
+    : world_(world),
+      cameras_(std::move(cameras)),
+      places_(frames),
+      pace_(pace),
+      finds_(std::ranges::any_of(world.cameras,
+                                 [](const world::CameraSpec& c) { return c.watches == "belt" && !c.reads_labels; })),
+      frames_(cameras_.size()) {
+  for (const world::CameraSpec& spec : world_.cameras) next_shutter_.emplace_back(from_s(spec.phase_s));
+  for (std::size_t camera = 0; camera < frames_.size(); ++camera) pages.lay(frames_[camera], camera, memory);
+  developer_ = std::jthread([this](const std::stop_token& stop) { develop(stop); });
+}
+
+Photographer::~Photographer() = default;
+
+void Photographer::open_shutters(Time now, const body::Sensors& sensors) {
+  for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
+    if (now < next_shutter_[camera]) continue;
+    next_shutter_[camera] += from_s(world_.cameras[camera].period_s);
+    if (finds_ && world_.cameras[camera].reads_labels && !places_.wants_labels()) continue;
+    if (pace_ == Pace::kRealTime && !places_.is_free(camera)) continue;
+    if (!wait_for_place(camera)) return;
+    cameras_[camera]->begin(now);
+    places_.open(camera, {now, sensors.position, sensors.belt_travel_m});
+    const std::lock_guard lock(mutex_);
+    exposed_.push_back(camera);
+    changed_.notify_all();
+  }
+}
+
+bool Photographer::wait_for_place(std::size_t camera) {
+  for (;;) {
+    const std::uint32_t seen = places_.given_back().value();
+    if (places_.failed()) return false;
+    if (places_.is_free(camera)) return true;
+    (void)places_.given_back().wait(seen, kNever);
+  }
+}
+
+void Photographer::develop(const std::stop_token& stop) {
+  for (;;) {
+    std::size_t camera = 0;
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [&] { return !exposed_.empty(); })) return;
+      camera = exposed_.front();
+      exposed_.pop_front();
+    }
+    if (auto finished = cameras_[camera]->finish(frames_[camera]); !finished) {
+      const std::lock_guard lock(mutex_);
+      error_ = finished.error();
+      places_.fail();
+      return;
+    }
+    places_.hand_over(camera);
+  }
+}
+
+Expected<void> Photographer::health() const {
+  const std::lock_guard lock(mutex_);
+  if (error_) return std::unexpected(*error_);
+  return {};
+}
+
+}  // namespace pons::runner

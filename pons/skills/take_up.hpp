@@ -1,0 +1,43 @@
+// What the arm's skills must know when a bridge follows one that is no more: what hangs on the cups, and whether a task
+// that was begun can go on.
+#pragma once
+
+#include <string>
+
+#include "pons/skills/cell.hpp"
+#include "pons/task/task.hpp"
+
+namespace pons::skills {
+
+class TakeUp {
+ public:
+  // `cell` must outlive it.
+  explicit TakeUp(Cell& cell) : cell_(cell) {}
+
+  // What is on the cups, to be written down whenever it changes: {"code":…,"mass_kg":…,"size_m":[…],"yaw_rad":…,
+  // "offset_m":[…]}, as in Held; null when nothing is.
+  [[nodiscard]] task::Json carries() const;
+
+  // After refresh(): believes what was written last, as far as the cups still hold something.
+  void restore(const task::Json& carried);
+
+  enum class Fate : std::uint8_t {
+    kGoesOn,  // what the next step needs is at hand
+    kDone,    // the next step had done its work: the load was let go over its place
+    kLost,    // it was carried, and is no more
+    kBroken,  // it was in the middle of something that cannot be gone on with; nothing is held
+  };
+  // Of a task whose first `done` steps have succeeded, after restore().
+  [[nodiscard]] Fate fate(const task::Task& task, std::size_t done) const;
+
+  // The arm is armed again: lets go of what the cups hold and nobody knows.
+  void settle();
+
+ private:
+  [[nodiscard]] bool is_over(const std::string& place) const;
+
+  Cell& cell_;
+  std::string carried_;  // the code that was written down, whether still held or not
+};
+
+}  // namespace pons::skills

@@ -1,0 +1,222 @@
+// Body and bridge in two processes: together they sort; either may be killed at any moment.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "pons/bridge/journal/journal.hpp"
+#include "pons/gate/local_socket.hpp"
+#include "pons/rt/periodic_loop.hpp"
+#include "tests/end_to_end/outcomes.hpp"
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int kBadInput = 2, kBodyGone = 3, kInterrupted = 130;
+constexpr Duration kLongest = std::chrono::seconds(120);  // beyond it a run hangs
+
+class Processes : public ::testing::Test {
+ protected:
+  std::vector<std::string> body(int parcels, const std::string& name = "body") const {
+    return {"body",     "parcel_cell", "--parcels", std::to_string(parcels),   "--seed",   "4",
+            "--link",   link_,         "--log",     folder_ / (name + ".log"), "--report", folder_ / (name + ".json"),
+            "--explain"};
+  }
+  std::vector<std::string> bridge(int parcels) const {
+    return {"bridge",    "parcel_cell",    "--parcels", std::to_string(parcels), "--seed", "4", "--link", link_,
+            "--journal", folder_ / "j.db", "--socket",  folder_ / "s",           "--wait", "60"};
+  }
+  // Asks `holds` again and again, until it does.
+  static bool eventually(const std::function<bool()>& holds) {
+    const rt::MonotonicClock clock;  // the processes live by the computer's
+    rt::PeriodicLoop loop(clock, std::chrono::milliseconds(20));
+    bool held = false;
+    loop.run([&](Time now) {
+      held = holds();
+      return !held && now < Time(kLongest);
+    });
+    return held;
+  }
+  // The task in whose events `kind` of `skill` has come last, by the bridge at work; empty: none.
+  std::string task_at(const std::string& kind, const std::string& skill) const {
+    const auto list = gate::ask(folder_ / "s", {{"op", "list"}});
+    if (!list || !list->value("ok", false)) return {};
+    for (const auto& task : list->at("tasks")) {
+      if (!task.value("started", false) || !task.value("outcome", std::string{}).empty()) continue;
+      const auto shown = gate::ask(folder_ / "s", {{"op", "show"}, {"id", task.at("id")}});
+      if (!shown || !shown->value("ok", false) || shown->at("events").empty()) continue;
+      const auto& last = shown->at("events").back();
+      if (last.value("kind", std::string{}) == kind && last.at("detail").value("skill", std::string{}) == skill)
+        return task.at("id");
+    }
+    return {};
+  }
+  void expect_nothing_left() const {
+    EXPECT_FALSE(std::filesystem::exists("/dev/shm/pons." + link_));
+    EXPECT_FALSE(std::filesystem::exists("/dev/shm/pons." + link_ + ".frames"));
+  }
+
+  const Folder folder_;
+  const std::string link_ = "test." + std::to_string(getpid());
+};
+
+// As RealTime asks of one process; a computer that stood still for others in the meantime gets a second try.
+TEST_F(Processes, AgreeWithLockstepOnEachOfThirtyParcels) {
+  const Finished lockstep = run_pons({"run", "parcel_cell", "--parcels", "30", "--seed", "4", "--quiet", "--lockstep",
+                                      "--journal", folder_ / "lockstep.db"});
+  EXPECT_EQ(lockstep.code, 0) << lockstep.out << lockstep.err;
+  const auto wanted = outcomes(folder_ / "lockstep.db");
+  EXPECT_GE(wanted.size(), 29U);
+  std::map<std::string, std::string> got;
+  Finished told;
+  for (int again = 0; again < 2 && got != wanted; ++again) {
+    std::filesystem::remove(folder_ / "j.db");
+    Running body_process(folder_.path(), "body", body(30));
+    Running bridge_process(folder_.path(), "bridge", bridge(30));
+    EXPECT_EQ(bridge_process.wait().code, 0);
+    told = body_process.wait();
+    got = outcomes(folder_ / "j.db");
+  }
+  EXPECT_EQ(got, wanted) << told.out;
+  EXPECT_EQ(told.code, 0) << told.out << told.err;
+  const nlohmann::json report = read_json(folder_ / "body.json");
+  expect_accounted_for(report);
+  EXPECT_GT(report["loop"]["ticks"], 60'000);
+  EXPECT_GT(report["throughput"]["parcels_per_hour"], 0);
+}
+
+TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlacesIt) {
+  constexpr int kParcels = 6;
+  Running body_process(folder_.path(), "body", body(kParcels));
+  std::string carried;
+  {
+    Running first(folder_.path(), "first", bridge(kParcels));
+    ASSERT_TRUE(eventually([&] { return !(carried = task_at("attempt", "place")).empty(); })) << first.err();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait().code, -SIGKILL);
+  }
+  // By the loop's own account, in the run's time.
+  ASSERT_TRUE(eventually([&] { return read_text(folder_ / "body.log").find("standstill") != std::string::npos; }));
+  const std::string log = read_text(folder_ / "body.log");
+  EXPECT_THAT(log, HasSubstr("protective stop: heartbeat lost"));
+  std::smatch silent, standing;
+  ASSERT_TRUE(std::regex_search(log, silent, std::regex("no command for ([0-9.]+) ms"))) << log;
+  EXPECT_LE(std::stod(silent[1]), 105) << "a tick or two, and the leash";
+  ASSERT_TRUE(std::regex_search(log, standing, std::regex("standstill CONFIRMED ([0-9]+) ms"))) << log;
+  EXPECT_LE(std::stoi(standing[1]), 1000);
+
+  Running second(folder_.path(), "second", bridge(kParcels));
+  const Finished ended = second.wait();
+  EXPECT_EQ(ended.code, 0) << ended.out << ended.err;
+  const Finished told = body_process.wait();
+  EXPECT_EQ(told.code, 0) << told.out << told.err;
+  const nlohmann::json report = read_json(folder_ / "body.json");
+  expect_accounted_for(report);
+  EXPECT_EQ(report["parcels"]["missorted"], 0);
+  EXPECT_EQ(report["limits"]["violations"], 0);
+  EXPECT_EQ(outcomes(folder_ / "j.db").at(carried.substr(0, carried.find('.'))), "SUCCEEDED") << told.out;
+  const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
+  ASSERT_TRUE(journal) << journal.error().line();
+  const auto events = (*journal)->events(carried);
+  ASSERT_TRUE(events);
+  const auto resumed = std::ranges::find(*events, "resumed", &bridge::Event::kind);
+  ASSERT_NE(resumed, events->end()) << "what is in the hand goes on, and is not asked for again";
+  EXPECT_EQ(resumed->detail.at("step"), 1) << "with what was left of it";
+  expect_nothing_left();
+}
+
+TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
+  Running first_body(folder_.path(), "body", body(6));
+  Running bridge_process(folder_.path(), "bridge", bridge(6));
+  ASSERT_TRUE(eventually([&] { return !task_at("attempt", "pick").empty(); })) << bridge_process.err();
+  first_body.signal(SIGKILL);
+  EXPECT_EQ(first_body.wait().code, -SIGKILL);
+  const Finished ended = bridge_process.wait();
+  EXPECT_EQ(ended.code, kBodyGone) << ended.err;
+  EXPECT_THAT(ended.err, HasSubstr("the body has gone"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db-wal")) << "the journal was not closed";
+  EXPECT_FALSE(outcomes(folder_ / "j.db").empty());
+
+  // What it left does not hinder the next body; the journal of its run is of no use to that one's bridge.
+  Running next_body(folder_.path(), "next", body(6, "next"));
+  const Finished refused = run_pons(bridge(6));
+  EXPECT_EQ(refused.code, kBadInput) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("holds a run of another body"));
+  next_body.signal(SIGINT);
+  EXPECT_EQ(next_body.wait().code, kInterrupted);
+  expect_nothing_left();
+}
+
+TEST_F(Processes, CtrlCOfEitherIsOrderly) {
+  Running body_process(folder_.path(), "body", body(6));
+  {
+    Running first(folder_.path(), "first", bridge(6));
+    ASSERT_TRUE(eventually([&] { return !task_at("attempt", "place").empty(); })) << first.err();
+    first.signal(SIGINT);
+    EXPECT_EQ(first.wait().code, kInterrupted);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db-wal"));
+  for (const auto& [id, outcome] : outcomes(folder_ / "j.db")) EXPECT_NE(outcome, "none") << id;
+  // The body waits for another; that one ends with it.
+  Running second(folder_.path(), "second", bridge(6));
+  ASSERT_TRUE(eventually([&] { return gate::ask(folder_ / "s", {{"op", "list"}}).has_value(); })) << second.err();
+  body_process.signal(SIGINT);
+  EXPECT_EQ(second.wait().code, kInterrupted);
+  const Finished told = body_process.wait();
+  EXPECT_EQ(told.code, kInterrupted) << told.err;
+  expect_accounted_for(read_json(folder_ / "body.json"));
+  expect_nothing_left();
+}
+
+TEST_F(Processes, WhatDoesNotBelongTogetherIsRefusedByName) {
+  std::vector<std::string> alone = bridge(6);
+  alone.back() = "0";
+  const Finished nobody = run_pons(alone);
+  EXPECT_EQ(nobody.code, kBadInput);
+  EXPECT_THAT(nobody.err, HasSubstr("nobody owns it; start its owner first"));
+
+  Running body_process(folder_.path(), "body", body(6));
+  ASSERT_TRUE(eventually([&] { return body_process.err().find("waits for its bridge") != std::string::npos; }));
+  const auto refused = [](const std::vector<std::string>& arguments) {
+    const Finished finished = run_pons(arguments);
+    EXPECT_EQ(finished.code, kBadInput) << finished.err;
+    return finished.err;
+  };
+  EXPECT_THAT(refused(body(6, "second")), HasSubstr("another process owns it"));
+  EXPECT_THAT(refused(bridge(7)), HasSubstr("the body was started with other parcels"));
+  std::vector<std::string> small = bridge(6);
+  small[1] = "small_cell";
+  EXPECT_THAT(refused(small), HasSubstr("the body runs the world 'parcel_cell', not 'small_cell'"));
+  EXPECT_THAT(refused({"bridge", "parcel_cell", "--link", link_}), HasSubstr("no journal is named"));
+  EXPECT_THAT(refused({"body", "parcel_cell", "--link", "a/b"}), HasSubstr("is no name for shared memory"));
+  // The same name, another camera: the run cannot be the same.
+  const std::filesystem::path worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  std::string text = read_text(worlds / "parcel_cell/world.yaml");
+  text.replace(text.find("width: 928"), 10, "width: 960");
+  write_text(worlds / "parcel_cell/world.yaml", text);
+  const Finished other = run_pons(bridge(6), {"PONS_WORLDS=" + worlds.string()});
+  EXPECT_EQ(other.code, kBadInput);
+  EXPECT_THAT(other.err, HasSubstr("has another robot, belt or cameras"));
+
+  Running bridge_process(folder_.path(), "bridge", bridge(6));
+  ASSERT_TRUE(eventually([&] { return gate::ask(folder_ / "s", {{"op", "list"}}).has_value(); }));
+  std::vector<std::string> second = bridge(6);
+  second[second.size() - 5] = folder_ / "other.db";
+  EXPECT_THAT(refused(second), HasSubstr("another process uses it"));
+  body_process.signal(SIGINT);
+  EXPECT_EQ(body_process.wait().code, kInterrupted);
+  expect_nothing_left();
+}
+
+}  // namespace
+}  // namespace pons::tests
