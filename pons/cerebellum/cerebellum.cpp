@@ -41,7 +41,7 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
   measured_position_ = measured_speed_ = position_now_ = speed_now_ = zero;
   state_.commanded = commanded_;
   state_.position = state_.speed = state_.torque_nm = zero;
-  state_.epoch = 1;  // a command that nobody gave an epoch is an old one
+  state_.epoch = machine_.epoch();
   queue_.rest(zero, start);
 }
 
@@ -110,10 +110,10 @@ bool Cerebellum::is_standing(Time now) const {
 
 void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   word_raised_ = link.emergency_stop_raised();
-  if (word_raised_) stop(StopKind::kEmergency, StopCause::kEmergencyWord, now);
-  if (powered_ && is_silent(now) && stop(StopKind::kEmergency, StopCause::kBodySilent, now))
+  if (word_raised_) stop(StopCause::kEmergencyWord, now);
+  if (powered_ && is_silent(now) && stop(StopCause::kBodySilent, now))
     log_.write(now, "no newer measurement for {:.1f} ms", 1e3 * to_s(now - fresh_at_));
-  if (stop_input_) stop(StopKind::kProtective, StopCause::kStopInput, now);
+  if (stop_input_) stop(StopCause::kStopInput, now);
   watch_following(now);
 }
 
@@ -130,8 +130,10 @@ void Cerebellum::watch_following(Time now) {
   const bool strays = error > settings_.following_error_rad;
   if (strays && !strays_) strays_since_ = now;
   strays_ = strays;
-  if (strays && now - strays_since_ >= settings_.following_time &&
-      stop(StopKind::kProtective, StopCause::kFollowingError, now))
+  if (!strays || now - strays_since_ < settings_.following_time) return;
+  // Once it stands it must stay: what moves it then is stronger than its drives.
+  const bool stands = state_.safety == SafetyState::kProtectiveStop;
+  if (stop(stands ? StopCause::kNoStandstill : StopCause::kFollowingError, now))
     log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
 }
 
@@ -145,8 +147,7 @@ void Cerebellum::take_commands(Time now, link::CerebellumEnd& link) {
   if (state_.dropped > dropped)
     log_.write(now, "refused {} commands up to number {}: {}, epoch {}", state_.dropped - dropped, state_.last_sequence,
                name(state_.safety), state_.epoch);
-  if (state_.safety == SafetyState::kOperational && now - heard_at_ >= settings_.heartbeat_timeout &&
-      stop(StopKind::kProtective, StopCause::kHeartbeatLost, now))
+  if (moves(state_.safety) && now - heard_at_ >= settings_.heartbeat_timeout && stop(StopCause::kHeartbeatLost, now))
     log_.write(now, "no command for {:.1f} ms", 1e3 * to_s(now - heard_at_));
 }
 
@@ -154,7 +155,7 @@ bool Cerebellum::take(const link::Command& command, Time now) {
   // These two are never too old: one says that somebody lives, the other asks for less.
   if (command.kind == CommandKind::kHeartbeat) return true;
   if (command.kind == CommandKind::kProtectiveStop) {
-    stop(StopKind::kProtective, StopCause::kCommanded, now);
+    stop(StopCause::kCommanded, now);
     return true;
   }
   if (command.epoch != state_.epoch) return false;
@@ -179,7 +180,7 @@ bool Cerebellum::take(const link::Command& command, Time now) {
 bool Cerebellum::take_motion(const link::Command& command, Time now) {
   const Refusal refusal = queue_.append(command.segment, command.splice, stepped_);
   if (refusal == Refusal::kNone) return true;
-  if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+  if (stop(StopCause::kBadCommand, now))
     log_.write(now, "command {}, motion from {:.6f} s on: {}", command.sequence, command.segment.start.s(),
                name(refusal));
   return false;
@@ -189,7 +190,7 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
   const auto& com = command.payload_com_m;
   const bool near = std::all_of(com.begin(), com.end(), [](double x) { return std::abs(x) <= 2; });
   if (!(command.payload_kg >= 0) || !(command.payload_kg <= settings_.max_payload_kg) || !near) {
-    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+    if (stop(StopCause::kBadCommand, now))
       log_.write(now, "command {}: a payload of {:.3g} kg, or where no load can be", command.sequence,
                  command.payload_kg);
     return false;
@@ -198,57 +199,59 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
   return true;
 }
 
+bool Cerebellum::enter(SafetyEvent event) {
+  const Transition* const row = machine_.apply(event);
+  if (row == nullptr) return false;
+  state_.safety = machine_.state();
+  state_.epoch = machine_.epoch();
+  powered_ = machine_.powered();
+  return true;
+}
+
 bool Cerebellum::reset(Time now) {
-  const bool stopped = state_.safety == SafetyState::kProtectiveStop || state_.safety == SafetyState::kEmergencyStop;
-  if (!stopped || !is_released()) return false;
-  state_.safety = SafetyState::kDisarmed;
+  if (!is_released() || !enter(SafetyEvent::kReset)) return false;
   state_.cause = StopCause::kNone;
   state_.stop_result = StopResult::kNone;
-  emergency_ = false;
+  queue_.rest(commanded_.position, stepped_);
   log_.write(now, "reset: disarmed");
   return true;
 }
 
 bool Cerebellum::arm(Time now) {
-  if (state_.safety != SafetyState::kDisarmed || !is_released()) return false;
+  if (!is_released()) return false;
   const AxisVector inside = measured_position_.cwiseMax(limits().position_min).cwiseMin(limits().position_max);
   if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance) return false;
-  if (!powered_) tracker_.reset();
-  powered_ = true;
+  const bool had_power = powered_;
+  if (!enter(SafetyEvent::kArm)) return false;
+  if (!had_power) tracker_.reset();
   commanded_ = before_ = at_rest(inside);
   queue_.rest(inside, stepped_);
   heard_at_ = now;
-  state_.safety = SafetyState::kOperational;
   log_.write(now, "armed in epoch {}", state_.epoch);
   return true;
 }
 
-bool Cerebellum::stop(StopKind kind, StopCause cause, Time now) {
-  const bool stopped = state_.safety == SafetyState::kStopping || state_.safety == SafetyState::kProtectiveStop ||
-                       state_.safety == SafetyState::kEmergencyStop;
-  const bool overtakes = kind == StopKind::kEmergency && !emergency_;
-  if (stopped && !overtakes) return false;
+bool Cerebellum::stop(StopCause cause, Time now) {
+  const SafetyEvent event = cause_row(cause)->event;
+  const SafetyState before = state_.safety;
+  const std::uint32_t epoch = state_.epoch;
+  if (!enter(event)) return false;
+  if (is_emergency(before) && state_.epoch == epoch) return true;  // the same stop, only harder
   ++statistics_.stops;
-  if (overtakes) {
-    emergency_ = true;
-    ++state_.epoch;
-  }
   state_.cause = cause;
-  state_.stop_result = StopResult::kPending;
-  if (state_.safety != SafetyState::kStopping) {
+  state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
+  if (!is_braking(before)) {
     motion::plan_stop(commanded_, limits(),
                       std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
     double longest = 0;
-    for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
+    for (Eigen::Index i = 0; i < commanded_.position.size(); ++i)
       longest = std::max(longest, stop_profiles_[static_cast<std::size_t>(i)].duration_s());
-    }
     stop_began_ = stepped_;
     stop_ends_ = std::max(now, stop_began_ + from_s(longest));
     queue_.rest(commanded_.position, stop_ends_);
   }
-  state_.safety = SafetyState::kStopping;
-  log_.write(now, "{} stop: {}", emergency_ ? std::string_view("emergency") : std::string_view("protective"),
-             name(cause));
+  log_.write(now, "{} stop: {}",
+             is_emergency(state_.safety) ? std::string_view("emergency") : std::string_view("protective"), name(cause));
   return true;
 }
 
@@ -258,8 +261,8 @@ void Cerebellum::advance(Time now) {
     commanded_ = before_ = at_rest(seen_ ? measured_position_ : commanded_.position);
     return;
   }
-  if (state_.safety == SafetyState::kOperational) follow(now);
-  if (state_.safety == SafetyState::kStopping) sample_stop(now);
+  if (moves(state_.safety)) follow(now);
+  if (is_braking(state_.safety)) sample_stop(now);
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);
 }
 
@@ -267,11 +270,10 @@ void Cerebellum::follow(Time now) {
   AxisState next = commanded_;
   const Phase phase = queue_.sample(now, next);
   if (phase == Phase::kEndedMoving) {
-    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
-      log_.write(now, "the motion ended moving, and nothing followed");
+    if (stop(StopCause::kBadCommand, now)) log_.write(now, "the motion ended moving, and nothing followed");
   } else if (const auto breach = limit_watch_.breach(commanded_, next, dt_s_)) {
     ++statistics_.refused;
-    if (stop(StopKind::kProtective, StopCause::kLimit, now))
+    if (stop(StopCause::kLimit, now))
       log_.write(now, "axis {} would have gone beyond its {} limit", breach->axis + 1, name(breach->limit));
   } else {
     commanded_ = next;
@@ -289,7 +291,7 @@ void Cerebellum::sample_stop(Time now) {
 }
 
 void Cerebellum::judge_stop(Time now) {
-  const bool at_end = state_.safety == SafetyState::kStopping && now >= stop_ends_;
+  const bool at_end = is_braking(state_.safety) && now >= stop_ends_;
   const bool unsure = state_.stop_result == StopResult::kUncertain || state_.stop_result == StopResult::kFailed;
   if (!at_end && !unsure) return;
   const bool standing = is_standing(now) && (unsure || now - stop_ends_ >= settings_.standstill_time || !powered_);
@@ -301,12 +303,15 @@ void Cerebellum::judge_stop(Time now) {
     state_.stop_result = StopResult::kUncertain;
   }
   if (!at_end || state_.stop_result == StopResult::kPending) return;
-  log_.write(now, "standstill {} {:.0f} ms after the stop began", name(state_.stop_result),
-             1e3 * to_s(now - stop_began_));
-  state_.safety = emergency_ ? SafetyState::kEmergencyStop : SafetyState::kProtectiveStop;
-  if (emergency_) {
-    powered_ = false;
-  } else if (state_.cause == StopCause::kFollowingError) {
+  const StopResult result = state_.stop_result;
+  log_.write(now, "standstill {} {:.0f} ms after the stop began", name(result), 1e3 * to_s(now - stop_began_));
+  if (!standing) {
+    stop(StopCause::kNoStandstill, now);
+    state_.stop_result = result;
+    return;
+  }
+  enter(SafetyEvent::kStandstill);
+  if (state_.cause == StopCause::kFollowingError) {
     // Something holds the arm off: holding the commanded place would go on pressing.
     commanded_ = at_rest(measured_position_);
     tracker_.reset();

@@ -1,16 +1,8 @@
 // The control step and the safety machine: follows the motion that the link brings, keeps every limit in every tick,
 // and stops by itself. It never waits for anyone, knows no task and no brain, and needs nobody alive to stop safely.
 //
-// States (IEC 60204-1 stop categories in brackets):
-//   disarmed         after start (drives off, brakes on) and after kReset (drives as the stop left them: holding after
-//   a
-//                    protective stop, off after an emergency stop); takes no motion
-//   operational      after kArm: follows motion, holds still when there is none
-//   stopping         decelerates along jerk limits from the last commanded state, then waits for standstill
-//   protective stop  [2] at rest, powered, holding; nothing but kReset leaves it
-//   emergency stop   [1] at rest, drives off once standstill is measured, or [0] when it is not within confirm_within
-// A protective stop that an emergency stop overtakes becomes one. Every emergency stop raises the epoch by one. Cups
-// keep what they were told through every stop: a held parcel stays held.
+// When it stops, how hard, and what leads out of a stop again: safety_machine.hpp, docs/safety.md. Cups keep what they
+// were told through every stop: a held parcel stays held.
 #pragma once
 
 #include <array>
@@ -19,6 +11,7 @@
 #include "pons/body/body.hpp"
 #include "pons/cerebellum/limit_watch.hpp"
 #include "pons/cerebellum/motion_queue.hpp"
+#include "pons/cerebellum/safety_machine.hpp"
 #include "pons/cerebellum/tracker.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/core/time.hpp"
@@ -78,8 +71,6 @@ class Cerebellum {
   [[nodiscard]] rt::EventLog& log() { return log_; }
 
  private:
-  enum class StopKind : std::uint8_t { kProtective, kEmergency };
-
   void take_measurement(Time now, const body::Sensors& sensors);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
@@ -89,8 +80,10 @@ class Cerebellum {
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
   [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
-  // False if it is stopped or stopping already.
-  bool stop(StopKind kind, link::StopCause cause, Time now);
+  // False where the machine has no such transition.
+  bool enter(SafetyEvent event);
+  // False if it is stopped so or harder already.
+  bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
   void sample_stop(Time now);
@@ -126,7 +119,9 @@ class Cerebellum {
   bool strays_ = false;
   Time strays_since_;
 
-  bool powered_ = false, emergency_ = false, word_raised_ = false, stop_input_ = false;
+  SafetyMachine machine_;
+  bool powered_ = false;  // the machine's
+  bool word_raised_ = false, stop_input_ = false;
   std::uint32_t vacuum_on_ = 0;
   Time heard_at_;  // last command of any kind
   Time stop_began_, stop_ends_;

@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "pons/cerebellum/safety_machine.hpp"
+
 namespace pons::runner {
 namespace {
 
@@ -16,8 +18,10 @@ constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
 
-// A person pressed something: only a person may take that back.
-bool needs_person(StopCause cause) { return cause == StopCause::kEmergencyWord || cause == StopCause::kStopInput; }
+bool needs_person(StopCause cause) {
+  const cerebellum::CauseRow* const row = cerebellum::cause_row(cause);
+  return row != nullptr && row->resumes == cerebellum::Resumes::kPerson;
+}
 
 }  // namespace
 
