@@ -26,6 +26,12 @@ Expected<void> check_resources(const task::SkillRegistry& skills, const world::W
   return {};
 }
 
+cerebellum::Settings settings_of(const world::World& world) {
+  cerebellum::Settings settings;
+  for (std::size_t i = 0; i < world.zones.size(); ++i) settings.zone_speed_share[i] = world.zones[i].speed_share;
+  return settings;
+}
+
 // On a computer shared with others a bridge tick comes late by tens of milliseconds.
 constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
@@ -39,8 +45,12 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto simulation = sim::Simulation::create(self->world, manifest, options.seed);
   if (!simulation) return std::unexpected(simulation.error());
   self->simulation = std::move(*simulation);
+  self->simulation->expect_visits(options.visits);
+  if (options.arm_at) self->simulation->set_arm(*options.arm_at);
+  const cerebellum::Settings settings = settings_of(self->world);
+  if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
   const bool realtime = options.pace == runner::Pace::kRealTime;
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), cerebellum::Settings{}, Time{});
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(model->copy(), settings, Time{});
   self->perception = std::make_unique<perception::Perception>(
       self->world, model->copy(),
       [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
@@ -74,8 +84,8 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
       std::make_unique<runner::CameraCrew>(self->world, self->simulation->cameras(), *self->perception, options.pace);
   std::function<void(Time)> visitors;
   if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
-  self->bridge_side =
-      std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), visitors);
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
+                                                           self->world.zones, options.recovery, visitors);
   return self;
 }
 
@@ -84,6 +94,8 @@ runner::SkillPort Assembly::skill_port() {
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
           .arm = [this](Time now) { cell->arm.arm(now); },
+          .outside_rad = [this] { return cell->arm.outside_rad(); },
+          .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); }};
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "apps/desk.hpp"
 #include "pons/brain/dispatcher.hpp"
@@ -32,6 +33,9 @@ struct AssemblyOptions {
   std::optional<std::filesystem::path> socket;  // where visitors may ask
   std::uint64_t seed = 1;
   runner::Pace pace = runner::Pace::kLockstep;
+  std::vector<sim::Visit> visits;    // who comes into which zone
+  std::optional<AxisVector> arm_at;  // where the arm is found; at home without it
+  runner::Recovery recovery = runner::Recovery::kRefused;
 };
 
 // Members stand in the order in which they need each other.

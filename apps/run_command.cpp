@@ -19,6 +19,7 @@
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
+#include "apps/visits.hpp"
 #include "pons/core/digest.hpp"
 #include "pons/record/file.hpp"
 #include "pons/record/report.hpp"
@@ -34,8 +35,10 @@ struct RunOptions {
   std::string world;
   std::int64_t parcels = 200;
   fs::path manifest, journal, report, log, picture, socket;
+  std::vector<std::string> visits;
+  std::string arm_at;
   std::uint64_t seed = 1;
-  bool parcels_given = false, realtime = false, lockstep = false, quiet = false, explain = false;
+  bool parcels_given = false, realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
 
 constexpr int kPictureWidth = 1280, kPictureHeight = 800;
@@ -290,7 +293,16 @@ int run(const RunOptions& options) {
   if (!journal) return bad_input(journal.error());
   AssemblyOptions assembly{.journal = *journal,
                            .seed = options.seed,
-                           .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep};
+                           .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep,
+                           .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
+  auto visits = visits_of(options.visits, *world);
+  if (!visits) return bad_input(visits.error());
+  assembly.visits = std::move(*visits);
+  if (!options.arm_at.empty()) {
+    const auto position = arm_at(options.arm_at, *world);
+    if (!position) return bad_input(position.error());
+    assembly.arm_at = *position;
+  }
   if (!options.socket.empty()) {
     assembly.socket = options.socket;
   } else if (options.realtime) {
@@ -335,6 +347,10 @@ void add_run(CLI::App& app, Chosen& chosen) {
   command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
   command->add_option("--socket", options->socket,
                       "Where `pons task` reaches this run (on by default with --realtime)");
+  command->add_option("--visit", options->visits,
+                      "ZONE@FROM+FOR: somebody is in that zone from then on, for so long (s)");
+  command->add_option("--arm-at", options->arm_at, "Where the arm is found: an angle an axis, rad, with commas (home)");
+  command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
   command->add_flag("--quiet", options->quiet, "No progress");
   for (CLI::Option* option : command->get_options()) {

@@ -18,10 +18,21 @@ using link::StopResult;
 
 // A burst longer than this waits for the next tick, so that a tick stays short whatever a bridge sends.
 constexpr int kCommandsPerTick = 64;
-// Armed a little outside its limits (by sagging or by hand), the arm is taken to stand on the limit.
-constexpr double kArmTolerance = 0.01;  // rad
 // Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
 constexpr double kTooFast = 1.01;
+// Beyond what a zone allows, from rounding and from a rate that is still settling.
+constexpr double kSlowTolerance = 0.01;
+
+// All that is passed on or reckoned with.
+bool is_finite(const body::Sensors& sensors, Eigen::Index axes) {
+  const auto finite = [](const auto& values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+  };
+  return sensors.position.size() == axes && sensors.speed.size() == axes && sensors.position.allFinite() &&
+         sensors.speed.allFinite() && finite(sensors.wrist_force_n) && finite(sensors.wrist_torque_nm) &&
+         finite(sensors.cup_vacuum_kpa) && std::isfinite(sensors.belt_travel_m) &&
+         std::isfinite(sensors.belt_speed_m_s);
+}
 
 AxisState at_rest(const AxisVector& position) {
   return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
@@ -32,7 +43,9 @@ AxisState at_rest(const AxisVector& position) {
 Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time start)
     : settings_(settings),
       tracker_(std::move(model), settings.gains),
-      limit_watch_(tracker_.robot_model().robot().limits),
+      limits_(tracker_.robot_model().robot().limits),
+      limit_watch_(limits_),
+      motion_time_(settings.rate),
       stepped_(start),
       fresh_at_(start),
       heard_at_(start) {
@@ -45,7 +58,7 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
   queue_.rest(zero, start);
 }
 
-const AxisLimits& Cerebellum::limits() const { return tracker_.robot_model().robot().limits; }
+const AxisLimits& Cerebellum::robot_limits() const { return tracker_.robot_model().robot().limits; }
 
 void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
                       body::SetPoints& set_points) PONS_NONBLOCKING {
@@ -53,6 +66,7 @@ void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEn
   if (now <= stepped_) return;  // no time has passed: what was written stays in force
   dt_s_ = to_s(now - stepped_);
   ++state_.tick;
+  watch_loop(now);
   take_measurement(now, sensors);
   watch(now, link);
   take_commands(now, link);
@@ -60,16 +74,29 @@ void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEn
   judge_stop(now);
   control(now, set_points);
   stepped_ = now;
-  publish(link, sensors, set_points);
+  publish(link, set_points);
+}
+
+// After a gap in its own ticks the commanded motion has run away from the arm: it must not be followed further.
+void Cerebellum::watch_loop(Time now) {
+  if (!powered_ || now - stepped_ <= settings_.stall_timeout) return;
+  const Duration gap = now - stepped_, lost = gap - settings_.period;
+  stepped_ += lost;
+  stop_began_ += lost;
+  stop_ends_ += lost;
+  dt_s_ = to_s(settings_.period);
+  if (stop(StopCause::kLoopStalled, now)) log_.write(now, "no step for {:.1f} ms", 1e3 * to_s(gap));
 }
 
 void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   stop_input_ = sensors.stop_input;
+  watchdog_tripped_ = sensors.watchdog_tripped;
+  zones_ = sensors.zones_occupied;
   const Eigen::Index axes = commanded_.position.size();
-  const bool good = sensors.position.size() == axes && sensors.speed.size() == axes && sensors.position.allFinite() &&
-                    sensors.speed.allFinite() && (!seen_ || sensors.stamp > measured_stamp_);
+  const bool good = is_finite(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
+                    sensors.stamp <= now + settings_.silence_timeout;
   if (good) {
-    const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(limits().speed_rad_s);
+    const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s);
     Eigen::Index fastest = 0;
     const double most = share.maxCoeff(&fastest);
     statistics_.measured_speed = std::max(statistics_.measured_speed, most);
@@ -83,6 +110,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
           statistics_.measured_acceleration, rate.cwiseAbs().cwiseQuotient(limits().acceleration_rad_s2).maxCoeff());
     }
     measured_position_ = sensors.position;
+    publish_measurement(sensors);
     measured_speed_ = sensors.speed;
     measured_stamp_ = sensors.stamp;
     fresh_at_ = now;
@@ -114,7 +142,35 @@ void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   if (powered_ && is_silent(now) && stop(StopCause::kBodySilent, now))
     log_.write(now, "no newer measurement for {:.1f} ms", 1e3 * to_s(now - fresh_at_));
   if (stop_input_) stop(StopCause::kStopInput, now);
+  if (powered_ && watchdog_tripped_) stop(StopCause::kBodyWatchdog, now);
+  watch_zones(now);
   watch_following(now);
+}
+
+// Slowed by scaling the motion's time; what is fast already has slow_within for it.
+void Cerebellum::watch_zones(Time now) {
+  state_.zones_occupied = zones_;
+  double share = 1;
+  zone_stops_ = false;
+  for (std::size_t i = 0; i < kMaxZones; ++i) {
+    if (((zones_ >> i) & 1U) == 0) continue;
+    if (settings_.zone_speed_share[i] > 0) {
+      share = std::min(share, settings_.zone_speed_share[i]);
+      continue;
+    }
+    zone_stops_ = true;
+    if (stop(StopCause::kZone, now)) log_.write(now, "somebody is in zone {}", i + 1);
+  }
+  if (share < state_.speed_share) slow_since_ = now;
+  if (share == 1) slow_since_.reset();
+  state_.speed_share = share;
+}
+
+void Cerebellum::watch_speed(Time now) {
+  if (!slow_since_ || now - *slow_since_ < settings_.slow_within || !moves(state_.safety)) return;
+  const double share = commanded_.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
+  if (share > state_.speed_share * (1 + kSlowTolerance) && stop(StopCause::kNotSlowed, now))
+    log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * share, 100 * state_.speed_share);
 }
 
 void Cerebellum::watch_following(Time now) {
@@ -162,28 +218,40 @@ bool Cerebellum::take(const link::Command& command, Time now) {
   const bool operational = state_.safety == SafetyState::kOperational;
   switch (command.kind) {
     case CommandKind::kMotion:
-      return operational && take_motion(command, now);
+      return moves(state_.safety) && take_motion(command, now);
     case CommandKind::kVacuum:
-      if (operational) vacuum_on_ = command.vacuum_on;
-      return operational;
+      return operational && take_vacuum(command, now);
     case CommandKind::kPayload:
       return take_payload(command, now);
     case CommandKind::kReset:
       return is_standing(now) && reset(now);
     case CommandKind::kArm:
       return is_standing(now) && arm(now);
+    case CommandKind::kRecover:
+      return is_standing(now) && recover(now);
     default:
       return false;
   }
 }
 
 bool Cerebellum::take_motion(const link::Command& command, Time now) {
-  const Refusal refusal = queue_.append(command.segment, command.splice, stepped_);
+  const Refusal refusal = queue_.append(command.segment, command.splice, motion_time_.time());
   if (refusal == Refusal::kNone) return true;
   if (stop(StopCause::kBadCommand, now))
     log_.write(now, "command {}, motion from {:.6f} s on: {}", command.sequence, command.segment.start.s(),
                name(refusal));
   return false;
+}
+
+bool Cerebellum::take_vacuum(const link::Command& command, Time now) {
+  const std::size_t cups = tracker_.robot_model().robot().tool.cups_m.size();
+  if (cups < kMaxCups && (command.vacuum_on >> cups) != 0) {
+    if (stop(StopCause::kBadCommand, now))
+      log_.write(now, "command {}: cups {:#x} where there are {}", command.sequence, command.vacuum_on, cups);
+    return false;
+  }
+  vacuum_on_ = command.vacuum_on;
+  return true;
 }
 
 bool Cerebellum::take_payload(const link::Command& command, Time now) {
@@ -212,6 +280,7 @@ bool Cerebellum::reset(Time now) {
   if (!is_released() || !enter(SafetyEvent::kReset)) return false;
   state_.cause = StopCause::kNone;
   state_.stop_result = StopResult::kNone;
+  limits_ = robot_limits();
   queue_.rest(commanded_.position, stepped_);
   log_.write(now, "reset: disarmed");
   return true;
@@ -219,16 +288,38 @@ bool Cerebellum::reset(Time now) {
 
 bool Cerebellum::arm(Time now) {
   if (!is_released()) return false;
-  const AxisVector inside = measured_position_.cwiseMax(limits().position_min).cwiseMin(limits().position_max);
-  if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance) return false;
-  const bool had_power = powered_;
-  if (!enter(SafetyEvent::kArm)) return false;
-  if (!had_power) tracker_.reset();
-  commanded_ = before_ = at_rest(inside);
-  queue_.rest(inside, stepped_);
-  heard_at_ = now;
+  const AxisVector inside =
+      measured_position_.cwiseMax(robot_limits().position_min).cwiseMin(robot_limits().position_max);
+  if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance_rad) return false;
+  if (!begin(SafetyEvent::kArm, inside, now)) return false;
   log_.write(now, "armed in epoch {}", state_.epoch);
   return true;
+}
+
+// Outside its limits the arm may be where it is, and come in from there; narrow() then takes back what it has left.
+bool Cerebellum::recover(Time now) {
+  if (!is_released() || !begin(SafetyEvent::kRecover, measured_position_, now)) return false;
+  limits_.position_min = limits_.position_min.cwiseMin(measured_position_);
+  limits_.position_max = limits_.position_max.cwiseMax(measured_position_);
+  limits_.speed_rad_s *= settings_.recovery_share;
+  log_.write(now, "recovery in epoch {}", state_.epoch);
+  return true;
+}
+
+bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) {
+  const bool had_power = powered_;
+  if (!enter(event)) return false;
+  if (!had_power) tracker_.reset();
+  commanded_ = before_ = at_rest(position);
+  queue_.rest(position, stepped_);
+  motion_time_.restart(stepped_);
+  heard_at_ = now;
+  return true;
+}
+
+void Cerebellum::narrow() {
+  limits_.position_min = robot_limits().position_min.cwiseMin(commanded_.position);
+  limits_.position_max = robot_limits().position_max.cwiseMax(commanded_.position);
 }
 
 bool Cerebellum::stop(StopCause cause, Time now) {
@@ -268,8 +359,15 @@ void Cerebellum::advance(Time now) {
 
 void Cerebellum::follow(Time now) {
   AxisState next = commanded_;
-  const Phase phase = queue_.sample(now, next);
-  if (phase == Phase::kEndedMoving) {
+  double wanted = 1;
+  if (state_.speed_share < 1) {
+    const double fastest = queue_.fastest(motion_time_.time(), robot_limits().speed_rad_s);
+    wanted = fastest > state_.speed_share ? state_.speed_share / fastest : 1;
+  }
+  const auto [phase, possible] = motion_time_.step(queue_, limits(), wanted, from_s(dt_s_), next);
+  if (!possible) {
+    if (stop(StopCause::kNotSlowed, now)) log_.write(now, "no change of the motion's rate keeps the limits");
+  } else if (phase == Phase::kEndedMoving) {
     if (stop(StopCause::kBadCommand, now)) log_.write(now, "the motion ended moving, and nothing followed");
   } else if (const auto breach = limit_watch_.breach(commanded_, next, dt_s_)) {
     ++statistics_.refused;
@@ -277,6 +375,8 @@ void Cerebellum::follow(Time now) {
       log_.write(now, "axis {} would have gone beyond its {} limit", breach->axis + 1, name(breach->limit));
   } else {
     commanded_ = next;
+    if (state_.safety == SafetyState::kRecovery) narrow();
+    watch_speed(now);
   }
 }
 
@@ -339,20 +439,28 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
   torque = clamped;
 }
 
-void Cerebellum::publish(link::CerebellumEnd& link, const body::Sensors& sensors, const body::SetPoints& set_points) {
-  state_.stamp = measured_stamp_;
-  state_.motion_end = queue_.end();
-  state_.commanded = commanded_;
-  state_.position = measured_position_;
-  state_.speed = measured_speed_;
-  state_.torque_nm = set_points.torque_nm;
+// What a good measurement says stays until the next good one.
+void Cerebellum::publish_measurement(const body::Sensors& sensors) {
+  state_.stamp = sensors.stamp;
+  state_.position = sensors.position;
+  state_.speed = sensors.speed;
   state_.wrist_force_n = sensors.wrist_force_n;
   state_.wrist_torque_nm = sensors.wrist_torque_nm;
   state_.cup_vacuum_kpa = sensors.cup_vacuum_kpa;
-  state_.vacuum_on = vacuum_on_;
   state_.belt_travel_m = sensors.belt_travel_m;
   state_.belt_speed_m_s = sensors.belt_speed_m_s;
   state_.photo_eye_blocked = sensors.photo_eye_blocked;
+}
+
+void Cerebellum::publish(link::CerebellumEnd& link, const body::SetPoints& set_points) {
+  const bool follows = moves(state_.safety);
+  state_.rate = follows ? motion_time_.rate() : 1;
+  state_.late = follows ? stepped_ - motion_time_.time() : Duration{0};
+  state_.motion_end = queue_.end() + state_.late;
+  state_.commanded = commanded_;
+  state_.torque_nm = set_points.torque_nm;
+  state_.vacuum_on = vacuum_on_;
+  state_.watchdog_tripped = watchdog_tripped_;
   link.publish(state_);
 }
 

@@ -11,9 +11,10 @@ constexpr std::string_view kHome = "home";
 
 class MoveTo final : public task::Skill {
  public:
-  MoveTo(Cell& cell, std::string place) : cell_(cell), place_(std::move(place)) {}
+  MoveTo(Cell& cell, std::string place) : cell_(cell), place_(std::move(place)), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
+    arrives_ += delay_.take();
     if (!cell_.arm.operational()) {
       moving_ = false;
       return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{};
@@ -56,6 +57,7 @@ class MoveTo final : public task::Skill {
 
   Cell& cell_;
   std::string place_;
+  Delay delay_;
   Time arrives_;
   bool moving_ = false, cancelled_ = false;
 };
