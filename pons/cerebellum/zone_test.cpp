@@ -80,8 +80,10 @@ TEST(Zones, StopTheArmAndRefuseAResetWhileSomebodyIsThere) {
   EXPECT_EQ(bench.state().cause, StopCause::kZone);
   EXPECT_EQ(bench.state().zones_occupied, kStop);
   EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  const auto dropped = bench.state().dropped;
   bench.send(plain_command(CommandKind::kReset));
   bench.run(50ms);
+  EXPECT_EQ(bench.state().dropped, dropped + 1);
   EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
   bench.plant.sensors.zones_occupied = 0;
   bench.send(plain_command(CommandKind::kReset));

@@ -47,6 +47,13 @@ int loop_thread() {
   return found;
 }
 
+// Whether it sleeps until its next tick, rather than is still setting out.
+bool sleeps(int thread) {
+  long call = -1;
+  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/syscall") >> call;
+  return call == SYS_futex;
+}
+
 class HeldLoop : public testing::Test {
  protected:
   void SetUp() override {
@@ -74,6 +81,7 @@ class HeldLoop : public testing::Test {
   void seize_loop() {
     int thread = 0;
     for (thread = loop_thread(); thread == 0; thread = loop_thread()) std::this_thread::yield();
+    while (!sleeps(thread)) std::this_thread::yield();
     hold.store(1);
     ASSERT_EQ(syscall(SYS_tgkill, getpid(), thread, SIGUSR1), 0);
     held.wait(0);
