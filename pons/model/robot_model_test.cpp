@@ -166,7 +166,7 @@ std::filesystem::path without_masses(const std::filesystem::path& urdf) {
   std::string text((std::istreambuf_iterator<char>(in)), {});
   for (auto at = text.find("<mass value=\""); at != std::string::npos; at = text.find("<mass value=\"", at + 1)) {
     const auto number = at + std::string("<mass value=\"").size();
-    text.replace(number, text.find('"', number) - number, "0");
+    text.replace(number, text.find('"', number) - number, 1, '0');
   }
   const auto path = std::filesystem::path(testing::TempDir()) / "weightless.urdf";
   std::ofstream(path) << text;
