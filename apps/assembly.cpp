@@ -26,6 +26,12 @@ Expected<void> check_resources(const task::SkillRegistry& skills, const world::W
   return {};
 }
 
+cerebellum::Settings settings_of(const world::World& world) {
+  cerebellum::Settings settings;
+  for (std::size_t i = 0; i < world.zones.size(); ++i) settings.zone_speed_share[i] = world.zones[i].speed_share;
+  return settings;
+}
+
 // On a computer shared with others a bridge tick comes late by tens of milliseconds.
 constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
@@ -62,7 +68,7 @@ Expected<std::string> body_in(const bridge::Journal& journal) {
 // ---- below the link ----
 
 Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, const world::Manifest& manifest,
-                                                    std::uint64_t seed, const Meeting& meeting) {
+                                                    const BodySetup& setup, const Meeting& meeting) {
   if (world.cameras.size() > link::kMaxCameras) {
     return fail(fmt::format("has {} cameras", world.cameras.size()), (world.folder / "world.yaml").string(),
                 fmt::format("the link has places for {}", link::kMaxCameras));
@@ -70,10 +76,14 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   std::unique_ptr<BodyHalf> self(new BodyHalf(meeting.link));
   auto model = model::RobotModel::load(world.robot);
   if (!model) return std::unexpected(model.error());
-  auto simulation = sim::Simulation::create(world, manifest, seed);
+  const cerebellum::Settings settings = settings_of(world);
+  if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
+  auto simulation = sim::Simulation::create(world, manifest, setup.seed);
   if (!simulation) return std::unexpected(simulation.error());
   self->simulation = std::move(*simulation);
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(std::move(*model), cerebellum::Settings{}, Time{});
+  self->simulation->expect_visits(setup.visits);
+  if (setup.arm_at) self->simulation->set_arm(*setup.arm_at);
+  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(std::move(*model), settings, Time{});
   self->photographer = std::make_unique<runner::Photographer>(world, self->simulation->cameras(), meeting.frames,
                                                               meeting.pages, meeting.pixels, meeting.pace);
   return self;
@@ -124,8 +134,8 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
                                                       meeting.pixels, meeting.pace);
   std::function<void(Time)> visitors;
   if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
-  self->bridge_side =
-      std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), visitors);
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
+                                                           world.zones, options.recovery, visitors);
   return self;
 }
 
@@ -153,6 +163,8 @@ runner::SkillPort BridgeHalf::skill_port() {
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
           .arm = [this](Time now) { cell->arm.arm(now); },
+          .outside_rad = [this] { return cell->arm.outside_rad(); },
+          .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
           .halt = [this] { cell->arm.halt(); },
           .carries = [this] { return take_up->carries(); },
@@ -167,10 +179,11 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
                                                     const AssemblyOptions& options) {
   std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
   const Meeting meeting{self->link, self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(), options.pace};
-  auto body = BodyHalf::build(self->world, manifest, options.seed, meeting);
+  auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above = BridgeHalf::build(self->world, manifest, {options.journal, options.socket, std::nullopt}, meeting);
+  auto above = BridgeHalf::build(self->world, manifest,
+                                 {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
   return self;

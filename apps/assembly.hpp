@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "apps/desk.hpp"
 #include "pons/brain/dispatcher.hpp"
@@ -41,13 +42,21 @@ struct Meeting {
   runner::Pace pace;
 };
 
+// What a simulated body begins with.
+struct BodySetup {
+  std::uint64_t seed = 1;
+  std::vector<sim::Visit> visits;    // who comes into which zone
+  std::optional<AxisVector> arm_at;  // where the arm is found; at home without it
+};
+
 // Members stand in the order in which they need each other.
 class BodyHalf {
  public:
-  // `world` must outlive it. Errors: whatever a part says about its files; more cameras than the link has places.
+  // `world` must outlive it. Errors: whatever a part says about its files; more cameras than the link has places;
+  // limits that contradict each other or that the drives cannot keep.
   [[nodiscard]] static Expected<std::unique_ptr<BodyHalf>> build(const world::World& world,
-                                                                 const world::Manifest& manifest, std::uint64_t seed,
-                                                                 const Meeting& meeting);
+                                                                 const world::Manifest& manifest,
+                                                                 const BodySetup& setup, const Meeting& meeting);
   [[nodiscard]] runner::BodyParts parts();
 
   std::unique_ptr<sim::Simulation> simulation;
@@ -65,6 +74,7 @@ struct BridgeOptions {
   // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
   // holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
+  runner::Recovery recovery = runner::Recovery::kRefused;
 };
 
 class BridgeHalf {
@@ -98,8 +108,9 @@ class BridgeHalf {
 struct AssemblyOptions {
   std::filesystem::path journal;                // as in BridgeOptions
   std::optional<std::filesystem::path> socket;  // likewise
-  std::uint64_t seed = 1;
+  BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;
+  runner::Recovery recovery = runner::Recovery::kRefused;
 };
 
 // Both halves in this process.

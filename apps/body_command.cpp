@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "apps/assembly.hpp"
+#include "apps/body_setup.hpp"
 #include "apps/commands.hpp"
 #include "apps/meeting.hpp"
 #include "apps/run_kit.hpp"
@@ -18,6 +19,7 @@ namespace fs = std::filesystem;
 struct BodyOptions {
   std::string world, link;
   ParcelOptions parcels;
+  BodySetupOptions setup;
   fs::path report, log;
   bool quiet = false, explain = false;
 };
@@ -50,10 +52,12 @@ int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& b
 }
 
 int run_body(const BodyOptions& options, const world::World& world, const world::Manifest& manifest) {
+  const auto setup = body_setup(options.setup, options.parcels.seed, world);
+  if (!setup) return bad_input(setup.error());
   const std::string name = options.link.empty() ? default_link(world.name) : options.link;
   auto place = MeetingPlace::make(name, world, identity_of(world, manifest));
   if (!place) return bad_input(place.error());
-  auto body = BodyHalf::build(world, manifest, options.parcels.seed, place->meeting());
+  auto body = BodyHalf::build(world, manifest, *setup, place->meeting());
   if (!body) return bad_input(body.error());
   LoopLog log;
   if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
@@ -95,6 +99,7 @@ void add_body(CLI::App& app, Chosen& chosen) {
       app.add_subcommand("body", "A world's body, cameras and control loop; the bridge is another process");
   command->add_option("world", options->world, "A world's name; `pons worlds` lists them");
   add_parcel_options(*command, options->parcels);
+  add_body_setup_options(*command, options->setup);
   command->add_option("--link", options->link,
                       "Where bridge and body meet: a name (the world's, and the user's number)");
   command->add_option("--report", options->report,

@@ -24,7 +24,7 @@ struct BridgeCommandOptions {
   ParcelOptions parcels;
   fs::path journal, socket;
   double wait_s = 10;
-  bool quiet = false;
+  bool quiet = false, recover = false;
 };
 
 // Both failures end the run; only one is the body's.
@@ -37,7 +37,8 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
                const MeetingPlace& place) {
   link::Border& border = place.border();
   const BridgeOptions half_options{options.journal, options.socket.empty() ? default_socket() : options.socket,
-                                   border.body};
+                                   border.body,
+                                   options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
   auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
   if (!half) return bad_input(half.error());
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
@@ -119,6 +120,7 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
   command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
       ->check(CLI::Range(0.0, 86400.0));
+  command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--quiet", options->quiet, "No progress");
   refuse_empty(*command);
   command->callback([options, &chosen] { chosen = [options] { return bridge(*options); }; });

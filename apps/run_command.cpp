@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "apps/assembly.hpp"
+#include "apps/body_setup.hpp"
 #include "apps/commands.hpp"
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
@@ -22,8 +23,9 @@ namespace fs = std::filesystem;
 struct RunOptions {
   std::string world;
   ParcelOptions parcels;
+  BodySetupOptions body;
   fs::path journal, report, log, picture, socket;
-  bool realtime = false, lockstep = false, quiet = false, explain = false;
+  bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
 
 constexpr int kPictureWidth = 1280, kPictureHeight = 800;
@@ -133,9 +135,12 @@ int run(const RunOptions& options) {
   Expected<fs::path> journal = options.journal;
   if (options.journal.empty()) journal = temporary.emplace().file();
   if (!journal) return bad_input(journal.error());
+  auto setup = body_setup(options.body, options.parcels.seed, *world);
+  if (!setup) return bad_input(setup.error());
   AssemblyOptions assembly{.journal = *journal,
-                           .seed = options.parcels.seed,
-                           .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep};
+                           .body = std::move(*setup),
+                           .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep,
+                           .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
   if (!options.socket.empty()) {
     assembly.socket = options.socket;
   } else if (options.realtime) {
@@ -164,6 +169,8 @@ void add_run(CLI::App& app, Chosen& chosen) {
   command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
   command->add_option("--socket", options->socket,
                       "Where `pons task` reaches this run (on by default with --realtime)");
+  add_body_setup_options(*command, options->body);
+  command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
   command->add_flag("--quiet", options->quiet, "No progress");
   refuse_empty(*command);

@@ -47,6 +47,7 @@ class Listener final : public body::Body {
     told_ = set_points;
     body_.write(set_points);
   }
+  [[nodiscard]] Duration watchdog() const override { return body_.watchdog(); }
   [[nodiscard]] const body::SetPoints& told() const { return told_; }
 
  private:

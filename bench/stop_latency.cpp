@@ -93,7 +93,7 @@ class Loop {
     sensors_.stamp = now;
     cerebellum_.step(now, sensors_, end_, set_points_);
     const link::State& state = cerebellum_.state();
-    const bool began = was == SafetyState::kOperational && state.safety == SafetyState::kStopping;
+    const bool began = was == SafetyState::kOperational && state.safety == SafetyState::kEmergencyStopping;
     if (began && state.cause == link::StopCause::kEmergencyWord) {
       found.latency.record(clock.now() - Time(Duration(raised_ns.load())));
       shortest_s_ = shortest_stop_s(before, limits_);

@@ -24,6 +24,8 @@ struct Sensors {
   double belt_speed_m_s = 0;                      // encoder
   bool photo_eye_blocked = false;                 // at the belt's entry
   bool stop_input = false;                        // the body's own stop button or safety chain
+  bool watchdog_tripped = false;                  // the body's watchdog has taken the power off: see Body
+  std::uint32_t zones_occupied = 0;               // bit i: somebody is in the world's zone i (scanner, light curtain)
 };
 
 // What the robot is told. Fixed size.
@@ -34,6 +36,11 @@ struct SetPoints {
 };
 
 // A robot. One thread calls read and write, in turn, once a tick.
+//
+// Its watchdog. A body with power that hears no write() for watchdog() of its own time takes the power off by itself:
+// drives off, brakes on, cups as they were told last. That is latched: the body says so in Sensors, and takes
+// set-points with power for ones without until it has heard some without; the next ones with power ask for it anew.
+// Without power silence means nothing. conformance.hpp checks a body against all this.
 class Body {
  public:
   virtual ~Body() = default;
@@ -41,6 +48,8 @@ class Body {
   virtual void read(Sensors& sensors) PONS_NONBLOCKING = 0;
   // In force until the next write. Never blocks.
   virtual void write(const SetPoints& set_points) PONS_NONBLOCKING = 0;
+  // How long it goes on without hearing set-points.
+  [[nodiscard]] virtual Duration watchdog() const = 0;
 };
 
 // A camera: begin() opens the shutter, finish() waits for the picture. begin is called by whoever advances the body;

@@ -1,25 +1,21 @@
 // The control step and the safety machine: follows the motion that the link brings, keeps every limit in every tick,
 // and stops by itself. It never waits for anyone, knows no task and no brain, and needs nobody alive to stop safely.
 //
-// States (IEC 60204-1 stop categories in brackets):
-//   disarmed         after start (drives off, brakes on) and after kReset (drives as the stop left them: holding after
-//   a
-//                    protective stop, off after an emergency stop); takes no motion
-//   operational      after kArm: follows motion, holds still when there is none
-//   stopping         decelerates along jerk limits from the last commanded state, then waits for standstill
-//   protective stop  [2] at rest, powered, holding; nothing but kReset leaves it
-//   emergency stop   [1] at rest, drives off once standstill is measured, or [0] when it is not within confirm_within
-// A protective stop that an emergency stop overtakes becomes one. Every emergency stop raises the epoch by one. Cups
-// keep what they were told through every stop: a held parcel stays held.
+// When it stops, how hard, and what leads out of a stop again: safety_machine.hpp, docs/safety.md. Cups keep what they
+// were told through every stop: a held parcel stays held.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "pons/body/body.hpp"
 #include "pons/cerebellum/limit_watch.hpp"
 #include "pons/cerebellum/motion_queue.hpp"
+#include "pons/cerebellum/motion_time.hpp"
+#include "pons/cerebellum/safety_machine.hpp"
 #include "pons/cerebellum/tracker.hpp"
+#include "pons/core/error.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/core/time.hpp"
 #include "pons/link/link.hpp"
@@ -28,6 +24,16 @@
 #include "pons/rt/event_log.hpp"
 
 namespace pons::cerebellum {
+
+[[nodiscard]] constexpr std::array<double, kMaxZones> all_of_it() {
+  std::array<double, kMaxZones> shares{};
+  shares.fill(1);
+  return shares;
+}
+
+// Armed a little outside its limits (by sagging or by hand), the arm is taken to stand on the limit; further out only
+// recovery is possible.
+inline constexpr double kArmTolerance_rad = 0.01;
 
 struct Settings {
   Gains gains;
@@ -39,35 +45,46 @@ struct Settings {
   double standstill_rad_s = 0.02;                               // every axis below it,
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
   Duration confirm_within = std::chrono::milliseconds(500);     // after the commanded stop ended
-  double max_payload_kg = 20;                                   // a kPayload above is a bad command
+  Duration stall_timeout = std::chrono::milliseconds(20);       // between two steps, while powered
+  RateBounds rate;                                              // of a motion that is slowed for a zone
+  Duration slow_within = std::chrono::milliseconds(500);        // from somebody's coming to the speed that is allowed
+  double recovery_share = 0.1;                                  // of each speed limit, in recovery
+  // What is allowed of each axis' speed limit while somebody is in zone i: 1 all, 0 a protective stop.
+  std::array<double, kMaxZones> zone_speed_share = all_of_it();
+  double max_payload_kg = 20;  // a kPayload above is a bad command
 };
+
+// Whether a cerebellum can work so. Errors: a setting that is not finite or out of range; limits that are not finite,
+// not positive or contradict each other; a home outside them; drives too weak to hold the arm at home.
+[[nodiscard]] Expected<void> check(const model::RobotModel& model, const Settings& settings);
 
 class Cerebellum {
  public:
-  // `start` is the time of the step before the first. The model's robot gives the limits.
+  // `start` is the time of the step before the first. The model's robot gives the limits. Both as check() wants them.
   Cerebellum(model::RobotModel model, const Settings& settings, Time start);
   Cerebellum(const Cerebellum&) = delete;
   Cerebellum& operator=(const Cerebellum&) = delete;
 
   // One tick at `now`, which grows from call to call: takes in the measurement and all commands, moves the commanded
   // state to `now`, and says what the drives shall do until the next. Measurements that are not finite, of another
-  // length or not newer than the last count as none. One thread.
+  // length, from the future or not newer than the last count as none. One thread.
   //
   // Which commands do what, and what refuses them (refused = counted in State::dropped; all need the present epoch
-  // unless stated):
+  // unless stated; another kind is refused):
   //   kHeartbeat       any epoch, any state
-  //   kMotion          operational only, else refused. Not finite, from the past (it begins before the last step), a
-  //   gap or a
-  //                    jump to what is queued (SeamTolerance), a full queue, or queued motion that ends moving:
-  //                    protective stop kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from
-  //                    the last tick.
-  //   kVacuum          operational only
+  //   kMotion          operational or in recovery, else refused. In the motion's time, which is State::late behind the
+  //                    clock's. Not finite, from the past (it begins before the last step), a gap or a jump to what is
+  //                    queued (SeamTolerance), a full queue, or queued motion that ends moving: protective stop
+  //                    kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from the last tick.
+  //   kVacuum          operational only; a cup that the tool does not have: protective stop kBadCommand
   //   kPayload         any state; negative, not finite or above max_payload_kg: protective stop kBadCommand
   //   kProtectiveStop  any epoch, any state
-  //   kReset           from a protective or emergency stop, at measured standstill, word and stop input released
-  //   kArm             disarmed, at measured standstill, word and stop input released; the commanded position becomes
-  //   the
-  //                    measured one
+  //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
+  //                    nobody in a zone that stops
+  //   kArm             disarmed, at measured standstill, inside the position limits, word and stop input released; the
+  //                    commanded position becomes the measured one
+  //   kRecover         likewise, wherever the arm is. Until kReset every axis keeps recovery_share of its speed limit,
+  //                    and one outside its position limits goes no further outside than it is
   void step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
             body::SetPoints& set_points) PONS_NONBLOCKING;
 
@@ -78,35 +95,46 @@ class Cerebellum {
   [[nodiscard]] rt::EventLog& log() { return log_; }
 
  private:
-  enum class StopKind : std::uint8_t { kProtective, kEmergency };
-
+  void watch_loop(Time now);
   void take_measurement(Time now, const body::Sensors& sensors);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
+  void watch_zones(Time now);
+  void watch_speed(Time now);
   void take_commands(Time now, link::CerebellumEnd& link);
   [[nodiscard]] bool take(const link::Command& command, Time now);
   [[nodiscard]] bool take_motion(const link::Command& command, Time now);
+  [[nodiscard]] bool take_vacuum(const link::Command& command, Time now);
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
   [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
-  // False if it is stopped or stopping already.
-  bool stop(StopKind kind, link::StopCause cause, Time now);
+  [[nodiscard]] bool recover(Time now);
+  [[nodiscard]] bool begin(SafetyEvent event, const AxisVector& position, Time now);
+  void narrow();
+  // False where the machine has no such transition.
+  bool enter(SafetyEvent event);
+  // False if it is stopped so or harder already.
+  bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
   void sample_stop(Time now);
   void judge_stop(Time now);
   void control(Time now, body::SetPoints& set_points);
-  void publish(link::CerebellumEnd& link, const body::Sensors& sensors, const body::SetPoints& set_points);
+  void publish_measurement(const body::Sensors& sensors);
+  void publish(link::CerebellumEnd& link, const body::SetPoints& set_points);
 
   [[nodiscard]] bool is_silent(Time now) const;
   [[nodiscard]] bool is_standing(Time now) const;
-  [[nodiscard]] bool is_released() const { return !word_raised_ && !stop_input_; }
-  [[nodiscard]] const AxisLimits& limits() const;
+  [[nodiscard]] bool is_released() const { return !word_raised_ && !stop_input_ && !zone_stops_; }
+  [[nodiscard]] const AxisLimits& limits() const { return limits_; }
+  [[nodiscard]] const AxisLimits& robot_limits() const;
 
   const Settings settings_;
   Tracker tracker_;
+  AxisLimits limits_;  // in force: the robot's, or what recovery makes of them
   LimitWatch limit_watch_;
   MotionQueue queue_;
+  MotionTime motion_time_;
   link::State state_;
   Statistics statistics_;
   rt::EventLog log_;
@@ -123,10 +151,14 @@ class Cerebellum {
   AxisVector measured_position_, measured_speed_, position_now_, speed_now_;
   bool is_still_ = false, is_too_fast_ = false;
   Time still_since_;
+  std::uint32_t zones_ = 0;  // occupied
+  std::optional<Time> slow_since_;
   bool strays_ = false;
   Time strays_since_;
 
-  bool powered_ = false, emergency_ = false, word_raised_ = false, stop_input_ = false;
+  SafetyMachine machine_;
+  bool powered_ = false;  // the machine's
+  bool word_raised_ = false, stop_input_ = false, watchdog_tripped_ = false, zone_stops_ = false;
   std::uint32_t vacuum_on_ = 0;
   Time heard_at_;  // last command of any kind
   Time stop_began_, stop_ends_;

@@ -1,5 +1,6 @@
 #include "pons/cerebellum/motion_queue.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -91,6 +92,44 @@ Refusal MotionQueue::append(const Segment& segment, bool splice, Time sampled) P
   at(count_) = segment;
   ++count_;
   return Refusal::kNone;
+}
+
+Phase MotionQueue::peek(Time time, std::size_t& hint, AxisState& state) const PONS_NONBLOCKING {
+  while (hint + 1 < count_ && at(hint + 1).start <= time) ++hint;
+  if (count_ > 0 && at(hint).start <= time) {
+    pons::sample(at(hint), time, state);
+    if (time <= at(hint).end()) return Phase::kFollowing;
+    if (!is_at_rest(state)) return Phase::kEndedMoving;
+  } else {
+    state.position = rest_;
+  }
+  state.speed.setZero();
+  state.acceleration.setZero();
+  return Phase::kResting;
+}
+
+double MotionQueue::fastest(Time from, const AxisVector& speed_limits) const PONS_NONBLOCKING {
+  constexpr int kParts = 8;
+  double most = 0;
+  for (std::size_t s = 0; s < count_; ++s) {
+    const Segment& segment = at(s);
+    if (segment.end() <= from) continue;
+    const double begin = std::max(0.0, to_s(from - segment.start)), end = to_s(segment.duration);
+    for (Eigen::Index i = 0; i < speed_limits.size(); ++i) {
+      const auto& c = segment.coefficients[static_cast<std::size_t>(i)];
+      const auto speed = [&](double t) {
+        return std::abs(c[1] + t * (2 * c[2] + t * (3 * c[3] + t * (4 * c[4] + t * 5 * c[5])))) / speed_limits[i];
+      };
+      most = std::max({most, speed(begin), speed(end)});
+      if (c[4] == 0 && c[5] == 0) {
+        const double turn = c[3] == 0 ? begin : -c[2] / (3 * c[3]);
+        if (turn > begin && turn < end) most = std::max(most, speed(turn));
+      } else {
+        for (int k = 1; k < kParts; ++k) most = std::max(most, speed(begin + (end - begin) * k / kParts));
+      }
+    }
+  }
+  return most;
 }
 
 Phase MotionQueue::sample(Time time, AxisState& state) PONS_NONBLOCKING {

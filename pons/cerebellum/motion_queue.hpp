@@ -45,6 +45,13 @@ class MotionQueue {
   // The motion at `time`, which must not go backwards from call to call. Drops what has ended.
   [[nodiscard]] Phase sample(Time time, AxisState& state) PONS_NONBLOCKING;
 
+  // The same at any time not before the last sample(), and nothing is dropped. `hint` is of the call before, on the
+  // same queue and for an earlier time, or 0.
+  Phase peek(Time time, std::size_t& hint, AxisState& state) const PONS_NONBLOCKING;
+  // The largest share of its axis' speed limit that the motion from `from` on has. Exact for constant jerk, else to
+  // within what it changes in an eighth of a segment.
+  [[nodiscard]] double fastest(Time from, const AxisVector& speed_limits) const PONS_NONBLOCKING;
+
   // When the queued motion ends, or the last one ended.
   [[nodiscard]] Time end() const PONS_NONBLOCKING;
   [[nodiscard]] std::size_t size() const PONS_NONBLOCKING { return count_; }

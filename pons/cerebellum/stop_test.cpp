@@ -79,7 +79,8 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
     before = bench.state().commanded;
     bench.tick();
   }
-  ASSERT_EQ(bench.state().safety, SafetyState::kStopping);
+  const SafetyState braking = GetParam().emergency ? SafetyState::kEmergencyStopping : SafetyState::kStopping;
+  ASSERT_EQ(bench.state().safety, braking);
   EXPECT_EQ(bench.state().cause, GetParam().cause);
   EXPECT_EQ(bench.state().stop_result, StopResult::kPending);
   const Time began = bench.now - 1ms;
@@ -91,7 +92,7 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
   const double hardest = -bench_robot().limits.acceleration_rad_s2[fastest] * (1 - 1e-9);
   EXPECT_LT(along * bench.state().commanded.acceleration[fastest],
             std::max(along * before.acceleration[fastest], hardest));
-  while (bench.state().safety == SafetyState::kStopping && !is_at_rest(bench.state().commanded)) bench.tick();
+  while (bench.state().safety == braking && !is_at_rest(bench.state().commanded)) bench.tick();
   EXPECT_LE(to_s(bench.now - began), shortest_stop_s(before) + 2e-3);
   bench.run(600ms);
   EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
@@ -202,7 +203,7 @@ TEST(BodySilence, StopsBlindAndSaysFailedThenPowersOff) {
   bench.run(17ms);
   EXPECT_TRUE(bench.operational());
   bench.run(5ms);
-  EXPECT_EQ(bench.state().safety, SafetyState::kStopping);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStopping);
   EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
   bench.run(500ms);
   EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
@@ -246,6 +247,36 @@ TEST(StopResultTest, IsUncertainWhenTheArmWillNotStandStill) {
   EXPECT_FALSE(bench.plant.set_points.power);  // category 0 when standstill is not confirmed in time
   bench.run(100ms);                            // the brakes do
   EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+}
+
+TEST(StopResultTest, AProtectiveStopWithoutStandstillFallsBackToCategoryZero) {
+  Bench bench;
+  get_moving(bench);
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  for (int i = 0; i < 1200 && bench.plant.set_points.power; ++i) {
+    bench.plant.extra_torque_nm[5] = (i / 10) % 2 == 0 ? 25 : -25;
+    bench.tick();
+  }
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().cause, StopCause::kNoStandstill);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kUncertain);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  EXPECT_EQ(bench.state().epoch, 2u);
+  bench.run(100ms);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+}
+
+TEST(StopResultTest, AnArmThatIsPushedOutOfAProtectiveStopLosesItsPower) {
+  Bench bench;
+  get_moving(bench);
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  bench.run(1s);
+  ASSERT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+  bench.plant.extra_torque_nm[5] = 60;  // twice what its motor has
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().cause, StopCause::kNoStandstill);
+  EXPECT_FALSE(bench.plant.set_points.power);
 }
 
 TEST(Heartbeat, AnyCommandCountsAndOneHundredMillisecondsAreEnough) {

@@ -33,6 +33,7 @@ world::Robot make_robot() {
   robot.rotor_inertia_kg_m2 = AxisVector::Constant(6, 0.01);
   robot.tool.mass_kg = 0.9;
   robot.tool.com_m = Vector3(0, 0, 0.06);
+  robot.tool.cups_m.resize(4, Vector3::Zero());
   return robot;
 }
 
@@ -98,6 +99,11 @@ void Plant::advance_to(Time time) {
   }
 }
 
+void Plant::place(const AxisVector& position) {
+  position_ = sensors.position = position;
+  speed_.setZero();
+}
+
 Bench::Bench(const PlantSettings& plant_settings, const Settings& settings)
     : cerebellum(bench_model(), settings, Time{}), plant(plant_settings, bench_robot().home) {}
 
@@ -105,7 +111,9 @@ void Bench::tick() {
   now += std::chrono::milliseconds(1);
   plant.advance_to(now);
   if (!mute && now.ns() % 10'000'000 == 0) send(plain_command(link::CommandKind::kHeartbeat));
-  cerebellum.step(now, plant.sensors, end, plant.set_points);
+  body::Sensors seen = plant.sensors;
+  if (spoil) spoil(seen);
+  cerebellum.step(now, seen, end, plant.set_points);
   if (operational()) worst_error_rad = std::max(worst_error_rad, error_rad());
 }
 

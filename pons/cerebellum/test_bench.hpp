@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ class Plant {
  public:
   Plant(const PlantSettings& settings, const AxisVector& position);
   void advance_to(Time time);
+  void place(const AxisVector& position);  // at rest there, without a way
   body::Sensors sensors;
   body::SetPoints set_points;
   AxisVector extra_torque_nm;  // from outside, at the joints
@@ -61,7 +63,8 @@ class Bench {
   Cerebellum cerebellum;
   Plant plant;
   bool mute = false;
-  double worst_error_rad = 0;  // since arming
+  std::function<void(body::Sensors&)> spoil;  // what comes between measurement and cerebellum
+  double worst_error_rad = 0;                 // since arming
 
  private:
   std::uint64_t sequence_ = 0;

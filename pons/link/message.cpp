@@ -14,6 +14,10 @@ std::string_view name(SafetyState state) {
       return "protective stop";
     case SafetyState::kEmergencyStop:
       return "emergency stop";
+    case SafetyState::kEmergencyStopping:
+      return "emergency stopping";
+    case SafetyState::kRecovery:
+      return "recovery";
   }
   return "unknown";
 }
@@ -38,6 +42,16 @@ std::string_view name(StopCause cause) {
       return "bad command";
     case StopCause::kBodySilent:
       return "body silent";
+    case StopCause::kNoStandstill:
+      return "no standstill";
+    case StopCause::kBodyWatchdog:
+      return "body watchdog";
+    case StopCause::kLoopStalled:
+      return "loop stalled";
+    case StopCause::kZone:
+      return "zone";
+    case StopCause::kNotSlowed:
+      return "not slowed";
   }
   return "unknown";
 }

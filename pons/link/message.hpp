@@ -19,6 +19,7 @@ enum class CommandKind : std::uint8_t {
   kProtectiveStop,  // stop along jerk limits, stay powered, hold
   kReset,           // leave a stop; moves nothing, arms nothing
   kArm,             // accept motion again, from the standstill measured now
+  kRecover,         // likewise, wherever the arm is, for slow motion towards the inside of its limits
 };
 
 // One command. `epoch` is the one the sender had read when it made the command; an older one is dropped.
@@ -33,7 +34,15 @@ struct Command {
   std::array<double, 3> payload_com_m{};  // kPayload: centre of mass, flange frame
 };
 
-enum class SafetyState : std::uint8_t { kDisarmed, kOperational, kStopping, kProtectiveStop, kEmergencyStop };
+enum class SafetyState : std::uint8_t {
+  kDisarmed,           // takes no motion; drives as they were
+  kOperational,        // follows motion
+  kStopping,           // brakes along the limits, then waits for standstill
+  kProtectiveStop,     // at rest, powered, holding
+  kEmergencyStop,      // drives off, brakes on
+  kEmergencyStopping,  // brakes along the limits, power off at standstill
+  kRecovery            // follows slow motion that leads inside the position limits
+};
 
 enum class StopCause : std::uint8_t {
   kNone,
@@ -45,6 +54,11 @@ enum class StopCause : std::uint8_t {
   kLimit,           // a command would have broken a limit
   kBadCommand,      // not finite, discontinuous, from the past
   kBodySilent,      // measurements stopped
+  kNoStandstill,    // a stop, and no standstill measured in time
+  kBodyWatchdog,    // the body heard nothing for too long and took the power off
+  kLoopStalled,     // the loop itself was kept from its ticks
+  kZone,            // somebody is in a zone that stops
+  kNotSlowed,       // the motion could not be slowed in time for a zone
 };
 
 // Standstill as measured, never assumed.
@@ -74,6 +88,11 @@ struct State {
   std::uint32_t vacuum_on = 0;
   double belt_travel_m = 0, belt_speed_m_s = 0;
   bool photo_eye_blocked = false;
+  bool watchdog_tripped = false;     // the body's has taken the power off
+  std::uint32_t zones_occupied = 0;  // bit i: somebody is in the world's zone i
+  double speed_share = 1;            // what the zones allow of each axis' speed limit
+  double rate = 1;                   // how fast the motion's time goes beside the clock's, 0 to 1
+  Duration late{0};  // so far the motion's time is behind the clock's: a segment begins at its start + late
 };
 
 }  // namespace pons::link

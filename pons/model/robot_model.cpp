@@ -176,6 +176,16 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
     return fail(fmt::format("link '{}' does not hang on the last moving joint", robot.flange_link), where,
                 "describe one chain of joints that ends in the flange");
   }
+  // Without it the controller would reckon with an arm that weighs nothing.
+  for (pinocchio::JointIndex i = 1; i < static_cast<pinocchio::JointIndex>(model.njoints); ++i) {
+    const auto& inertia = model.inertias[i];
+    const Eigen::Matrix3d about_com = inertia.inertia().matrix();
+    if (inertia.mass() > 0 && std::isfinite(inertia.mass()) && inertia.lever().allFinite() && about_com.allFinite() &&
+        about_com.diagonal().minCoeff() > 0)
+      continue;
+    return fail(fmt::format("what moves with joint '{}' has no mass or no inertia", model.names[i]), where,
+                "give its links an <inertial> with a mass and an inertia above 0");
+  }
   for (const auto& capsule : robot.capsules) {
     if (!model.existFrame(capsule.link, pinocchio::BODY)) {
       return fail(fmt::format("a capsule hangs on '{}', which is no link", capsule.link), where,

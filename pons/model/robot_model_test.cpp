@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <string>
 
 #include "pons/core/random.hpp"
 #include "pons/model/test_robots.hpp"
@@ -157,6 +160,19 @@ TEST(RobotModel, CopyIsIndependentAndEqual) {
   EXPECT_EQ(here, there);
 }
 
+// The same arm, of nothing.
+std::filesystem::path without_masses(const std::filesystem::path& urdf) {
+  std::ifstream in(urdf);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  for (auto at = text.find("<mass value=\""); at != std::string::npos; at = text.find("<mass value=\"", at + 1)) {
+    const auto number = at + std::string("<mass value=\"").size();
+    text.replace(number, text.find('"', number) - number, 1, '0');
+  }
+  const auto path = std::filesystem::path(testing::TempDir()) / "weightless.urdf";
+  std::ofstream(path) << text;
+  return path;
+}
+
 TEST(RobotModel, LoadingSaysWhatIsWrong) {
   auto robot = hanging_arm();
   robot.urdf = "no/such.urdf";
@@ -174,6 +190,9 @@ TEST(RobotModel, LoadingSaysWhatIsWrong) {
   robot = hanging_arm();
   robot.flange_link = "forearm_link";
   EXPECT_NE(RobotModel::load(robot).error().line().find("does not hang on the last moving joint"), std::string::npos);
+  robot = hanging_arm();
+  robot.urdf = without_masses(robot.urdf);
+  EXPECT_NE(RobotModel::load(robot).error().line().find("has no mass or no inertia"), std::string::npos);
   const auto path = std::filesystem::path(testing::TempDir()) / "broken.urdf";
   std::ofstream(path) << "<robot name='x'><link";
   robot = hanging_arm();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -21,17 +22,18 @@ class BodySide {
  public:
   // Begins. `parts` and `clock`, which has kLeash, must outlive it; the body's thread paces the clock.
   BodySide(BodyParts& parts, rt::MonotonicClock& clock);
-  // Both threads have ended when it returns.
+  // Both threads have ended when it returns, but for a loop that end() has left behind.
   ~BodySide();
   BodySide(const BodySide&) = delete;
   BodySide& operator=(const BodySide&) = delete;
 
   // Nothing more will come. Any thread.
   [[nodiscard]] bool finished() const { return finished_.load(); }
-  // Error: body or camera failed; the loop has stopped. Any thread.
+  // Error: body or camera failed, or nothing has come from the loop for a second; the loop has stopped. Any thread.
   [[nodiscard]] Expected<void> health() const;
-  // Ends both threads. Once.
-  [[nodiscard]] LoopFigures end();
+  // Ends both threads. Once. Error: the loop does not end. Its thread is left behind, and this, its parts and its clock
+  // must outlive it: leave them, too, and end the process.
+  [[nodiscard]] Expected<LoopFigures> end();
 
  private:
   // Measurements and set-points change hands without either side waiting.
@@ -41,7 +43,7 @@ class BodySide {
   };
 
   void run_body();
-  void run_loop();
+  [[nodiscard]] LoopFigures run_loop();
   void fail(const Error& what);
 
   BodyParts& parts_;
@@ -51,7 +53,7 @@ class BodySide {
   std::atomic<bool> running_{true}, finished_{false};
   mutable std::mutex mutex_;
   std::optional<Error> error_;
-  LoopFigures figures_;  // the loop's, once it has ended
+  std::future<LoopFigures> figures_;  // the loop's, once it has ended
   std::jthread body_, loop_;
 };
 

@@ -1,29 +1,35 @@
 #include "pons/runner/bridge_side.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <utility>
+
+#include "pons/cerebellum/cerebellum.hpp"
+#include "pons/cerebellum/safety_machine.hpp"
 
 namespace pons::runner {
 namespace {
 
 using bridge::Json;
 using link::SafetyState;
-using link::StopCause;
 
 // A stop whose cause has passed is left again after this long at standstill.
 constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
 
-// A person pressed something: only a person may take that back.
-bool needs_person(StopCause cause) { return cause == StopCause::kEmergencyWord || cause == StopCause::kStopInput; }
-
 }  // namespace
 
 BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills,
-                       std::function<void(Time)> visitors)
-    : bridge_(bridge), dispatcher_(dispatcher), skills_(std::move(skills)), visitors_(std::move(visitors)) {}
+                       const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
+    : bridge_(bridge),
+      dispatcher_(dispatcher),
+      skills_(std::move(skills)),
+      zones_(zones),
+      recovery_(recovery),
+      visitors_(std::move(visitors)) {}
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
@@ -54,7 +60,8 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   std::vector<ObjectBelief> obstacles = objects;
   std::ranges::copy(predicted(seen_.coming, now, belt_travel_m), std::back_inserter(obstacles));
   skills_.refresh(now, std::move(obstacles));
-  look_after_arm(now);
+  look_around(now);
+  if (auto good = look_after_arm(now); !good) return good;
   if (!stopping_) ask_brain(objects, now);
   if (visitors_) visitors_(now);
 
@@ -123,7 +130,35 @@ void BridgeSide::note_carried(Time now) {
   bridge_.keep_notes(now);
 }
 
-void BridgeSide::look_after_arm(Time now) {
+// Who is where, into the journal.
+void BridgeSide::look_around(Time now) {
+  const std::uint32_t occupied = skills_.state().zones_occupied;
+  for (std::size_t i = 0; i < zones_.size(); ++i) {
+    const bool is = ((occupied >> i) & 1U) != 0, was = ((zones_occupied_ >> i) & 1U) != 0;
+    if (is) occupied_at_[i] = now;
+    if (is != was) bridge_.note("zone", {{"zone", zones_[i].name}, {"occupied", is}}, now);
+  }
+  zones_occupied_ = occupied;
+}
+
+bool BridgeSide::zones_are_empty(Time now) const {
+  for (std::size_t i = 0; i < zones_.size(); ++i) {
+    const world::Zone& zone = zones_[i];
+    if (zone.speed_share > 0 || !occupied_at_[i]) continue;
+    if (!zone.resume_after_s || now - *occupied_at_[i] < from_s(*zone.resume_after_s)) return false;
+  }
+  return true;
+}
+
+// From a stop at rest.
+bool BridgeSide::may_resume(const link::State& state, Time now) const {
+  const cerebellum::CauseRow* const row = cerebellum::cause_row(state.cause);
+  if (row == nullptr || row->resumes == cerebellum::Resumes::kPerson) return false;
+  if (row->resumes == cerebellum::Resumes::kZone && !zones_are_empty(now)) return false;
+  return now - *stopped_since_ >= kStandstillBeforeReset;
+}
+
+Expected<void> BridgeSide::look_after_arm(Time now) {
   const link::State& state = skills_.state();
   yielding_ = yielding_ && state.safety == SafetyState::kOperational;
   const bool operational = state.safety == SafetyState::kOperational && !yielding_;
@@ -141,16 +176,31 @@ void BridgeSide::look_after_arm(Time now) {
   was_operational_ = operational;
   if (operational) {
     stopped_since_.reset();
-    return;
+    return {};
   }
   if (!stopped_since_) stopped_since_ = now;
+  const bool recovers = state.safety == SafetyState::kRecovery;
+  if (recovers || (state.safety == SafetyState::kDisarmed && skills_.outside_rad() > cerebellum::kArmTolerance_rad))
+    return bring_in(now);
   if (state.safety == SafetyState::kDisarmed) {
     skills_.arm(now);
-    return;
+    return {};
   }
   const bool stopped =
       state.safety == SafetyState::kProtectiveStop && state.stop_result == link::StopResult::kConfirmed;
-  if (stopped && !needs_person(state.cause) && now - *stopped_since_ >= kStandstillBeforeReset) skills_.arm(now);
+  if (stopped && may_resume(state, now)) skills_.arm(now);
+  return {};
+}
+
+Expected<void> BridgeSide::bring_in(Time now) {
+  const double outside_rad = skills_.outside_rad();
+  if (recovery_ == Recovery::kRefused) {
+    return fail(fmt::format("an axis stands {:.3f} rad outside its position limits", outside_rad), "arm",
+                "see that its way in is clear and allow it with --recover, or bring it in by hand");
+  }
+  if (!recovering_) bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
+  recovering_ = true;
+  return skills_.recover(now);
 }
 
 void BridgeSide::stop(Time now, const std::string& reason) {

@@ -82,25 +82,28 @@ Expected<RunResult> run_body_process(BodyParts& parts, const Crossing& crossing,
   }
   std::destroy_at(&border.clock);
   std::construct_at(&border.clock, kLeash);
-  BodySide side(parts, border.clock);
+  auto side = std::make_unique<BodySide>(parts, border.clock);
   border.go_to(Stage::kRunning);
   Expected<void> good;
   rt::PeriodicLoop loop(own, kLook);
   loop.run([&](Time) {
-    border.finished.store(side.finished());
+    border.finished.store(side->finished());
     pass_on_events(parts, watch);
-    good = side.health();
+    good = side->health();
     const bool lives = bridge.look();
     if (interrupted() && border.now_at() == Stage::kRunning) border.go_to(Stage::kEnding);
     const bool left = border.now_at() == Stage::kEnding && !lives;
     return good.has_value() && border.closing.load() == Closing::kOpen && !left;
   });
   result.end = border.clock.now();
-  result.loop = side.end();
+  const auto figures = side->end();
+  if (!figures) (void)side.release();  // a loop that is stuck is left with it
   pass_on_events(parts, watch);
   result.complete = border.closing.load() == Closing::kComplete;
   border.go_to(Stage::kEnded);
   if (!good) return std::unexpected(good.error());
+  if (!figures) return std::unexpected(figures.error());
+  result.loop = *figures;
   return result;
 }
 

@@ -1,5 +1,7 @@
 #include "pons/runner/realtime.hpp"
 
+#include <memory>
+
 #include "pons/rt/grant.hpp"
 #include "pons/rt/periodic_loop.hpp"
 #include "pons/runner/body_side.hpp"
@@ -33,19 +35,27 @@ Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, cons
 }
 
 Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
-  rt::MonotonicClock clock(kLeash);
-  BodySide body(parts.body, clock);
+  // On the heap, where a loop that is stuck may be left with them.
+  auto clock = std::make_unique<rt::MonotonicClock>(kLeash);
+  auto body = std::make_unique<BodySide>(parts.body, *clock);
   const rt::WakeWord gone;  // not while this process lives
   Watch both = watch;
   both.progress = [&](Time now) {
     if (watch.progress) watch.progress(now);
     pass_on_events(parts.body, watch);
   };
-  auto result = run_bridge(*parts.bridge_side, *parts.observer,
-                           {&clock, &gone, [&] { return body.finished(); }, [&] { return body.health(); }}, both);
-  if (!result) return result;
-  result->loop = body.end();
+  auto result =
+      run_bridge(*parts.bridge_side, *parts.observer,
+                 {clock.get(), &gone, [&] { return body->finished(); }, [&] { return body->health(); }}, both);
+  const auto figures = body->end();
+  if (!figures) {
+    (void)body.release();
+    (void)clock.release();
+  }
   pass_on_events(parts.body, watch);
+  if (!result) return result;
+  if (!figures) return std::unexpected(figures.error());
+  result->loop = *figures;
   return result;
 }
 

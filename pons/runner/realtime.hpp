@@ -7,7 +7,9 @@
 
 namespace pons::runner {
 
-// Both sides in this process. Error: body, camera or journal failed. Either way every thread has ended when it returns.
+// Both sides in this process. Error: body, camera or journal failed, or nothing has come from the control loop for a
+// second. Either way every thread has ended when it returns, but for a loop's that is stuck: that one is left behind,
+// and should it ever go on, looks at `parts` once more. End the process then.
 [[nodiscard]] Expected<RunResult> run_realtime(Parts& parts, const Watch& watch);
 
 // What the bridge's side knows of a body that moves elsewhere. All are asked once a period.

@@ -12,6 +12,7 @@
 #include "pons/sim/feeder.hpp"
 #include "pons/sim/gripper.hpp"
 #include "pons/sim/ledger.hpp"
+#include "pons/sim/simulation.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::sim {
@@ -23,6 +24,7 @@ class SimBody final : public body::Body {
   explicit SimBody(Cell* cell) : cell_(cell) {}
   void read(body::Sensors& sensors) PONS_NONBLOCKING override;
   void write(const body::SetPoints& set_points) PONS_NONBLOCKING override;
+  [[nodiscard]] Duration watchdog() const override;
 
  private:
   Cell* cell_;
@@ -53,12 +55,16 @@ struct Cell {
   Time stepped;  // end of the last step
   Time now;      // last time advanced to
   bool stop_pressed = false;
-  AxisVector held;      // where the brakes hold the arm; empty while it moves
-  std::string failure;  // what MuJoCo said when it gave up
+  std::vector<Visit> visits;
+  Time heard;                     // when set-points were last written
+  bool watchdog_tripped = false;  // until set-points without power are heard
+  AxisVector held;                // where the brakes hold the arm; empty while it moves
+  std::string failure;            // what MuJoCo said when it gave up
 
  private:
   std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom
 
+  void watch_loop();
   void drive();
   void brake();
   void measure();

@@ -72,6 +72,7 @@ void Puppet::step(const AxisVector& position, const AxisVector& speed) {
   }
   cell_.set_points.vacuum_on = vacuum_;
   cell_.set_points.power = true;
+  cell_.heard = cell_.stepped;
   cell_.step();
 }
 

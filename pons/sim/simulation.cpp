@@ -47,12 +47,19 @@ void Cell::step() {
   feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
   belt.step(model, composed.belt_geom, stepped, world.physics_step_s);
   gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
+  watch_loop();
   drive();
   mj_step(model, data.get());
   stepped += step_length;
   gripper.measure(composed, data.get());
   measure();
   ledger.update(composed, data.get(), gripper, set_points.vacuum_on, set_points.torque_nm, stepped);
+}
+
+void Cell::watch_loop() {
+  if (!set_points.power || stepped + step_length - heard <= body.watchdog()) return;
+  watchdog_tripped = true;
+  set_points.power = false;
 }
 
 void Cell::drive() {
@@ -124,9 +131,21 @@ void SimBody::read(body::Sensors& sensors) {
   }
   sensors.stamp = cell_->now;
   sensors.stop_input = cell_->stop_pressed;
+  sensors.watchdog_tripped = cell_->watchdog_tripped;
+  sensors.zones_occupied = 0;
+  for (const Visit& visit : cell_->visits) {
+    if (cell_->now >= visit.from && cell_->now < visit.from + visit.stays) sensors.zones_occupied |= 1U << visit.zone;
+  }
 }
 
-void SimBody::write(const body::SetPoints& set_points) { cell_->set_points = set_points; }
+void SimBody::write(const body::SetPoints& set_points) {
+  cell_->set_points = set_points;
+  cell_->heard = cell_->now;
+  if (!set_points.power) cell_->watchdog_tripped = false;
+  if (cell_->watchdog_tripped) cell_->set_points.power = false;
+}
+
+Duration SimBody::watchdog() const { return from_s(cell_->world.robot.watchdog_s); }
 
 Simulation::Simulation(std::unique_ptr<Cell> cell) : cell_(std::move(cell)) {}
 Simulation::~Simulation() = default;
@@ -161,6 +180,8 @@ void Simulation::advance_to(Time time) {
 body::Body& Simulation::body() { return cell_->body; }
 const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
 void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
+
+void Simulation::expect_visits(std::vector<Visit> visits) { cell_->visits = std::move(visits); }
 
 void Simulation::set_arm(const AxisVector& position) {
   Cell& cell = *cell_;

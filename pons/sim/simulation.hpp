@@ -16,6 +16,13 @@ namespace pons::sim {
 
 struct Cell;
 
+// Somebody in a zone for a while.
+struct Visit {
+  std::size_t zone = 0;  // of world.zones
+  Time from;
+  Duration stays{0};
+};
+
 // One thread calls everything here except Camera::finish. The same world, manifest, seed and set-points give the same
 // states to the byte.
 class Simulation {
@@ -39,6 +46,8 @@ class Simulation {
 
   // The stop input as a person presses (true) or releases (false) it.
   void press_stop(bool pressed);
+  // Who will come, told by the safety scanner's bits in body::Sensors.
+  void expect_visits(std::vector<Visit> visits);
   // Places the arm at rest there, without moving through space; `position` must have one value an axis.
   void set_arm(const AxisVector& position);
 

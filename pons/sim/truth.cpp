@@ -46,6 +46,15 @@ Vector3 Truth::velocity_m_s(std::size_t parcel) const {
   return {v[0], v[1], v[2]};
 }
 
+std::uint32_t Truth::cups_on() const {
+  constexpr double kDriven_kpa = 4;  // half of what an open cup that is driven draws
+  const Cell& cell = *simulation_->cell_;
+  std::uint32_t on = 0;
+  for (std::size_t i = 0; i < cell.composed.cups.size(); ++i)
+    on |= cell.gripper.pressure_kpa(i) > kDriven_kpa ? 1U << i : 0U;
+  return on;
+}
+
 int Truth::on_belt() const {
   int count = 0;
   for (int i = 0; i < kSlots; ++i) count += simulation_->cell_->ledger.on_belt(i) ? 1 : 0;

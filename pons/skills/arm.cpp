@@ -8,6 +8,10 @@ namespace {
 constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
 // A cup below this share of the sealed vacuum lets go.
 constexpr double kOpenShare = 0.4;
+// Of an arm that is brought in from outside its limits: so slowly, so far inside, and at rest so long before it is
+// asked where it stands.
+constexpr double kRecoverySpeed = 0.05, kInside_rad = 0.02;
+constexpr Duration kRecoveredRest = std::chrono::milliseconds(200);
 
 AxisState at_rest(const AxisVector& position) {
   return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
@@ -20,15 +24,15 @@ Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
 
 void Arm::refresh(Time now) {
   link_.latest(state_);
-  const bool is_operational = operational();
-  if (is_operational != was_operational_) {
+  if (state_.safety != safety_before_) {
     // After a stop the arm is where it came to rest, whatever was planned.
     asked_.clear();
     rest_ = at_rest(state_.commanded.position.size() > 0 ? state_.commanded.position : world_.robot.home);
-    was_operational_ = is_operational;
+    safety_before_ = state_.safety;
   }
   // Segments that ended are history; the last one says where the arm rests.
-  const auto live = std::find_if(asked_.begin(), asked_.end(), [&](const Segment& s) { return s.end() >= now; });
+  const Time reached = now - late();
+  const auto live = std::find_if(asked_.begin(), asked_.end(), [&](const Segment& s) { return s.end() >= reached; });
   if (live == asked_.end()) {
     if (!asked_.empty()) asked_.erase(asked_.begin(), asked_.end() - 1);
   } else {
@@ -39,10 +43,10 @@ void Arm::refresh(Time now) {
 
 AxisState Arm::planned(Time time) const {
   if (asked_.empty()) return rest_;
-  return motion::sample(asked_, time, rest_.position.size());
+  return motion::sample(asked_, time - late(), rest_.position.size());
 }
 
-Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().end(); }
+Time Arm::motion_end() const { return asked_.empty() ? Time{} : asked_.back().end() + late(); }
 
 Time Arm::splice_time(Time now, const AxisLimits& limits) const {
   Time from = splice_time(now);
@@ -59,15 +63,16 @@ Expected<void> Arm::stream(const motion::Trajectory& trajectory) {
     return fail("the link to the cerebellum is full", "arm", "the loop has stopped taking commands");
   }
   bool first = true;
-  for (const Segment& segment : trajectory) {
+  for (Segment segment : trajectory) {
+    segment.start = segment.start - late();
+    if (first) {
+      const Time start = segment.start;
+      std::erase_if(asked_, [&](const Segment& s) { return s.start >= start; });
+      if (!asked_.empty() && asked_.back().end() > start) asked_.back().duration = start - asked_.back().start;
+    }
     send({.kind = link::CommandKind::kMotion, .splice = first, .segment = segment});
+    asked_.push_back(segment);
     first = false;
-  }
-  if (!trajectory.empty()) {
-    const Time start = trajectory.front().start;
-    std::erase_if(asked_, [&](const Segment& s) { return s.start >= start; });
-    if (!asked_.empty() && asked_.back().end() > start) asked_.back().duration = start - asked_.back().start;
-    asked_.insert(asked_.end(), trajectory.begin(), trajectory.end());
   }
   return {};
 }
@@ -108,6 +113,41 @@ void Arm::arm(Time) {
   } else if (state_.safety == link::SafetyState::kDisarmed) {
     send({.kind = link::CommandKind::kArm});
   }
+}
+
+double Arm::outside_rad() const {
+  const AxisLimits& limits = world_.robot.limits;
+  if (state_.position.size() != limits.position_min.size()) return 0;
+  return std::max(
+      {0.0, (limits.position_min - state_.position).maxCoeff(), (state_.position - limits.position_max).maxCoeff()});
+}
+
+Expected<void> Arm::recover(Time now) {
+  if (state_.safety != link::SafetyState::kRecovery) {
+    if (state_.safety == link::SafetyState::kDisarmed)
+      send({.kind = link::CommandKind::kRecover});
+    else
+      arm(now);
+    return {};
+  }
+  if (now < motion_end() + kRecoveredRest) return {};
+  if (outside_rad() <= 0) {
+    send({.kind = link::CommandKind::kReset});
+    return {};
+  }
+  const Time from = splice_time(now);
+  const AxisVector inside =
+      state_.commanded.position.cwiseMax((world_.robot.limits.position_min.array() + kInside_rad).matrix())
+          .cwiseMin((world_.robot.limits.position_max.array() - kInside_rad).matrix());
+  AxisLimits slow = world_.robot.limits;
+  slow.position_min = slow.position_min.cwiseMin(state_.commanded.position);
+  slow.position_max = slow.position_max.cwiseMax(state_.commanded.position);
+  slow.speed_rad_s *= kRecoverySpeed;
+  slow.acceleration_rad_s2 *= kRecoverySpeed;
+  slow.jerk_rad_s3 *= kRecoverySpeed;
+  auto way = motion::move(at_rest(state_.commanded.position), from, {inside, AxisVector::Zero(inside.size())}, slow);
+  if (!way) return std::unexpected(way.error());
+  return stream(*way);
 }
 
 bool Arm::send(link::Command command) {

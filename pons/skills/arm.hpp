@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "pons/core/error.hpp"
 #include "pons/link/link.hpp"
@@ -14,6 +15,8 @@ namespace pons::skills {
 // From the moment a motion is planned to its begin: two bridge periods, one for the command to arrive, one in reserve.
 inline constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
 
+// Times are the clock's. The motion's own time is State::late behind it: whoever planned on it hears of a motion that
+// has become later by late(), and the motion asked for moves along.
 class Arm {
  public:
   // Both must outlive it. A motion that arrives after its begin is refused and stops the arm, so where ticks may come
@@ -25,6 +28,11 @@ class Arm {
 
   [[nodiscard]] const link::State& state() const { return state_; }
   [[nodiscard]] bool operational() const { return state_.safety == link::SafetyState::kOperational; }
+
+  // How late the motion is by now; what was planned to happen with it happens so much later than it was planned then.
+  [[nodiscard]] Duration late() const { return state_.late; }
+  // What zones allow of the speed limits now.
+  [[nodiscard]] double speed_share() const { return state_.speed_share; }
 
   // Where the motion asked for so far will be at `time`.
   [[nodiscard]] AxisState planned(Time time) const;
@@ -49,6 +57,11 @@ class Arm {
   void halt() { (void)send({.kind = link::CommandKind::kProtectiveStop}); }
   // Leaves a stop (when it may) and arms from standstill. Moves nothing.
   void arm(Time now);
+  // Likewise, for recovery; and in recovery, slowly in, until every axis stands inside its position limits. One step.
+  // Error: no way in.
+  [[nodiscard]] Expected<void> recover(Time now);
+  // By how much an axis stands outside its position limits; 0 inside.
+  [[nodiscard]] double outside_rad() const;
 
  private:
   bool send(link::Command command);
@@ -57,10 +70,21 @@ class Arm {
   const world::World& world_;
   Duration splice_lead_;
   link::State state_;
-  motion::Trajectory asked_;
-  AxisState rest_;  // in force when nothing was asked for since arming
+  motion::Trajectory asked_;  // in the motion's time
+  AxisState rest_;            // in force when nothing was asked for since arming
   std::uint64_t sequence_ = 0;
-  bool was_operational_ = false;
+  link::SafetyState safety_before_ = link::SafetyState::kDisarmed;
+};
+
+// By how much the motion has become later since the last look: so far whatever was planned with it moves along.
+class Delay {
+ public:
+  explicit Delay(const Arm& arm) : arm_(arm), late_(arm.late()) {}
+  [[nodiscard]] Duration take() { return arm_.late() - std::exchange(late_, arm_.late()); }
+
+ private:
+  const Arm& arm_;
+  Duration late_;
 };
 
 }  // namespace pons::skills

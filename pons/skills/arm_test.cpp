@@ -123,6 +123,61 @@ TEST_F(ArmTest, RefusesAMotionThatTheLinkCannotTakeWhole) {
   EXPECT_TRUE(arm_.stream(trajectory));
 }
 
+// While somebody is near, the motion's time falls behind the clock's.
+TEST_F(ArmTest, AMotionThatIsLateMovesAlongAndWhatReplacesItIsAskedForInItsTime) {
+  constexpr Duration kLate = std::chrono::milliseconds(300);
+  hear(Time(kTick), SafetyState::kOperational);
+  Delay delay(arm_);
+  ASSERT_TRUE(arm_.stream(way(arm_.splice_time(Time(kTick)), 0.4)));
+  const Time end = arm_.motion_end(), moment(from_s(0.2));
+  const AxisState then = arm_.planned(moment);
+  (void)received();
+  state_.late = kLate;
+  state_.speed_share = 0.3;
+  hear(Time(2 * kTick), SafetyState::kOperational);
+  EXPECT_EQ(delay.take(), kLate);
+  EXPECT_EQ(delay.take(), Duration{0});
+  EXPECT_EQ(arm_.speed_share(), 0.3);
+  EXPECT_EQ(arm_.motion_end(), end + kLate);
+  EXPECT_EQ(arm_.planned(moment + kLate).position, then.position);
+  const Time from = moment + kLate;
+  ASSERT_TRUE(arm_.stream(way(from, 0.1)));
+  const auto commands = received();
+  ASSERT_GT(commands.size(), 2U) << "a heartbeat and a motion";
+  EXPECT_EQ(commands[1].segment.start, moment) << "in the motion's time";
+  AxisState first = then;
+  sample(commands[1].segment, moment, first);
+  EXPECT_TRUE(first.position.isApprox(then.position, 1e-12)) << "without a seam";
+}
+
+TEST_F(ArmTest, RecoversFromOutsideItsLimitsSlowlyAndArmsThen) {
+  AxisVector outside = world_.robot.home;
+  outside[2] = world_.robot.limits.position_min[2] - 0.1;
+  state_.position = outside;
+  const auto asked = [&](Time now, SafetyState safety) {
+    hear(now, safety, state_.position);
+    (void)received();
+    EXPECT_TRUE(arm_.recover(now));
+    return received();
+  };
+  hear(Time(kTick), SafetyState::kDisarmed, outside);
+  EXPECT_NEAR(arm_.outside_rad(), 0.1, 1e-12);
+  auto commands = asked(Time(2 * kTick), SafetyState::kDisarmed);
+  ASSERT_EQ(commands.size(), 1U);
+  EXPECT_EQ(commands[0].kind, CommandKind::kRecover);
+  commands = asked(Time(from_s(1)), SafetyState::kRecovery);
+  ASSERT_FALSE(commands.empty());
+  for (const link::Command& command : commands) EXPECT_EQ(command.kind, CommandKind::kMotion);
+  const AxisVector end = arm_.planned(arm_.motion_end()).position;
+  EXPECT_GT(end[2], world_.robot.limits.position_min[2]);
+  EXPECT_EQ(end[0], outside[0]) << "an axis that stands inside stays";
+  EXPECT_TRUE(asked(Time(from_s(1.1)), SafetyState::kRecovery).empty()) << "it is on its way";
+  state_.position = end;
+  commands = asked(arm_.motion_end() + from_s(1), SafetyState::kRecovery);
+  ASSERT_EQ(commands.size(), 1U);
+  EXPECT_EQ(commands[0].kind, CommandKind::kReset);
+}
+
 TEST_F(ArmTest, AfterAStopItPlansFromWhereTheArmCameToRest) {
   hear(Time(kTick), SafetyState::kOperational);
   ASSERT_TRUE(arm_.stream(way(arm_.splice_time(Time(kTick)), 0.4)));

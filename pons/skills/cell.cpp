@@ -134,7 +134,7 @@ void Cell::keep_clear(Time now) {
 
 AxisLimits Cell::limits_empty() const {
   AxisLimits limits = world.robot.limits;
-  limits.speed_rad_s *= kPlanShare;
+  limits.speed_rad_s *= kPlanShare * arm.speed_share();
   limits.acceleration_rad_s2 *= kPlanShare;
   limits.jerk_rad_s3 *= kPlanShare;
   return limits;

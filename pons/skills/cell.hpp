@@ -61,7 +61,8 @@ class Cell {
   // How far the axis that turns most must turn, rad; far more when an axis would end so near its position limit that
   // the next small motion needs a whole turn back.
   [[nodiscard]] double effort(const AxisVector& from, const AxisVector& to) const;
-  // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces.
+  // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces, and as slow
+  // as zones want it.
   [[nodiscard]] AxisLimits limits_empty() const;
   // Where a carry shall end, joints, given those it starts from.
   using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;

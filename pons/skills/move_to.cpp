@@ -14,9 +14,10 @@ constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 class MoveTo final : public task::Skill {
  public:
   MoveTo(Cell& cell, std::string place, std::string path)
-      : cell_(cell), place_(std::move(place)), path_(std::move(path)) {}
+      : cell_(cell), place_(std::move(place)), path_(std::move(path)), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
+    arrives_ += delay_.take();
     if (!cell_.arm.operational()) {
       moving_ = false;
       return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{};
@@ -85,6 +86,7 @@ class MoveTo final : public task::Skill {
 
   Cell& cell_;
   std::string place_, path_;
+  Delay delay_;
   Time arrives_;
   double way_s_ = 0;
   bool moving_ = false, cancelled_ = false;

@@ -39,6 +39,7 @@ constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a 
 constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
 constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
 constexpr double kRetreat_m = 0.08;
+constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups slide over what they touch
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
@@ -54,9 +55,10 @@ constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits f
 class Pick final : public task::Skill {
  public:
   Pick(Cell& cell, std::string code, Time now)
-      : cell_(cell), code_(std::move(code)), started_(now), seen_(now), set_down_(cell) {}
+      : cell_(cell), code_(std::move(code)), started_(now), seen_(now), set_down_(cell), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
+    move_along(delay_.take());
     if (!cell_.arm.operational()) {
       stopped_ = true;
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
@@ -99,6 +101,14 @@ class Pick final : public task::Skill {
 
  private:
   enum class Phase : std::uint8_t { kFind, kApproach, kGrip, kLift, kSetDown, kRetreat };
+
+  // What was planned with the motion comes as much later as it does; approach() then finds the parcel further on.
+  void move_along(Duration later) {
+    for (Time* const moment : {&grasp_.hover, &grasp_.contact, &lift_end_, &rides_until_, &retreated_at_})
+      *moment += later;
+    for (Segment& segment : grasp_.trajectory) segment.start += later;
+    behind_ += later;
+  }
 
   Progress find(Time now) {
     cell_.keep_clear(now);
@@ -274,6 +284,7 @@ class Pick final : public task::Skill {
     }
     if (now + kVacuumLead >= grasp_.contact) {
       cell_.arm.vacuum(true);
+      behind_ = Duration{0};
       phase_ = Phase::kGrip;
     }
     return {};
@@ -292,6 +303,7 @@ class Pick final : public task::Skill {
   }
 
   Progress grip(Time now) {
+    if (to_s(behind_) * cell_.belt_speed_m_s() > kDragged_m) return give_up(now, "slowed over it, and left behind");
     sealed_ticks_ = cell_.arm.sealed_cups() >= cell_.world.robot.tool.cups_to_lift ? sealed_ticks_ + 1 : 0;
     const int all = static_cast<int>(cell_.world.robot.tool.cups_m.size());
     const int needed_ticks = cell_.arm.sealed_cups() == all ? 1 : 3;
@@ -444,6 +456,8 @@ class Pick final : public task::Skill {
   double lift_travel_m_ = 0;  // of the belt then
   Scale scale_;
   SetDown set_down_;
+  Delay delay_;
+  Duration behind_{0};  // of the belt, since the cups set out for the contact
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_;
   int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;

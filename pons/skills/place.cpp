@@ -45,9 +45,10 @@ constexpr double kMiddle = 0.15;  // of the mouth, from its centre
 class Place final : public task::Skill {
  public:
   Place(Cell& cell, std::string name, std::string object, Time now)
-      : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now) {}
+      : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
+    move_along(delay_.take());
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       phase_ = Phase::kPlan;
@@ -75,6 +76,11 @@ class Place final : public task::Skill {
 
  private:
   enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kHold };
+
+  void move_along(Duration later) {
+    arrives_ += later;
+    for (Segment& segment : way_) segment.start += later;
+  }
 
   Progress plan(Time now) {
     if (!cell_.held) return {Status::kFailed, "nothing is held", {}};
@@ -242,6 +248,7 @@ class Place final : public task::Skill {
   Cell& cell_;
   std::string name_, object_;
   Time started_, arrives_, looked_at_;
+  Delay delay_;
   motion::Trajectory way_;
   Phase phase_ = Phase::kPlan;
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();

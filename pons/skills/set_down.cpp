@@ -30,7 +30,7 @@ Expected<void> SetDown::begin(Time now) {
   }
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(*way); !sent) return sent;
-  released_at_ = way->back().end();
+  begin_at(way->back().end());
   return {};
 }
 
@@ -74,6 +74,7 @@ Vector3 SetDown::free_spot(Time time, double over_belt_m) const {
 }
 
 Expected<bool> SetDown::tick(Time now) {
+  released_at_ += delay_.take();
   if (now < released_at_) {
     if (weigh_now(cell_) > kPushedBack_kg) return false;
     released_at_ = now;  // it stands already: its size was misjudged

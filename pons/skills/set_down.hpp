@@ -8,13 +8,16 @@ namespace pons::skills {
 class SetDown {
  public:
   // `cell` must outlive it.
-  explicit SetDown(Cell& cell) : cell_(cell) {}
+  explicit SetDown(Cell& cell) : cell_(cell), delay_(cell.arm) {}
 
   // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. Error: no way
   // there now; what is in it rides on.
   [[nodiscard]] Expected<void> begin(Time now);
   // The way down is under way already, and ends then.
-  void begin_at(Time released_at) { released_at_ = released_at; }
+  void begin_at(Time released_at) {
+    released_at_ = released_at;
+    (void)delay_.take();
+  }
   // Once a period after that: true when the cups are empty. Error: the arm does not obey.
   [[nodiscard]] Expected<bool> tick(Time now);
 
@@ -23,6 +26,7 @@ class SetDown {
   [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const;
 
   Cell& cell_;
+  Delay delay_;
   Time released_at_;
 };
 

@@ -20,6 +20,7 @@ namespace {
 constexpr double kReach = 100;        // m
 constexpr double kMaxSeconds = 3600;  // of a period, a phase, a latency
 constexpr double kMaxMass = 1000;     // kg
+constexpr double kSlowest = 0.05;     // share of the speed limits: slower, nothing gets anywhere
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -148,6 +149,37 @@ std::vector<Resource> read_resources(const YamlValue& value) {
   return resources;
 }
 
+Zone read_zone(const YamlMap& map) {
+  Zone zone;
+  zone.center_m = map["center"].vector(kReach);
+  zone.size_m = map["size"].vector(kReach);
+  if (zone.size_m.minCoeff() <= 0) map["size"].refuse("is not above 0 everywhere", "write three lengths");
+  if (map.has("slow") == map.has("stop"))
+    map.value().refuse("needs slow or stop, and not both", "write slow: 0.3, or stop: yes");
+  if (map.has("slow")) {
+    zone.speed_share = map["slow"].number(kSlowest, 1);
+  } else if (!map["stop"].boolean()) {
+    map["stop"].refuse("is 'no'", "write stop: yes, or slow: 0.3");
+  }
+  if (map.has("resume_after_s")) {
+    if (!map.has("stop")) map["resume_after_s"].refuse("is of no use without stop: yes", "leave it out");
+    zone.resume_after_s = map["resume_after_s"].positive(kMaxSeconds);
+  }
+  return zone;
+}
+
+std::vector<Zone> read_zones(const YamlValue& value) {
+  std::vector<Zone> zones;
+  std::set<std::string> taken;
+  for (const YamlValue& entry : value.list(1, kMaxZones)) {
+    const YamlMap map(entry, {"name", "center", "size"}, {"slow", "stop", "resume_after_s"});
+    std::string name = new_name(map["name"], taken);
+    zones.push_back(read_zone(map));
+    zones.back().name = std::move(name);
+  }
+  return zones;
+}
+
 Rules read_rules(const YamlValue& value, const Robot& robot) {
   const YamlMap map(value, {"max_mass_kg", "max_size_m", "max_press_n", "max_drop_m"});
   Rules rules;
@@ -200,8 +232,10 @@ Arrivals read_arrivals(const YamlValue& value, const Rules& rules) {
 }
 
 World read_world(const std::filesystem::path& folder, std::string_view name) {
-  const YamlMap map(read_yaml(folder / "world.yaml"), {"scene_mjcf", "physics_step_s", "robot", "belt", "places",
-                                                       "cameras", "resources", "arrivals", "rules"});
+  const YamlMap map(
+      read_yaml(folder / "world.yaml"),
+      {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
+      {"zones"});
   World world;
   world.name = name;
   world.folder = folder;
@@ -212,6 +246,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.places = read_places(map["places"]);
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   world.resources = read_resources(map["resources"]);
+  if (map.has("zones")) world.zones = read_zones(map["zones"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
   return world;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,6 +46,7 @@ struct Robot {
   AxisLimits limits;
   AxisVector rotor_inertia_kg_m2;  // one an axis: what the drive's rotor adds about the joint, behind the gears
   double payload_kg = 0;           // at the flange, tool included
+  double watchdog_s = 0.02;        // without set-points for so long, the body takes the power off
   Tool tool;
   std::vector<Capsule> capsules;
 };
@@ -109,6 +111,15 @@ struct Rules {
   [[nodiscard]] bool too_large(const Vector3& size_m) const { return size_m.maxCoeff() > max_size_m + 0.006; }
 };
 
+// A watched box of space. The body says whether somebody is in it: bit i of its sensors is zones[i].
+struct Zone {
+  std::string name;
+  Vector3 center_m = Vector3::Zero();    // world frame
+  Vector3 size_m = Vector3::Zero();      // along the world axes
+  double speed_share = 0;                // of each axis' speed limit, while somebody is in it; 0: a protective stop
+  std::optional<double> resume_after_s;  // empty for so long, the stop is left again; nothing: a person resets it
+};
+
 struct Resource {
   std::string name;  // "arm"
 };
@@ -123,6 +134,7 @@ struct World {
   std::vector<Place> places;
   std::vector<CameraSpec> cameras;
   std::vector<Resource> resources;
+  std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;
   Rules rules;
 

@@ -236,6 +236,44 @@ TEST_F(BrokenWorld, RefusesImpossiblePlaces) {
   EXPECT_THAT(changed("kind: tray", "kind: region"), HasSubstr("places: there are 0 trays"));
 }
 
+TEST_F(BrokenWorld, ZonesAreTheFilesOrNone) {
+  const auto world = load_text(text_);
+  ASSERT_TRUE(world) << world.error().line();
+  ASSERT_EQ(world->zones.size(), 2U);
+  EXPECT_EQ(world->zones[0].name, "aisle");
+  EXPECT_EQ(world->zones[0].speed_share, 0.3);
+  EXPECT_FALSE(world->zones[0].resume_after_s);
+  EXPECT_EQ(world->zones[1].speed_share, 0) << "a stop";
+  EXPECT_EQ(world->zones[1].resume_after_s, 2.0);
+  const std::size_t from = text_.find("zones:"), to = text_.find("\n\n", from);
+  const auto none = load_text(text_.substr(0, from) + text_.substr(to));
+  ASSERT_TRUE(none) << none.error().line();
+  EXPECT_TRUE(none->zones.empty());
+}
+
+TEST_F(BrokenWorld, RefusesImpossibleZones) {
+  EXPECT_THAT(changed("slow: 0.3", "slow: 0"), HasSubstr("zones[0].slow"));
+  EXPECT_THAT(changed("slow: 0.3", "slow: 1.5"), HasSubstr("zones[0].slow"));
+  EXPECT_THAT(changed("slow: 0.3", "slow: 0.3, stop: yes"), HasSubstr("needs slow or stop, and not both"));
+  EXPECT_THAT(changed(", slow: 0.3", ""), HasSubstr("needs slow or stop, and not both"));
+  EXPECT_THAT(changed("slow: 0.3", "slow: 0.3, resume_after_s: 2"), HasSubstr("of no use without stop"));
+  EXPECT_THAT(changed("stop: yes", "stop: no"), HasSubstr("zones[1].stop"));
+  EXPECT_THAT(changed("resume_after_s: 2.0", "resume_after_s: -1"), HasSubstr("zones[1].resume_after_s"));
+  EXPECT_THAT(changed("name: gate", "name: aisle"), HasSubstr("'aisle' is there twice"));
+  EXPECT_THAT(changed("size: [4.0, 0.8, 2.0]", "size: [4.0, 0.0, 2.0]"), HasSubstr("zones[1].size"));
+}
+
+TEST_F(BrokenWorld, TheBodysWatchdogIsTheFilesOrElseTheUsualOne) {
+  EXPECT_EQ(load_text(text_)->robot.watchdog_s, 0.02);
+  const auto put = [&](const char* value) {
+    std::string with = text_;
+    return with.replace(with.find("  payload_kg:"), 0, std::string("  watchdog_s: ") + value + "\n");
+  };
+  EXPECT_EQ(load_text(put("0.05"))->robot.watchdog_s, 0.05);
+  EXPECT_THAT(error(put("0.001")), HasSubstr("robot.watchdog_s"));
+  EXPECT_THAT(error(put("10")), HasSubstr("robot.watchdog_s"));
+}
+
 TEST_F(BrokenWorld, RefusesImpossibleCameras) {
   EXPECT_THAT(changed("watches: tray", "watches: attic"),
               HasSubstr("cameras[2].watches: there is no place 'attic'; choose from belt, chute_1"));

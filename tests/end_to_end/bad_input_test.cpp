@@ -134,6 +134,33 @@ TEST_F(BadInput, WorldsWhoseFilesDisagree) {
   expect_refused_with("world.yaml", "resources: [arm]", "resources: [leg]", {"world.yaml", "resources", "'arm'"});
 }
 
+TEST_F(BadInput, VisitsAndPlacesOfTheArmThatAreNone) {
+  for (const char* visit : {"aisle", "aisle@", "aisle@1", "aisle@1+", "aisle@-1+2", "aisle@1+nan", "aisle@one+2"})
+    expect_refused({"run", "parcel_cell", "--parcels", "1", "--visit", visit}, {visit, "ZONE@FROM+FOR"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--visit", "roof@1+2"}, {"roof", "aisle, gate"});
+  expect_refused({"run", "small_cell", "--parcels", "1", "--visit", "aisle@1+2"}, {"aisle", "has no zones"});
+  for (const char* at : {"1", "1,2,3,4,5", "1,2,3,4,5,6,7", "1,2,3,4,5,", "1,2,3,4,5,inf", "a,b,c,d,e,f"})
+    expect_refused({"run", "parcel_cell", "--parcels", "1", "--arm-at", at}, {"--arm-at", "6 numbers"});
+}
+
+TEST_F(BadInput, AnArmThatCannotBe) {
+  const auto worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  const auto expect_refused_with = [&](const std::string& file, const std::string& old_text,
+                                       const std::string& new_text, const std::vector<std::string>& says) {
+    const std::string text = read_text(worlds / file);
+    ASSERT_NE(text.find(old_text), std::string::npos) << old_text;
+    std::string changed = text;
+    write_text(worlds / file, changed.replace(text.find(old_text), old_text.size(), new_text));
+    expect_refused({"run", "parcel_cell", "--parcels", "1"}, says, {"PONS_WORLDS=" + worlds.string()});
+    write_text(worlds / file, text);
+  };
+  expect_refused_with("parcel_cell/world.yaml", "torque_nm: [150, 150, 150,", "torque_nm: [150, 5, 150,",
+                      {"axis 2 needs", "to hold the arm at home"});
+  expect_refused_with("robots/ur5e/ur5e.urdf", "<mass value=\"3.761\"/>", "<mass value=\"0\"/>",
+                      {"ur5e.urdf", "no mass"});
+}
+
 TEST_F(BadInput, ARefusedSocketLeavesNoJournal) {
   expect_refused(
       {"run", "parcel_cell", "--parcels", "1", "--journal", folder_ / "j.db", "--socket", folder_ / "none/s"},

@@ -1,0 +1,246 @@
+// What is wrong in each field of a command, a measurement, a setting, and in time itself: refused by name or stopped,
+// and never a jump.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "pons/cerebellum/test_bench.hpp"
+
+namespace pons::cerebellum {
+namespace {
+
+using namespace std::chrono_literals;
+using link::CommandKind;
+using link::SafetyState;
+using link::StopCause;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
+
+void get_moving(Bench& bench) {
+  bench.arm();
+  bench.move(bench_robot().home.array() + 0.8);
+  bench.run(300ms);
+  ASSERT_TRUE(bench.operational());
+}
+
+// For so long, or until it stands: finite torques, and no tick that breaks a limit.
+void run_unharmed(Bench& bench, Duration duration) {
+  for (const Time until = bench.now + duration; bench.now < until;) {
+    bench.tick();
+    ASSERT_TRUE(bench.plant.set_points.torque_nm.allFinite());
+    ASSERT_TRUE(bench.state().commanded.position.allFinite());
+  }
+  EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
+  EXPECT_LE(bench.cerebellum.statistics().commanded.jerk, 1 + 1e-5);
+}
+
+struct BadCommand {
+  const char* name;
+  std::function<void(link::Command&)> spoil;  // of a piece of motion that goes on from the present one
+  StopCause cause = StopCause::kBadCommand;   // kNone: the command is dropped, and nothing else happens
+};
+
+const BadCommand kCommands[] = {
+    {"CoefficientNan", [](auto& c) { c.segment.coefficients[3][2] = kNan; }},
+    {"CoefficientInfinite", [](auto& c) { c.segment.coefficients[0][5] = -kInf; }},
+    {"CoefficientOfAnAxisThatIsNotThere", [](auto& c) { c.segment.coefficients[7][0] = kNan; }},
+    {"CoefficientHuge", [](auto& c) { c.segment.coefficients[1][0] = 1e300; }},
+    {"DurationZero", [](auto& c) { c.segment.duration = Duration{0}; }},
+    {"DurationNegative", [](auto& c) { c.segment.duration = -1ms; }},
+    {"DurationOfAges", [](auto& c) { c.segment.duration = Duration::max(); }},
+    {"StartInThePast", [](auto& c) { c.segment.start = c.segment.start - 1s; }},
+    {"StartBeforeAllTime", [](auto& c) { c.segment.start = Time(Duration::min()); }},
+    {"StartAtTheEndOfTime", [](auto& c) { c.segment.start = Time(Duration::max()); }},
+    {"StartAfterAGap",
+     [](auto& c) {
+       c.segment.start += 10s;
+       c.splice = false;
+     }},
+    {"CupsThatAreNotThere",
+     [](auto& c) {
+       c.kind = CommandKind::kVacuum;
+       c.vacuum_on = 0x10;
+     }},
+    {"PayloadNan",
+     [](auto& c) {
+       c.kind = CommandKind::kPayload;
+       c.payload_kg = kNan;
+     }},
+    {"PayloadInfinite",
+     [](auto& c) {
+       c.kind = CommandKind::kPayload;
+       c.payload_kg = kInf;
+     }},
+    {"PayloadNegative",
+     [](auto& c) {
+       c.kind = CommandKind::kPayload;
+       c.payload_kg = -0.1;
+     }},
+    {"PayloadNowhere",
+     [](auto& c) {
+       c.kind = CommandKind::kPayload;
+       c.payload_com_m = {0, kNan, 0};
+     }},
+    {"PayloadFarAway",
+     [](auto& c) {
+       c.kind = CommandKind::kPayload;
+       c.payload_com_m = {0, 0, kInf};
+     }},
+    {"KindThatIsNone", [](auto& c) { c.kind = static_cast<CommandKind>(200); }, StopCause::kNone},
+    {"ResetInMotion", [](auto& c) { c.kind = CommandKind::kReset; }, StopCause::kNone},
+    {"ArmInMotion", [](auto& c) { c.kind = CommandKind::kArm; }, StopCause::kNone},
+    {"RecoverInMotion", [](auto& c) { c.kind = CommandKind::kRecover; }, StopCause::kNone},
+};
+
+class BadCommands : public testing::TestWithParam<BadCommand> {};
+
+TEST_P(BadCommands, AreRefusedByName) {
+  Bench bench;
+  get_moving(bench);
+  const auto dropped = bench.state().dropped;
+  Segment still;
+  still.start = bench.now + 20ms;
+  still.duration = 100ms;
+  link::Command command = motion_command(still, true);
+  GetParam().spoil(command);
+  bench.send(command);
+  bench.tick();
+  EXPECT_EQ(bench.state().cause, GetParam().cause);
+  EXPECT_EQ(bench.state().dropped, dropped + 1);
+  run_unharmed(bench, 1s);
+  EXPECT_EQ(bench.operational(), GetParam().cause == StopCause::kNone);
+  EXPECT_EQ(bench.state().vacuum_on, 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fields, BadCommands, testing::ValuesIn(kCommands), [](const auto& c) { return c.param.name; });
+
+struct BadMeasurement {
+  const char* name;
+  std::function<void(body::Sensors&)> spoil;
+};
+
+const BadMeasurement kMeasurements[] = {
+    {"PositionNan", [](auto& s) { s.position[1] = kNan; }},
+    {"PositionInfinite", [](auto& s) { s.position[5] = kInf; }},
+    {"PositionOfFiveAxes", [](auto& s) { s.position = AxisVector::Zero(5); }},
+    {"PositionOfNone", [](auto& s) { s.position.resize(0); }},
+    {"SpeedNan", [](auto& s) { s.speed[0] = kNan; }},
+    {"SpeedInfinite", [](auto& s) { s.speed[2] = -kInf; }},
+    {"SpeedOfEightAxes", [](auto& s) { s.speed = AxisVector::Zero(8); }},
+    {"StampThatStandsStill", [](auto& s) { s.stamp = Time(300ms); }},
+    {"StampThatRunsBack", [](auto& s) { s.stamp = Time(1s) - s.stamp.since_start(); }},
+    {"StampFromTheFuture", [](auto& s) { s.stamp += 1h; }},
+    {"WristForceNan", [](auto& s) { s.wrist_force_n[0] = kNan; }},
+    {"WristTorqueInfinite", [](auto& s) { s.wrist_torque_nm[2] = kInf; }},
+    {"VacuumNan", [](auto& s) { s.cup_vacuum_kpa[7] = kNan; }},
+    {"BeltTravelNan", [](auto& s) { s.belt_travel_m = kNan; }},
+    {"BeltSpeedInfinite", [](auto& s) { s.belt_speed_m_s = kInf; }},
+};
+
+class BadMeasurements : public testing::TestWithParam<BadMeasurement> {};
+
+TEST_P(BadMeasurements, CountAsNoneAndStopTheArmWhenTheyLast) {
+  Bench bench;
+  get_moving(bench);
+  bench.spoil = GetParam().spoil;
+  run_unharmed(bench, 5ms);
+  EXPECT_TRUE(bench.operational()) << "a hiccup is ridden out";
+  EXPECT_TRUE(std::isfinite(bench.state().belt_travel_m) && std::isfinite(bench.state().wrist_force_n[0]));
+  bench.spoil = {};
+  run_unharmed(bench, 50ms);
+  EXPECT_TRUE(bench.operational());
+  bench.spoil = GetParam().spoil;
+  run_unharmed(bench, 1s);
+  EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
+  EXPECT_FALSE(bench.plant.set_points.power);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fields, BadMeasurements, testing::ValuesIn(kMeasurements),
+                         [](const auto& c) { return c.param.name; });
+
+TEST(BadTime, RunningBackOrStandingStillChangesNothing) {
+  Bench bench;
+  get_moving(bench);
+  const link::State before = bench.state();
+  const body::SetPoints told = bench.plant.set_points;
+  for (const Time time : {bench.now, bench.now - 5ms, Time{}, Time(Duration::min())}) {
+    bench.cerebellum.step(time, bench.plant.sensors, bench.end, bench.plant.set_points);
+    EXPECT_EQ(bench.state().tick, before.tick);
+    EXPECT_EQ(bench.state().commanded.position, before.commanded.position);
+    EXPECT_EQ(bench.plant.set_points.torque_nm, told.torque_nm);
+  }
+  run_unharmed(bench, 1s);
+  EXPECT_TRUE(bench.operational());
+}
+
+TEST(BadTime, AGapInTheTicksStopsTheArmWithoutALeap) {
+  Bench bench;
+  get_moving(bench);
+  const AxisState before = bench.state().commanded;
+  bench.now += 40ms;
+  bench.plant.blocked = true;  // what holds a real arm then are its brakes
+  bench.tick();
+  bench.plant.blocked = false;
+  EXPECT_EQ(bench.state().cause, StopCause::kLoopStalled);
+  EXPECT_LT((bench.state().commanded.position - before.position).cwiseAbs().maxCoeff(), 3.14 * 1.1e-3);
+  EXPECT_LT((bench.state().commanded.acceleration - before.acceleration).cwiseAbs().maxCoeff(), 0.41);
+  run_unharmed(bench, 1s);
+  EXPECT_TRUE(bench.state().safety == SafetyState::kProtectiveStop || bench.state().cause == StopCause::kNoStandstill);
+}
+
+TEST(BodyWatchdog, WhatTheBodySwitchedOffIsNotFollowedFurther) {
+  Bench bench;
+  get_moving(bench);
+  bench.plant.sensors.watchdog_tripped = true;
+  bench.tick();
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().cause, StopCause::kBodyWatchdog);
+  EXPECT_EQ(bench.state().epoch, 2U);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  bench.plant.sensors.watchdog_tripped = false;  // it has heard set-points without power
+  bench.run(100ms);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  EXPECT_FALSE(bench.plant.set_points.power) << "power is asked for anew by a person's reset and an arming alone";
+}
+
+struct BadSetting {
+  const char* name;
+  std::function<void(world::Robot&, Settings&)> spoil;
+  const char* says;
+};
+
+const BadSetting kSettings[] = {
+    {"LimitsCrossed", [](auto& r, auto&) { std::swap(r.limits.position_min, r.limits.position_max); },
+     "position_max is not above position_min"},
+    {"LimitNan", [](auto& r, auto&) { r.limits.jerk_rad_s3[2] = kNan; }, "limits.jerk_rad_s3: is not finite"},
+    {"LimitZero", [](auto& r, auto&) { r.limits.speed_rad_s[0] = 0; }, "limits.speed_rad_s: holds a limit"},
+    {"LimitNegative", [](auto& r, auto&) { r.limits.torque_nm[4] = -28; }, "limits.torque_nm: holds a limit"},
+    {"HomeOutside", [](auto& r, auto&) { r.home[1] = 7; }, "home: lies outside"},
+    {"DrivesTooWeak", [](auto& r, auto&) { r.limits.torque_nm.setConstant(1); }, "to hold the arm at home"},
+    {"NoHeartbeat", [](auto&, auto& s) { s.heartbeat_timeout = Duration{0}; }, "settings.heartbeat_timeout"},
+    {"StallBelowAPeriod", [](auto&, auto& s) { s.stall_timeout = s.period; }, "settings.stall_timeout - period"},
+    {"GainNan", [](auto&, auto& s) { s.gains.speed_1_s = kNan; }, "settings.gains.speed_1_s"},
+    {"ErrorInfinite", [](auto&, auto& s) { s.following_error_rad = kInf; }, "settings.following_error_rad"},
+    {"ShareAboveOne", [](auto&, auto& s) { s.zone_speed_share[3] = 1.5; }, "settings.zone_speed_share"},
+    {"RecoveryAtNothing", [](auto&, auto& s) { s.recovery_share = 0; }, "settings.recovery_share"},
+};
+
+class BadSettings : public testing::TestWithParam<BadSetting> {};
+
+TEST_P(BadSettings, AreRefusedByName) {
+  world::Robot robot = bench_robot();
+  Settings settings;
+  ASSERT_TRUE(check(model::RobotModel::load(robot).value(), settings));
+  GetParam().spoil(robot, settings);
+  const auto good = check(model::RobotModel::load(robot).value(), settings);
+  ASSERT_FALSE(good);
+  EXPECT_THAT(good.error().line(), testing::HasSubstr(GetParam().says));
+}
+
+INSTANTIATE_TEST_SUITE_P(Fields, BadSettings, testing::ValuesIn(kSettings), [](const auto& c) { return c.param.name; });
+
+}  // namespace
+}  // namespace pons::cerebellum

@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "pons/cerebellum/cerebellum.hpp"
+
+namespace pons::cerebellum {
+namespace {
+
+Expected<void> check_limits(const world::Robot& robot, Eigen::Index axes) {
+  const AxisLimits& limits = robot.limits;
+  const std::array<std::pair<const char*, const AxisVector*>, 6> all{
+      {{"position_min", &limits.position_min},
+       {"position_max", &limits.position_max},
+       {"speed_rad_s", &limits.speed_rad_s},
+       {"acceleration_rad_s2", &limits.acceleration_rad_s2},
+       {"jerk_rad_s3", &limits.jerk_rad_s3},
+       {"torque_nm", &limits.torque_nm}}};
+  for (const auto& [name, values] : all) {
+    const std::string where = robot.name + ": limits." + name;
+    if (values->size() != axes)
+      return fail(fmt::format("has {} values for {} axes", values->size(), axes), where, "give one value an axis");
+    if (!values->allFinite()) return fail("is not finite", where, "write a number for each axis");
+    if (values != &limits.position_min && values != &limits.position_max && values->minCoeff() <= 0)
+      return fail("holds a limit that is not above 0", where, "every rate and torque is above 0");
+  }
+  if (!(limits.position_max.array() > limits.position_min.array()).all())
+    return fail("position_max is not above position_min everywhere", robot.name + ": limits", "raise it");
+  const bool inside = robot.home.size() == axes && (robot.home.array() >= limits.position_min.array()).all() &&
+                      (robot.home.array() <= limits.position_max.array()).all();
+  if (!inside) return fail("lies outside the position limits", robot.name + ": home", "move it inside");
+  return {};
+}
+
+// A drive that cannot bear the arm's own weight lets it fall when it is armed.
+Expected<void> check_strength(const model::RobotModel& model) {
+  const world::Robot& robot = model.robot();
+  const AxisVector still = AxisVector::Zero(model.axes());
+  AxisVector torque_nm = still;
+  model::RobotModel scratch = model.copy();
+  scratch.inverse_dynamics(robot.home, still, still, {}, torque_nm);
+  Eigen::Index axis = 0;
+  const double most = torque_nm.cwiseAbs().cwiseQuotient(robot.limits.torque_nm).maxCoeff(&axis);
+  if (most < 1) return {};
+  return fail(fmt::format("axis {} needs {:.0f} Nm to hold the arm at home, {:.0f} are allowed", axis + 1,
+                          std::abs(torque_nm[axis]), robot.limits.torque_nm[axis]),
+              robot.name + ": limits.torque_nm", "raise it, or correct the masses");
+}
+
+Expected<void> check_settings(const Settings& settings) {
+  const std::array<std::pair<const char*, Duration>, 9> durations{
+      {{"period", settings.period},
+       {"heartbeat_timeout", settings.heartbeat_timeout},
+       {"silence_timeout", settings.silence_timeout},
+       {"following_time", settings.following_time},
+       {"standstill_time", settings.standstill_time},
+       {"confirm_within", settings.confirm_within},
+       {"stall_timeout", settings.stall_timeout},
+       {"slow_within", settings.slow_within},
+       {"stall_timeout - period", settings.stall_timeout - settings.period}}};
+  for (const auto& [name, duration] : durations) {
+    if (duration <= Duration{0}) return fail("is not above 0", fmt::format("settings.{}", name), "give it some time");
+  }
+  const Gains& gains = settings.gains;
+  const std::array<std::pair<const char*, double>, 10> numbers{
+      {{"gains.position_1_s2", gains.position_1_s2},
+       {"gains.speed_1_s", gains.speed_1_s},
+       {"gains.integral_1_s3", gains.integral_1_s3},
+       {"gains.integral_max_rad_s2", gains.integral_max_rad_s2},
+       {"following_error_rad", settings.following_error_rad},
+       {"standstill_rad_s", settings.standstill_rad_s},
+       {"max_payload_kg", settings.max_payload_kg},
+       {"rate.slower_1_s", settings.rate.slower_1_s},
+       {"rate.faster_1_s", settings.rate.faster_1_s},
+       {"rate.change_1_s2", settings.rate.change_1_s2}}};
+  for (const auto& [name, number] : numbers) {
+    if (!std::isfinite(number) || number < 0)
+      return fail(fmt::format("is {}", number), fmt::format("settings.{}", name), "give it a number, 0 or more");
+  }
+  if (!(settings.recovery_share > 0 && settings.recovery_share <= 1))
+    return fail(fmt::format("is {}", settings.recovery_share), "settings.recovery_share",
+                "a share is above 0, at most 1");
+  for (const double share : settings.zone_speed_share) {
+    if (!(share >= 0 && share <= 1))
+      return fail(fmt::format("holds {}", share), "settings.zone_speed_share", "a share is 0 to 1");
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<void> check(const model::RobotModel& model, const Settings& settings) {
+  if (auto good = check_limits(model.robot(), model.axes()); !good) return good;
+  if (auto good = check_settings(settings); !good) return good;
+  return check_strength(model);
+}
+
+}  // namespace pons::cerebellum

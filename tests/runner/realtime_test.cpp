@@ -1,0 +1,128 @@
+// What a real-time run does when its control loop is held up: with every real part, and a loop thread that a signal
+// holds where it happens to be.
+
+#include "pons/runner/realtime.hpp"
+
+#include <dirent.h>
+#include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "apps/assembly.hpp"
+
+namespace pons::runner {
+namespace {
+
+// As words that a signal handler may wait on.
+std::atomic<int> hold{0}, held{0};
+
+// Runs on the loop's thread, in place of what it would do.
+void stand_still(int) {
+  held.store(1);
+  held.notify_all();
+  while (hold.load() != 0) hold.wait(1);
+}
+
+void let_go() {
+  hold.store(0);
+  hold.notify_all();
+}
+
+int loop_thread() {
+  int found = 0;
+  DIR* const tasks = opendir("/proc/self/task");
+  while (const dirent* entry = readdir(tasks)) {
+    std::string name;
+    std::ifstream(std::string("/proc/self/task/") + entry->d_name + "/comm") >> name;
+    if (name == "pons_loop") found = std::atoi(entry->d_name);
+  }
+  closedir(tasks);
+  return found;
+}
+
+// Whether it sleeps until its next tick, rather than is still setting out.
+bool sleeps(int thread) {
+  long call = -1;
+  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/syscall") >> call;
+  return call == SYS_futex;
+}
+
+class HeldLoop : public testing::Test {
+ protected:
+  void SetUp() override {
+    struct sigaction action{};
+    action.sa_handler = stand_still;
+    sigaction(SIGUSR1, &action, nullptr);
+    hold.store(0);
+    held.store(0);
+    auto world = world::load("worlds", "small_cell");
+    ASSERT_TRUE(world) << world.error().line();
+    const auto manifest = world::draw_manifest(*world, 1, 1);
+    ASSERT_TRUE(manifest) << manifest.error().line();
+    auto built = apps::Assembly::build(std::move(*world), *manifest, {.journal = ":memory:", .pace = Pace::kRealTime});
+    ASSERT_TRUE(built) << built.error().line();
+    cell_ = std::move(*built);
+    parts_ = cell_->parts();
+  }
+  // What was left behind must not touch the parts when they are gone.
+  void TearDown() override {
+    let_go();
+    while (loop_thread() != 0) std::this_thread::yield();
+  }
+
+  // From the body's thread: does not return before the loop stands still.
+  void seize_loop() {
+    int thread = 0;
+    for (thread = loop_thread(); thread == 0; thread = loop_thread()) std::this_thread::yield();
+    while (!sleeps(thread)) std::this_thread::yield();
+    hold.store(1);
+    ASSERT_EQ(syscall(SYS_tgkill, getpid(), thread, SIGUSR1), 0);
+    held.wait(0);
+  }
+
+  std::unique_ptr<apps::Assembly> cell_;
+  Parts parts_;
+};
+
+TEST_F(HeldLoop, ALoopThatIsGoneForGoodEndsTheRunWithAnError) {
+  int advanced = 0;
+  parts_.plant.advance = [&](Time now) {
+    if (++advanced == 300) seize_loop();
+    cell_->simulation->advance_to(now);
+  };
+  const auto result = run_realtime(parts_, {});
+  ASSERT_FALSE(result) << "the loop is still held, for ever as far as the run knows";
+  EXPECT_NE(result.error().what.find("silent"), std::string::npos) << result.error().line();
+  EXPECT_EQ(hold.load(), 1);
+  EXPECT_LT(advanced, 300 + 1100);
+}
+
+TEST_F(HeldLoop, AFirstTickLongerThanTheLeashDoesNotStopTheRun) {
+  int advanced = 0;
+  Time released;
+  parts_.plant.finished = [] { return true; };
+  parts_.plant.advance = [&](Time now) {
+    ++advanced;
+    if (advanced == 1) seize_loop();
+    if (advanced == 100) {
+      released = now;
+      let_go();
+    }
+    cell_->simulation->advance_to(now);
+  };
+  const auto result = run_realtime(parts_, {});
+  ASSERT_TRUE(result) << result.error().line();
+  EXPECT_GT(released, Time(from_s(0.05))) << "the leash is far shorter";
+  EXPECT_GT(result->end, released + from_s(1));
+  EXPECT_GT(result->loop.ticks, 1000U);
+}
+
+}  // namespace
+}  // namespace pons::runner
