@@ -26,7 +26,8 @@ class Router {
 
   // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims: with a margin,
   // close to both ends without. Straight, else over what is in the way by one or two via points, else round it on a
-  // path that is found by sampling (detour.hpp). Errors: no clear way found, or an end that cannot be reached.
+  // path that is found by sampling (detour.hpp). Only
+  // in a world that names an obstacle. Errors: no clear way found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits);
