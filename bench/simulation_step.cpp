@@ -61,7 +61,7 @@ struct Rehearsal {
 };
 
 Rehearsal rehearse(const world::World& world, const world::Manifest& manifest, std::uint64_t seed) {
-  const auto cell = must(apps::Assembly::build(world, manifest, {.journal = ":memory:", .socket = {}, .seed = seed}));
+  const auto cell = must(apps::Assembly::build(world, manifest, {.journal = ":memory:", .body = {.seed = seed}}));
   sim::Simulation& simulation = *cell->body->simulation;
   Listener listener(simulation.body(), world.robot.home.size());
   Rehearsal rehearsal;

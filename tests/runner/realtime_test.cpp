@@ -93,9 +93,9 @@ class HeldLoop : public testing::Test {
 
 TEST_F(HeldLoop, ALoopThatIsGoneForGoodEndsTheRunWithAnError) {
   int advanced = 0;
-  parts_.plant.advance = [&](Time now) {
+  parts_.body.plant.advance = [&](Time now) {
     if (++advanced == 300) seize_loop();
-    cell_->simulation->advance_to(now);
+    cell_->body->simulation->advance_to(now);
   };
   const auto result = run_realtime(parts_, {});
   ASSERT_FALSE(result) << "the loop is still held, for ever as far as the run knows";
@@ -107,15 +107,15 @@ TEST_F(HeldLoop, ALoopThatIsGoneForGoodEndsTheRunWithAnError) {
 TEST_F(HeldLoop, AFirstTickLongerThanTheLeashDoesNotStopTheRun) {
   int advanced = 0;
   Time released;
-  parts_.plant.finished = [] { return true; };
-  parts_.plant.advance = [&](Time now) {
+  parts_.body.plant.finished = [] { return true; };
+  parts_.body.plant.advance = [&](Time now) {
     ++advanced;
     if (advanced == 1) seize_loop();
     if (advanced == 100) {
       released = now;
       let_go();
     }
-    cell_->simulation->advance_to(now);
+    cell_->body->simulation->advance_to(now);
   };
   const auto result = run_realtime(parts_, {});
   ASSERT_TRUE(result) << result.error().line();
