@@ -12,6 +12,7 @@ namespace pons::cerebellum {
 namespace {
 
 using link::CommandKind;
+using link::Controller;
 using link::SafetyState;
 using link::StopCause;
 using link::StopResult;
@@ -33,14 +34,19 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
     : settings_(settings),
       tracker_(std::move(model), settings.gains),
       limit_watch_(tracker_.robot_model().robot().limits),
+      collision_(tracker_.robot_model().copy(), settings.collision),
+      laws_(tracker_, settings.control),
+      wrist_(settings.control.bias_s),
+      vacuum_settings_(VacuumSettings::of(tracker_.robot_model().robot().tool)),
       stepped_(start),
       fresh_at_(start),
       heard_at_(start) {
   const AxisVector zero = AxisVector::Zero(tracker_.robot_model().axes());
   commanded_ = before_ = at_rest(zero);
+  driven_nm_ = zero;
   measured_position_ = measured_speed_ = position_now_ = speed_now_ = zero;
   state_.commanded = commanded_;
-  state_.position = state_.speed = state_.torque_nm = zero;
+  state_.position = state_.speed = state_.torque_nm = state_.external_nm = zero;
   state_.epoch = 1;  // a command that nobody gave an epoch is an old one
   queue_.rest(zero, start);
 }
@@ -59,12 +65,14 @@ void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEn
   advance(now);
   judge_stop(now);
   control(now, set_points);
+  watch_cups(now, sensors);
   stepped_ = now;
   publish(link, sensors, set_points);
 }
 
 void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   stop_input_ = sensors.stop_input;
+  if (powered_) collision_.drive(driven_nm_, dt_s_);
   const Eigen::Index axes = commanded_.position.size();
   const bool good = sensors.position.size() == axes && sensors.speed.size() == axes && sensors.position.allFinite() &&
                     sensors.speed.allFinite() && (!seen_ || sensors.stamp > measured_stamp_);
@@ -82,11 +90,16 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
       statistics_.measured_acceleration = std::max(
           statistics_.measured_acceleration, rate.cwiseAbs().cwiseQuotient(limits().acceleration_rad_s2).maxCoeff());
     }
+    if (powered_) collision_.measure(sensors.stamp, sensors.position, sensors.speed);
     measured_position_ = sensors.position;
     measured_speed_ = sensors.speed;
     measured_stamp_ = sensors.stamp;
     fresh_at_ = now;
     seen_ = true;
+    const bool free = state_.safety == SafetyState::kOperational && laws_.controller() == Controller::kTracking &&
+                      collision_.expected_n() == 0 && vacuum_on_ == 0;
+    wrist_.feel(tracker_.robot_model(), {measured_position_, measured_speed_, commanded_.acceleration},
+                tracker_.payload(), sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep, dt_s_);
     const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
     if (still && !is_still_) still_since_ = now;
     is_still_ = still;
@@ -114,20 +127,40 @@ void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   if (powered_ && is_silent(now) && stop(StopKind::kEmergency, StopCause::kBodySilent, now))
     log_.write(now, "no newer measurement for {:.1f} ms", 1e3 * to_s(now - fresh_at_));
   if (stop_input_) stop(StopKind::kProtective, StopCause::kStopInput, now);
+  watch_contact(now);
   watch_following(now);
 }
 
+void Cerebellum::watch_contact(Time now) {
+  if (state_.safety != SafetyState::kOperational) return;
+  statistics_.contact = std::max(statistics_.contact, collision_.share());
+  if (!collision_.collides() || !stop(StopKind::kProtective, StopCause::kCollision, now)) return;
+  gives_way_ = true;
+  const Vector6& wrench = collision_.wrench();
+  log_.write(now, "axis {} is pushed with {:.1f} N·m, {:.0f} % of what no collision explains; {:.0f} N at the tip",
+             collision_.axis() + 1, collision_.external_nm()[collision_.axis()], 100 * collision_.share(),
+             wrench.head<3>().norm());
+}
+
+void Cerebellum::watch_cups(Time now, const body::Sensors& sensors) {
+  const link::VacuumPhase before = vacuum_.seen.phase;
+  vacuum_ = next(vacuum_settings_, vacuum_, vacuum_on_, sensors.cup_vacuum_kpa, now);
+  if (before == link::VacuumPhase::kSealed && vacuum_.seen.phase == link::VacuumPhase::kLost)
+    log_.write(now, "the cups have lost what they held");
+}
+
 void Cerebellum::watch_following(Time now) {
-  if (!powered_) {
+  if (!powered_ || gives_way_) {
     strays_ = false;
     return;
   }
   // commanded_ is still the last step's: compare it with where the arm was then.
   const AxisVector then = position_now_ - dt_s_ * speed_now_;
   Eigen::Index axis = 0;
-  const double error = (commanded_.position - then).cwiseAbs().maxCoeff(&axis);
-  statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
-  const bool strays = error > settings_.following_error_rad;
+  const double error = (commanded_.position + laws_.gives_way() - then).cwiseAbs().maxCoeff(&axis);
+  const bool springs = laws_.controller() == Controller::kImpedance;
+  if (!springs) statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
+  const bool strays = error > (springs ? settings_.yielding_error_rad : settings_.following_error_rad);
   if (strays && !strays_) strays_since_ = now;
   strays_ = strays;
   if (strays && now - strays_since_ >= settings_.following_time &&
@@ -167,6 +200,10 @@ bool Cerebellum::take(const link::Command& command, Time now) {
       return operational;
     case CommandKind::kPayload:
       return take_payload(command, now);
+    case CommandKind::kContact:
+      return operational && take_contact(command, now);
+    case CommandKind::kControl:
+      return operational && take_control(command, now);
     case CommandKind::kReset:
       return is_standing(now) && reset(now);
     case CommandKind::kArm:
@@ -195,6 +232,41 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
     return false;
   }
   tracker_.carry({command.payload_kg, com});
+  collision_.carry({command.payload_kg, com});
+  return true;
+}
+
+bool Cerebellum::take_contact(const link::Command& command, Time now) {
+  if (!(command.contact_n >= 0) || !(command.contact_n <= settings_.collision.contact_max_n)) {
+    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+      log_.write(now, "command {}: a contact of {:.3g} N is nothing to expect", command.sequence, command.contact_n);
+    return false;
+  }
+  collision_.expect(command.contact_n);
+  return true;
+}
+
+bool Cerebellum::take_control(const link::Command& command, Time now) {
+  const bool known = command.controller <= Controller::kAdmittance;
+  std::string_view wrong = known ? std::string_view{} : "no such controller";
+  if (known && command.controller != Controller::kTracking)
+    wrong = fault(command.compliance, settings_.control.compliance);
+  if (!wrong.empty()) {
+    if (stop(StopKind::kProtective, StopCause::kBadCommand, now))
+      log_.write(now, "command {}, control: {}", command.sequence, wrong);
+    return false;
+  }
+  if (queue_.end() > stepped_ || !is_at_rest(commanded_)) {
+    log_.write(now, "command {}: the law of a moving arm is not changed", command.sequence);
+    return false;
+  }
+  if (command.controller != laws_.controller()) {
+    const AxisVector held = laws_.held(commanded_.position, position_now_);
+    commanded_ = before_ = at_rest(held.cwiseMax(limits().position_min).cwiseMin(limits().position_max));
+    queue_.rest(commanded_.position, stepped_);
+    log_.write(now, "control: {}", name(command.controller));
+  }
+  laws_.select(command.controller, command.compliance);
   return true;
 }
 
@@ -214,6 +286,9 @@ bool Cerebellum::arm(Time now) {
   const AxisVector inside = measured_position_.cwiseMax(limits().position_min).cwiseMin(limits().position_max);
   if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance) return false;
   if (!powered_) tracker_.reset();
+  collision_.reset();
+  collision_.expect(0);
+  laws_.reset();
   powered_ = true;
   commanded_ = before_ = at_rest(inside);
   queue_.rest(inside, stepped_);
@@ -260,6 +335,7 @@ void Cerebellum::advance(Time now) {
   }
   if (state_.safety == SafetyState::kOperational) follow(now);
   if (state_.safety == SafetyState::kStopping) sample_stop(now);
+  if (gives_way_ && now >= stop_ends_) hold_measured(now);
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);
 }
 
@@ -276,6 +352,16 @@ void Cerebellum::follow(Time now) {
   } else {
     commanded_ = next;
   }
+}
+
+void Cerebellum::hold_measured(Time now) {
+  gives_way_ = false;
+  tracker_.reset();
+  laws_.reset();
+  commanded_ = before_ = at_rest(measured_position_);
+  motion::plan_stop(commanded_, limits(),
+                    std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
+  queue_.rest(commanded_.position, now);
 }
 
 void Cerebellum::sample_stop(Time now) {
@@ -310,6 +396,7 @@ void Cerebellum::judge_stop(Time now) {
     // Something holds the arm off: holding the commanded place would go on pressing.
     commanded_ = at_rest(measured_position_);
     tracker_.reset();
+    laws_.reset();
   }
   queue_.rest(commanded_.position, now);
 }
@@ -318,20 +405,28 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
   set_points.power = powered_;
   set_points.vacuum_on = vacuum_on_;
   if (!powered_) {
-    set_points.torque_nm = AxisVector::Zero(commanded_.position.size());
+    set_points.torque_nm = driven_nm_ = AxisVector::Zero(commanded_.position.size());
     return;
   }
   AxisVector& torque = set_points.torque_nm;
   if (is_silent(now))
     tracker_.track_blind(commanded_, torque);
+  else if (gives_way_)
+    tracker_.yield(position_now_, speed_now_, torque);
   else
-    tracker_.track(commanded_, position_now_, speed_now_, dt_s_, torque);
+    laws_.torques({.commanded = commanded_,
+                   .position = position_now_,
+                   .speed = speed_now_,
+                   .felt = wrist_.at_tip(),
+                   .dt_s = dt_s_,
+                   .presses = state_.safety == SafetyState::kOperational},
+                  driven_nm_, torque);
   const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
   const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
   statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));
   statistics_.commanded.torque = std::max(statistics_.commanded.torque, share(clamped));
   if (clamped != torque) ++statistics_.saturated;
-  torque = clamped;
+  torque = driven_nm_ = clamped;
 }
 
 void Cerebellum::publish(link::CerebellumEnd& link, const body::Sensors& sensors, const body::SetPoints& set_points) {
@@ -341,9 +436,14 @@ void Cerebellum::publish(link::CerebellumEnd& link, const body::Sensors& sensors
   state_.position = measured_position_;
   state_.speed = measured_speed_;
   state_.torque_nm = set_points.torque_nm;
+  state_.external_nm = collision_.external_nm();
+  std::copy_n(collision_.wrench().data(), state_.tip_wrench.size(), state_.tip_wrench.begin());
   state_.wrist_force_n = sensors.wrist_force_n;
   state_.wrist_torque_nm = sensors.wrist_torque_nm;
+  std::copy_n(wrist_.at_tip().data(), state_.wrist_wrench.size(), state_.wrist_wrench.begin());
+  state_.controller = laws_.controller();
   state_.cup_vacuum_kpa = sensors.cup_vacuum_kpa;
+  state_.vacuum = vacuum_.seen;
   state_.vacuum_on = vacuum_on_;
   state_.belt_travel_m = sensors.belt_travel_m;
   state_.belt_speed_m_s = sensors.belt_speed_m_s;

@@ -17,9 +17,13 @@
 #include <cstdint>
 
 #include "pons/body/body.hpp"
+#include "pons/cerebellum/collision.hpp"
+#include "pons/cerebellum/control_laws.hpp"
 #include "pons/cerebellum/limit_watch.hpp"
 #include "pons/cerebellum/motion_queue.hpp"
 #include "pons/cerebellum/tracker.hpp"
+#include "pons/cerebellum/vacuum.hpp"
+#include "pons/cerebellum/wrist.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/core/time.hpp"
 #include "pons/link/link.hpp"
@@ -31,10 +35,13 @@ namespace pons::cerebellum {
 
 struct Settings {
   Gains gains;
+  CollisionSettings collision;
+  ControlSettings control;
   Duration period = std::chrono::milliseconds(1);               // nominal, between two steps
   Duration heartbeat_timeout = std::chrono::milliseconds(100);  // without any command, while operational
   Duration silence_timeout = std::chrono::milliseconds(20);     // without a newer measurement, while powered
   double following_error_rad = 0.05;                            // of any axis,
+  double yielding_error_rad = 0.5;                              // the same, of an arm that gives way as a spring does
   Duration following_time = std::chrono::milliseconds(20);      // for so long
   double standstill_rad_s = 0.02;                               // every axis below it,
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
@@ -63,6 +70,10 @@ class Cerebellum {
   //                    the last tick.
   //   kVacuum          operational only
   //   kPayload         any state; negative, not finite or above max_payload_kg: protective stop kBadCommand
+  //   kContact         operational only, and forgotten when armed; negative, not finite or above
+  //                    CollisionSettings::contact_max_n: protective stop kBadCommand
+  //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
+  //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm.
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a protective or emergency stop, at measured standstill, word and stop input released
   //   kArm             disarmed, at measured standstill, word and stop input released; the commanded position becomes
@@ -83,16 +94,21 @@ class Cerebellum {
   void take_measurement(Time now, const body::Sensors& sensors);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
+  void watch_contact(Time now);
+  void watch_cups(Time now, const body::Sensors& sensors);
   void take_commands(Time now, link::CerebellumEnd& link);
   [[nodiscard]] bool take(const link::Command& command, Time now);
   [[nodiscard]] bool take_motion(const link::Command& command, Time now);
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
+  [[nodiscard]] bool take_contact(const link::Command& command, Time now);
+  [[nodiscard]] bool take_control(const link::Command& command, Time now);
   [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
   // False if it is stopped or stopping already.
   bool stop(StopKind kind, link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
+  void hold_measured(Time now);
   void sample_stop(Time now);
   void judge_stop(Time now);
   void control(Time now, body::SetPoints& set_points);
@@ -106,6 +122,11 @@ class Cerebellum {
   const Settings settings_;
   Tracker tracker_;
   LimitWatch limit_watch_;
+  CollisionWatch collision_;
+  ControlLaws laws_;
+  WristSense wrist_;
+  const VacuumSettings vacuum_settings_;
+  VacuumState vacuum_;
   MotionQueue queue_;
   link::State state_;
   Statistics statistics_;
@@ -126,6 +147,9 @@ class Cerebellum {
   bool strays_ = false;
   Time strays_since_;
 
+  // After a collision the arm gives way while it brakes, and then holds where that brought it.
+  bool gives_way_ = false;
+  AxisVector driven_nm_;  // what the drives were told last
   bool powered_ = false, emergency_ = false, word_raised_ = false, stop_input_ = false;
   std::uint32_t vacuum_on_ = 0;
   Time heard_at_;  // last command of any kind

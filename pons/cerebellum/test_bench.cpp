@@ -33,6 +33,9 @@ world::Robot make_robot() {
   robot.rotor_inertia_kg_m2 = AxisVector::Constant(6, 0.01);
   robot.tool.mass_kg = 0.9;
   robot.tool.com_m = Vector3(0, 0, 0.06);
+  robot.tool.flange_from_tip.translation() = Vector3(0, 0, 0.16);
+  robot.tool.sealed_kpa = 35;
+  robot.tool.cups_to_lift = 3;
   return robot;
 }
 

@@ -14,6 +14,9 @@ inline constexpr std::size_t kMaxCups = 8;  // suction cups of one gripper
 // count, storage is inline.
 using AxisVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, static_cast<int>(kMaxAxes), 1>;
 
+// A force (N) and a moment (N·m), or a twist (m/s, rad/s): the straight part first.
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
 // Limits that hold in every tick. Rates are symmetric; all entries are positive except position_min.
 struct AxisLimits {
   AxisVector position_min;         // rad

@@ -66,6 +66,8 @@ class Truth {
   [[nodiscard]] std::optional<Pose> top(std::size_t parcel) const;
   // Speed of that parcel's middle, world frame; zero when it is not in the cell.
   [[nodiscard]] Vector3 velocity_m_s(std::size_t parcel) const;
+  // What everything else exerts on arm and tool through contacts at this moment: N, world frame.
+  [[nodiscard]] Vector3 force_on_arm_n() const;
   // How many of the manifest lie on the belt, unheld.
   [[nodiscard]] int on_belt() const;
 

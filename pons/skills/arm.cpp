@@ -6,8 +6,6 @@ namespace pons::skills {
 namespace {
 
 constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
-// A cup below this share of the sealed vacuum lets go.
-constexpr double kOpenShare = 0.4;
 
 AxisState at_rest(const AxisVector& position) {
   return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
@@ -21,11 +19,14 @@ Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
 void Arm::refresh(Time now) {
   link_.latest(state_);
   const bool is_operational = operational();
-  if (is_operational != was_operational_) {
-    // After a stop the arm is where it came to rest, whatever was planned.
+  if (is_operational != was_operational_ || state_.controller != was_controlled_) {
+    // After a stop the arm is where it came to rest, whatever was planned; after it gave way, where that brought it.
     asked_.clear();
     rest_ = at_rest(state_.commanded.position.size() > 0 ? state_.commanded.position : world_.robot.home);
+    const bool armed = is_operational && !was_operational_;
     was_operational_ = is_operational;
+    was_controlled_ = state_.controller;
+    if (armed && contact_n_ > 0) send({.kind = link::CommandKind::kContact, .contact_n = contact_n_});
   }
   // Segments that ended are history; the last one says where the arm rests.
   const auto live = std::find_if(asked_.begin(), asked_.end(), [&](const Segment& s) { return s.end() >= now; });
@@ -90,16 +91,14 @@ void Arm::payload(double mass_kg, const Vector3& com_in_flange_m) {
         .payload_com_m = {com_in_flange_m.x(), com_in_flange_m.y(), com_in_flange_m.z()}});
 }
 
-int Arm::sealed_cups() const {
-  const auto& vacuum = state_.cup_vacuum_kpa;
-  return static_cast<int>(
-      std::count_if(vacuum.begin(), vacuum.end(), [&](double kpa) { return kpa >= world_.robot.tool.sealed_kpa; }));
+void Arm::expect_contact(double force_n) {
+  if (force_n == contact_n_) return;
+  contact_n_ = force_n;
+  if (operational()) send({.kind = link::CommandKind::kContact, .contact_n = force_n});
 }
 
-bool Arm::all_cups_open() const {
-  const auto& vacuum = state_.cup_vacuum_kpa;
-  return std::all_of(vacuum.begin(), vacuum.end(),
-                     [&](double kpa) { return kpa < kOpenShare * world_.robot.tool.sealed_kpa; });
+void Arm::control(link::Controller controller, const link::Compliance& compliance) {
+  send({.kind = link::CommandKind::kControl, .controller = controller, .compliance = compliance});
 }
 
 void Arm::arm(Time) {
