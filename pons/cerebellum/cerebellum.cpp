@@ -11,13 +11,11 @@
 namespace pons::cerebellum {
 namespace {
 
-using link::CommandKind;
+using link::Controller;
 using link::SafetyState;
 using link::StopCause;
 using link::StopResult;
 
-// A burst longer than this waits for the next tick, so that a tick stays short whatever a bridge sends.
-constexpr int kCommandsPerTick = 64;
 // Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
 constexpr double kTooFast = 1.01;
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
@@ -34,10 +32,6 @@ bool is_finite(const body::Sensors& sensors, Eigen::Index axes) {
          std::isfinite(sensors.belt_speed_m_s);
 }
 
-AxisState at_rest(const AxisVector& position) {
-  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
-}
-
 }  // namespace
 
 Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time start)
@@ -45,15 +39,20 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
       tracker_(std::move(model), settings.gains),
       limits_(tracker_.robot_model().robot().limits),
       limit_watch_(limits_),
+      collision_(tracker_.robot_model().copy(), settings.collision),
+      laws_(tracker_, settings.control),
+      wrist_(settings.control.bias_s),
+      vacuum_settings_(VacuumSettings::of(tracker_.robot_model().robot().tool)),
       motion_time_(settings.rate),
       stepped_(start),
       fresh_at_(start),
       heard_at_(start) {
   const AxisVector zero = AxisVector::Zero(tracker_.robot_model().axes());
   commanded_ = before_ = at_rest(zero);
+  driven_nm_ = zero;
   measured_position_ = measured_speed_ = position_now_ = speed_now_ = zero;
   state_.commanded = commanded_;
-  state_.position = state_.speed = state_.torque_nm = zero;
+  state_.position = state_.speed = state_.torque_nm = state_.external_nm = zero;
   state_.epoch = machine_.epoch();
   queue_.rest(zero, start);
 }
@@ -73,6 +72,7 @@ void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEn
   advance(now);
   judge_stop(now);
   control(now, set_points);
+  watch_cups(now);
   stepped_ = now;
   publish(link, set_points);
 }
@@ -92,6 +92,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   stop_input_ = sensors.stop_input;
   watchdog_tripped_ = sensors.watchdog_tripped;
   zones_ = sensors.zones_occupied;
+  if (powered_) collision_.drive(driven_nm_, dt_s_);
   const Eigen::Index axes = commanded_.position.size();
   const bool good = is_finite(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
                     sensors.stamp <= now + settings_.silence_timeout;
@@ -109,12 +110,17 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
       statistics_.measured_acceleration = std::max(
           statistics_.measured_acceleration, rate.cwiseAbs().cwiseQuotient(limits().acceleration_rad_s2).maxCoeff());
     }
+    if (powered_) collision_.measure(sensors.stamp, sensors.position, sensors.speed);
     measured_position_ = sensors.position;
     publish_measurement(sensors);
     measured_speed_ = sensors.speed;
     measured_stamp_ = sensors.stamp;
     fresh_at_ = now;
     seen_ = true;
+    const bool free = state_.safety == SafetyState::kOperational && laws_.controller() == Controller::kTracking &&
+                      collision_.expected_n() == 0 && vacuum_on_ == 0;
+    wrist_.feel(tracker_.robot_model(), {measured_position_, measured_speed_, commanded_.acceleration},
+                tracker_.payload(), sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep, dt_s_);
     const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
     if (still && !is_still_) still_since_ = now;
     is_still_ = still;
@@ -144,6 +150,7 @@ void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   if (stop_input_) stop(StopCause::kStopInput, now);
   if (powered_ && watchdog_tripped_) stop(StopCause::kBodyWatchdog, now);
   watch_zones(now);
+  watch_contact(now);
   watch_following(now);
 }
 
@@ -173,17 +180,36 @@ void Cerebellum::watch_speed(Time now) {
     log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * share, 100 * state_.speed_share);
 }
 
+void Cerebellum::watch_contact(Time now) {
+  if (state_.safety != SafetyState::kOperational) return;
+  statistics_.contact = std::max(statistics_.contact, collision_.share());
+  if (!collision_.collides() || !stop(StopCause::kCollision, now)) return;
+  gives_way_ = true;
+  const Vector6& wrench = collision_.wrench();
+  log_.write(now, "axis {} is pushed with {:.1f} N·m, {:.0f} % of what no collision explains; {:.0f} N at the tip",
+             collision_.axis() + 1, collision_.external_nm()[collision_.axis()], 100 * collision_.share(),
+             wrench.head<3>().norm());
+}
+
+void Cerebellum::watch_cups(Time now) {
+  const link::VacuumPhase before = vacuum_.seen.phase;
+  vacuum_ = next(vacuum_settings_, vacuum_, vacuum_on_, state_.cup_vacuum_kpa, now);
+  if (before == link::VacuumPhase::kSealed && vacuum_.seen.phase == link::VacuumPhase::kLost)
+    log_.write(now, "the cups have lost what they held");
+}
+
 void Cerebellum::watch_following(Time now) {
-  if (!powered_) {
+  if (!powered_ || gives_way_) {
     strays_ = false;
     return;
   }
   // commanded_ is still the last step's: compare it with where the arm was then.
   const AxisVector then = position_now_ - dt_s_ * speed_now_;
   Eigen::Index axis = 0;
-  const double error = (commanded_.position - then).cwiseAbs().maxCoeff(&axis);
-  statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
-  const bool strays = error > settings_.following_error_rad;
+  const double error = (commanded_.position + laws_.gives_way() - then).cwiseAbs().maxCoeff(&axis);
+  const bool springs = laws_.controller() == Controller::kImpedance;
+  if (!springs) statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
+  const bool strays = error > (springs ? settings_.yielding_error_rad : settings_.following_error_rad);
   if (strays && !strays_) strays_since_ = now;
   strays_ = strays;
   if (!strays || now - strays_since_ < settings_.following_time) return;
@@ -193,80 +219,6 @@ void Cerebellum::watch_following(Time now) {
     log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
 }
 
-void Cerebellum::take_commands(Time now, link::CerebellumEnd& link) {
-  const std::uint64_t dropped = state_.dropped;
-  for (int i = 0; i < kCommandsPerTick && link.receive(command_); ++i) {
-    heard_at_ = now;
-    state_.last_sequence = std::max(state_.last_sequence, command_.sequence);
-    if (!take(command_, now)) ++state_.dropped;
-  }
-  if (state_.dropped > dropped)
-    log_.write(now, "refused {} commands up to number {}: {}, epoch {}", state_.dropped - dropped, state_.last_sequence,
-               name(state_.safety), state_.epoch);
-  if (moves(state_.safety) && now - heard_at_ >= settings_.heartbeat_timeout && stop(StopCause::kHeartbeatLost, now))
-    log_.write(now, "no command for {:.1f} ms", 1e3 * to_s(now - heard_at_));
-}
-
-bool Cerebellum::take(const link::Command& command, Time now) {
-  // These two are never too old: one says that somebody lives, the other asks for less.
-  if (command.kind == CommandKind::kHeartbeat) return true;
-  if (command.kind == CommandKind::kProtectiveStop) {
-    stop(StopCause::kCommanded, now);
-    return true;
-  }
-  if (command.epoch != state_.epoch) return false;
-  const bool operational = state_.safety == SafetyState::kOperational;
-  switch (command.kind) {
-    case CommandKind::kMotion:
-      return moves(state_.safety) && take_motion(command, now);
-    case CommandKind::kVacuum:
-      return operational && take_vacuum(command, now);
-    case CommandKind::kPayload:
-      return take_payload(command, now);
-    case CommandKind::kReset:
-      return is_standing(now) && reset(now);
-    case CommandKind::kArm:
-      return is_standing(now) && arm(now);
-    case CommandKind::kRecover:
-      return is_standing(now) && recover(now);
-    default:
-      return false;
-  }
-}
-
-bool Cerebellum::take_motion(const link::Command& command, Time now) {
-  const Refusal refusal = queue_.append(command.segment, command.splice, motion_time_.time());
-  if (refusal == Refusal::kNone) return true;
-  if (stop(StopCause::kBadCommand, now))
-    log_.write(now, "command {}, motion from {:.6f} s on: {}", command.sequence, command.segment.start.s(),
-               name(refusal));
-  return false;
-}
-
-bool Cerebellum::take_vacuum(const link::Command& command, Time now) {
-  const std::size_t cups = tracker_.robot_model().robot().tool.cups_m.size();
-  if (cups < kMaxCups && (command.vacuum_on >> cups) != 0) {
-    if (stop(StopCause::kBadCommand, now))
-      log_.write(now, "command {}: cups {:#x} where there are {}", command.sequence, command.vacuum_on, cups);
-    return false;
-  }
-  vacuum_on_ = command.vacuum_on;
-  return true;
-}
-
-bool Cerebellum::take_payload(const link::Command& command, Time now) {
-  const auto& com = command.payload_com_m;
-  const bool near = std::all_of(com.begin(), com.end(), [](double x) { return std::abs(x) <= 2; });
-  if (!(command.payload_kg >= 0) || !(command.payload_kg <= settings_.max_payload_kg) || !near) {
-    if (stop(StopCause::kBadCommand, now))
-      log_.write(now, "command {}: a payload of {:.3g} kg, or where no load can be", command.sequence,
-                 command.payload_kg);
-    return false;
-  }
-  tracker_.carry({command.payload_kg, com});
-  return true;
-}
-
 bool Cerebellum::enter(SafetyEvent event) {
   const Transition* const row = machine_.apply(event);
   if (row == nullptr) return false;
@@ -274,52 +226,6 @@ bool Cerebellum::enter(SafetyEvent event) {
   state_.epoch = machine_.epoch();
   powered_ = machine_.powered();
   return true;
-}
-
-bool Cerebellum::reset(Time now) {
-  if (!is_released() || !enter(SafetyEvent::kReset)) return false;
-  state_.cause = StopCause::kNone;
-  state_.stop_result = StopResult::kNone;
-  limits_ = robot_limits();
-  queue_.rest(commanded_.position, stepped_);
-  log_.write(now, "reset: disarmed");
-  return true;
-}
-
-bool Cerebellum::arm(Time now) {
-  if (!is_released()) return false;
-  const AxisVector inside =
-      measured_position_.cwiseMax(robot_limits().position_min).cwiseMin(robot_limits().position_max);
-  if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance_rad) return false;
-  if (!begin(SafetyEvent::kArm, inside, now)) return false;
-  log_.write(now, "armed in epoch {}", state_.epoch);
-  return true;
-}
-
-// Outside its limits the arm may be where it is, and come in from there; narrow() then takes back what it has left.
-bool Cerebellum::recover(Time now) {
-  if (!is_released() || !begin(SafetyEvent::kRecover, measured_position_, now)) return false;
-  limits_.position_min = limits_.position_min.cwiseMin(measured_position_);
-  limits_.position_max = limits_.position_max.cwiseMax(measured_position_);
-  limits_.speed_rad_s *= settings_.recovery_share;
-  log_.write(now, "recovery in epoch {}", state_.epoch);
-  return true;
-}
-
-bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) {
-  const bool had_power = powered_;
-  if (!enter(event)) return false;
-  if (!had_power) tracker_.reset();
-  commanded_ = before_ = at_rest(position);
-  queue_.rest(position, stepped_);
-  motion_time_.restart(stepped_);
-  heard_at_ = now;
-  return true;
-}
-
-void Cerebellum::narrow() {
-  limits_.position_min = robot_limits().position_min.cwiseMin(commanded_.position);
-  limits_.position_max = robot_limits().position_max.cwiseMax(commanded_.position);
 }
 
 bool Cerebellum::stop(StopCause cause, Time now) {
@@ -354,6 +260,7 @@ void Cerebellum::advance(Time now) {
   }
   if (moves(state_.safety)) follow(now);
   if (is_braking(state_.safety)) sample_stop(now);
+  if (gives_way_ && now >= stop_ends_) hold_measured(now);
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);
 }
 
@@ -378,6 +285,16 @@ void Cerebellum::follow(Time now) {
     if (state_.safety == SafetyState::kRecovery) narrow();
     watch_speed(now);
   }
+}
+
+void Cerebellum::hold_measured(Time now) {
+  gives_way_ = false;
+  tracker_.reset();
+  laws_.reset();
+  commanded_ = before_ = at_rest(measured_position_);
+  motion::plan_stop(commanded_, limits(),
+                    std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
+  queue_.rest(commanded_.position, now);
 }
 
 void Cerebellum::sample_stop(Time now) {
@@ -415,6 +332,7 @@ void Cerebellum::judge_stop(Time now) {
     // Something holds the arm off: holding the commanded place would go on pressing.
     commanded_ = at_rest(measured_position_);
     tracker_.reset();
+    laws_.reset();
   }
   queue_.rest(commanded_.position, now);
 }
@@ -423,20 +341,28 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
   set_points.power = powered_;
   set_points.vacuum_on = vacuum_on_;
   if (!powered_) {
-    set_points.torque_nm = AxisVector::Zero(commanded_.position.size());
+    set_points.torque_nm = driven_nm_ = AxisVector::Zero(commanded_.position.size());
     return;
   }
   AxisVector& torque = set_points.torque_nm;
   if (is_silent(now))
     tracker_.track_blind(commanded_, torque);
+  else if (gives_way_)
+    tracker_.yield(position_now_, speed_now_, torque);
   else
-    tracker_.track(commanded_, position_now_, speed_now_, dt_s_, torque);
+    laws_.torques({.commanded = commanded_,
+                   .position = position_now_,
+                   .speed = speed_now_,
+                   .felt = wrist_.at_tip(),
+                   .dt_s = dt_s_,
+                   .presses = state_.safety == SafetyState::kOperational},
+                  driven_nm_, torque);
   const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
   const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
   statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));
   statistics_.commanded.torque = std::max(statistics_.commanded.torque, share(clamped));
   if (clamped != torque) ++statistics_.saturated;
-  torque = clamped;
+  torque = driven_nm_ = clamped;
 }
 
 // What a good measurement says stays until the next good one.
@@ -459,7 +385,12 @@ void Cerebellum::publish(link::CerebellumEnd& link, const body::SetPoints& set_p
   state_.motion_end = queue_.end() + state_.late;
   state_.commanded = commanded_;
   state_.torque_nm = set_points.torque_nm;
+  state_.external_nm = collision_.external_nm();
+  std::copy_n(collision_.wrench().data(), state_.tip_wrench.size(), state_.tip_wrench.begin());
+  std::copy_n(wrist_.at_tip().data(), state_.wrist_wrench.size(), state_.wrist_wrench.begin());
+  state_.controller = laws_.controller();
   state_.vacuum_on = vacuum_on_;
+  state_.vacuum = vacuum_.seen;
   state_.watchdog_tripped = watchdog_tripped_;
   link.publish(state_);
 }

@@ -10,11 +10,15 @@
 #include <optional>
 
 #include "pons/body/body.hpp"
+#include "pons/cerebellum/collision.hpp"
+#include "pons/cerebellum/control_laws.hpp"
 #include "pons/cerebellum/limit_watch.hpp"
 #include "pons/cerebellum/motion_queue.hpp"
 #include "pons/cerebellum/motion_time.hpp"
 #include "pons/cerebellum/safety_machine.hpp"
 #include "pons/cerebellum/tracker.hpp"
+#include "pons/cerebellum/vacuum.hpp"
+#include "pons/cerebellum/wrist.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/core/time.hpp"
@@ -37,10 +41,13 @@ inline constexpr double kArmTolerance_rad = 0.01;
 
 struct Settings {
   Gains gains;
+  CollisionSettings collision;
+  ControlSettings control;
   Duration period = std::chrono::milliseconds(1);               // nominal, between two steps
   Duration heartbeat_timeout = std::chrono::milliseconds(100);  // without any command, while operational
   Duration silence_timeout = std::chrono::milliseconds(20);     // without a newer measurement, while powered
   double following_error_rad = 0.05;                            // of any axis,
+  double yielding_error_rad = 0.5;                              // the same, of an arm that gives way as a spring does
   Duration following_time = std::chrono::milliseconds(20);      // for so long
   double standstill_rad_s = 0.02;                               // every axis below it,
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
@@ -78,6 +85,10 @@ class Cerebellum {
   //                    kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from the last tick.
   //   kVacuum          operational only; a cup that the tool does not have: protective stop kBadCommand
   //   kPayload         any state; negative, not finite or above max_payload_kg: protective stop kBadCommand
+  //   kContact         operational only, and forgotten when armed; negative, not finite or above
+  //                    CollisionSettings::contact_max_n: protective stop kBadCommand
+  //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
+  //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm.
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
   //                    nobody in a zone that stops
@@ -101,11 +112,15 @@ class Cerebellum {
   void watch_following(Time now);
   void watch_zones(Time now);
   void watch_speed(Time now);
+  void watch_contact(Time now);
+  void watch_cups(Time now);
   void take_commands(Time now, link::CerebellumEnd& link);
   [[nodiscard]] bool take(const link::Command& command, Time now);
   [[nodiscard]] bool take_motion(const link::Command& command, Time now);
   [[nodiscard]] bool take_vacuum(const link::Command& command, Time now);
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
+  [[nodiscard]] bool take_contact(const link::Command& command, Time now);
+  [[nodiscard]] bool take_control(const link::Command& command, Time now);
   [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
   [[nodiscard]] bool recover(Time now);
@@ -117,6 +132,7 @@ class Cerebellum {
   bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
+  void hold_measured(Time now);
   void sample_stop(Time now);
   void judge_stop(Time now);
   void control(Time now, body::SetPoints& set_points);
@@ -133,6 +149,11 @@ class Cerebellum {
   Tracker tracker_;
   AxisLimits limits_;  // in force: the robot's, or what recovery makes of them
   LimitWatch limit_watch_;
+  CollisionWatch collision_;
+  ControlLaws laws_;
+  WristSense wrist_;
+  const VacuumSettings vacuum_settings_;
+  VacuumState vacuum_;
   MotionQueue queue_;
   MotionTime motion_time_;
   link::State state_;
@@ -156,6 +177,9 @@ class Cerebellum {
   bool strays_ = false;
   Time strays_since_;
 
+  // After a collision the arm gives way while it brakes, and then holds where that brought it.
+  bool gives_way_ = false;
+  AxisVector driven_nm_;  // what the drives were told last
   SafetyMachine machine_;
   bool powered_ = false;  // the machine's
   bool word_raised_ = false, stop_input_ = false, watchdog_tripped_ = false, zone_stops_ = false;

@@ -125,6 +125,8 @@ inline constexpr std::array kCauses = [] {
       {Cause::kZone, Event::kProtectiveStop, Resumes::kZone, "somebody is in a zone that stops"},
       {Cause::kNotSlowed, Event::kProtectiveStop, Resumes::kBridge,
        "the motion could not be slowed for a zone within `slow_within`"},
+      {Cause::kCollision, Event::kProtectiveStop, Resumes::kBridge,
+       "something pushes on the arm that neither motion, load nor an expected contact explains"},
   });
 }();
 

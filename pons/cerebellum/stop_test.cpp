@@ -48,9 +48,17 @@ struct StopCase {
   std::function<void(Bench&)> trigger;
   std::function<void(Bench&)> release;
   const char* detail = "";  // what the log adds to the cause
+  Settings settings;
 };
 
 void nothing(Bench&) {}
+
+// A wall is a collision long before it is a following error.
+Settings without_collisions() {
+  Settings settings;
+  settings.collision.torque_share = 1e9;
+  return settings;
+}
 
 const StopCase kCases[] = {
     {"Commanded", StopCause::kCommanded, false, [](Bench& b) { b.send(plain_command(CommandKind::kProtectiveStop)); },
@@ -62,7 +70,9 @@ const StopCase kCases[] = {
     {"HeartbeatLost", StopCause::kHeartbeatLost, false, [](Bench& b) { b.mute = true; },
      [](Bench& b) { b.mute = false; }, "no command for 10"},
     {"FollowingError", StopCause::kFollowingError, false, [](Bench& b) { b.plant.blocked = true; },
-     [](Bench& b) { b.plant.blocked = false; }, "rad from where it was told to be"},
+     [](Bench& b) { b.plant.blocked = false; }, "rad from where it was told to be", without_collisions()},
+    {"Collision", StopCause::kCollision, false, [](Bench& b) { b.plant.blocked = true; },
+     [](Bench& b) { b.plant.blocked = false; }, "of what no collision explains"},
     {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing,
      "of no sensible duration"},
 };
@@ -70,7 +80,7 @@ const StopCase kCases[] = {
 class Stop : public testing::TestWithParam<StopCase> {};
 
 TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
-  Bench bench;
+  Bench bench({}, GetParam().settings);
   get_moving(bench);
   GetParam().trigger(bench);
   AxisState before = bench.state().commanded;
@@ -104,7 +114,7 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
 }
 
 TEST_P(Stop, IsToldWithItsCauseAndItsStandstill) {
-  Bench bench;
+  Bench bench({}, GetParam().settings);
   get_moving(bench);
   GetParam().trigger(bench);
   bench.run(1500ms);
@@ -117,7 +127,7 @@ TEST_P(Stop, IsToldWithItsCauseAndItsStandstill) {
 }
 
 TEST_P(Stop, OnlyResetAndArmLeaveItAndNeitherMovesAnything) {
-  Bench bench;
+  Bench bench({}, GetParam().settings);
   get_moving(bench);
   GetParam().trigger(bench);
   bench.run(1500ms);

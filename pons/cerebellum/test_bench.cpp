@@ -34,6 +34,9 @@ world::Robot make_robot() {
   robot.tool.mass_kg = 0.9;
   robot.tool.com_m = Vector3(0, 0, 0.06);
   robot.tool.cups_m.resize(4, Vector3::Zero());
+  robot.tool.flange_from_tip.translation() = Vector3(0, 0, 0.16);
+  robot.tool.sealed_kpa = 35;
+  robot.tool.cups_to_lift = 3;
   return robot;
 }
 

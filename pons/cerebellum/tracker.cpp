@@ -22,4 +22,10 @@ void Tracker::track_blind(const AxisState& commanded, AxisVector& torque_nm) PON
   model_.inverse_dynamics(commanded.position, commanded.speed, wanted_, payload_, torque_nm);
 }
 
+void Tracker::yield(const AxisVector& position, const AxisVector& speed, AxisVector& torque_nm) PONS_NONBLOCKING {
+  const AxisVector& most = model_.robot().limits.acceleration_rad_s2;
+  wanted_ = (-gains_.brake_1_s * speed).cwiseMin(most).cwiseMax(-most);
+  model_.inverse_dynamics(position, speed, wanted_, payload_, torque_nm);
+}
+
 }  // namespace pons::cerebellum

@@ -12,6 +12,7 @@ struct Gains {
   double position_1_s2 = 4800;
   double speed_1_s = 120;
   double integral_1_s3 = 64'000;
+  double brake_1_s = 60;             // of an arm that gives way
   double integral_max_rad_s2 = 120;  // what the integral may ask for, so that it cannot wind up against an obstacle
 };
 
@@ -26,11 +27,16 @@ class Tracker {
              AxisVector& torque_nm) PONS_NONBLOCKING;
   // The same without a measurement: feed-forward alone.
   void track_blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING;
+  // Gives way to what pushes: weight alone is carried, and what moves is braked, by brake_1_s times its speed and no
+  // harder than its acceleration limit.
+  void yield(const AxisVector& position, const AxisVector& speed, AxisVector& torque_nm) PONS_NONBLOCKING;
   // Forgets the integral.
   void reset() PONS_NONBLOCKING { integral_.setZero(); }
   void carry(const model::Payload& payload) PONS_NONBLOCKING { payload_ = payload; }
 
   [[nodiscard]] const model::RobotModel& robot_model() const { return model_; }
+  [[nodiscard]] model::RobotModel& robot_model() { return model_; }
+  [[nodiscard]] const model::Payload& payload() const { return payload_; }
 
  private:
   model::RobotModel model_;

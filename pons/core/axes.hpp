@@ -15,6 +15,9 @@ inline constexpr std::size_t kMaxZones = 16;  // watched zones of one cell
 // count, storage is inline.
 using AxisVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, static_cast<int>(kMaxAxes), 1>;
 
+// A force (N) and a moment (N·m), or a twist (m/s, rad/s): the straight part first.
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
 // Limits that hold in every tick. Rates are symmetric; all entries are positive except position_min.
 struct AxisLimits {
   AxisVector position_min;         // rad
@@ -31,5 +34,9 @@ struct AxisState {
   AxisVector speed;         // rad/s
   AxisVector acceleration;  // rad/s²
 };
+
+[[nodiscard]] inline AxisState at_rest(const AxisVector& position) {
+  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
+}
 
 }  // namespace pons

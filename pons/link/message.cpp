@@ -52,6 +52,8 @@ std::string_view name(StopCause cause) {
       return "zone";
     case StopCause::kNotSlowed:
       return "not slowed";
+    case StopCause::kCollision:
+      return "collision";
   }
   return "unknown";
 }
@@ -68,6 +70,34 @@ std::string_view name(StopResult result) {
       return "UNCERTAIN";
     case StopResult::kFailed:
       return "FAILED";
+  }
+  return "unknown";
+}
+
+std::string_view name(Controller controller) {
+  switch (controller) {
+    case Controller::kTracking:
+      return "tracking";
+    case Controller::kImpedance:
+      return "impedance";
+    case Controller::kAdmittance:
+      return "admittance";
+  }
+  return "unknown";
+}
+
+std::string_view name(VacuumPhase phase) {
+  switch (phase) {
+    case VacuumPhase::kOff:
+      return "off";
+    case VacuumPhase::kBuilding:
+      return "building";
+    case VacuumPhase::kSealed:
+      return "sealed";
+    case VacuumPhase::kLost:
+      return "lost";
+    case VacuumPhase::kReleasing:
+      return "releasing";
   }
   return "unknown";
 }

@@ -20,6 +20,37 @@ enum class CommandKind : std::uint8_t {
   kReset,           // leave a stop; moves nothing, arms nothing
   kArm,             // accept motion again, from the standstill measured now
   kRecover,         // likewise, wherever the arm is, for slow motion towards the inside of its limits
+  kContact,         // the force that the tip may meet from now on without its being a collision
+  kControl,         // by which law the arm follows its commanded motion from now on
+};
+
+// How the arm follows its commanded motion. Pushed by the force f, the tip gives way
+//   kTracking    not at all, as far as the drives can: computed torque
+//   kImpedance   as a spring and damper at the drives' torques would (Hogan 1985)
+//   kAdmittance  as a mass, spring and damper would, which the wrist's sensor moves and the drives track
+enum class Controller : std::uint8_t { kTracking, kImpedance, kAdmittance };
+
+// Of the two compliant laws, in the tip's axes: x, y, z, and about them.
+struct Compliance {
+  std::array<double, 6> stiffness{};  // N/m, N·m/rad; 0: it yields for good
+  std::array<double, 6> damping{};    // N·s/m, N·m·s/rad
+  std::array<double, 6> wrench{};     // N, N·m: what the tip pushes with beside that; z points out of the tool
+  double force_max_n = 0;             // of spring, damper and wrench together
+};
+
+// What the cups do, debounced; thresholds are the world's.
+enum class VacuumPhase : std::uint8_t {
+  kOff,
+  kBuilding,   // on, too few cups sealed to lift
+  kSealed,     // enough to lift were, and at least one still is
+  kLost,       // they were, and none is: what was held is gone
+  kReleasing,  // off, and the cups still hold
+};
+
+struct Vacuum {
+  VacuumPhase phase = VacuumPhase::kOff;
+  std::uint8_t sealed_cups = 0;
+  bool open = true;  // every cup has let go, or never held
 };
 
 // One command. `epoch` is the one the sender had read when it made the command; an older one is dropped.
@@ -28,10 +59,13 @@ struct Command {
   std::uint32_t epoch = 0;
   CommandKind kind = CommandKind::kHeartbeat;
   bool splice = false;
-  Segment segment;                        // kMotion
-  std::uint32_t vacuum_on = 0;            // kVacuum: bit i = cup i
-  double payload_kg = 0;                  // kPayload
-  std::array<double, 3> payload_com_m{};  // kPayload: centre of mass, flange frame
+  Segment segment;                                // kMotion
+  std::uint32_t vacuum_on = 0;                    // kVacuum: bit i = cup i
+  double payload_kg = 0;                          // kPayload
+  std::array<double, 3> payload_com_m{};          // kPayload: centre of mass, flange frame
+  double contact_n = 0;                           // kContact; 0: none is expected
+  Controller controller = Controller::kTracking;  // kControl
+  Compliance compliance;                          // kControl, unless tracking
 };
 
 enum class SafetyState : std::uint8_t {
@@ -59,6 +93,7 @@ enum class StopCause : std::uint8_t {
   kLoopStalled,     // the loop itself was kept from its ticks
   kZone,            // somebody is in a zone that stops
   kNotSlowed,       // the motion could not be slowed in time for a zone
+  kCollision,       // something pushes that neither motion, load nor an expected contact explains
 };
 
 // Standstill as measured, never assumed.
@@ -67,6 +102,8 @@ enum class StopResult : std::uint8_t { kNone, kPending, kConfirmed, kUncertain, 
 [[nodiscard]] std::string_view name(SafetyState state);
 [[nodiscard]] std::string_view name(StopCause cause);
 [[nodiscard]] std::string_view name(StopResult result);
+[[nodiscard]] std::string_view name(Controller controller);
+[[nodiscard]] std::string_view name(VacuumPhase phase);
 
 // The cerebellum's view after a tick.
 struct State {
@@ -82,10 +119,15 @@ struct State {
   AxisState commanded;                    // what the loop asks of the arm now
   AxisVector position, speed;             // measured
   AxisVector torque_nm;                   // asked of the drives
+  AxisVector external_nm;                 // on each axis from outside, as the momentum observer has it
+  std::array<double, 6> tip_wrench{};     // what explains it: force (N), moment about the tip (N·m), world axes
+  std::array<double, 6> wrist_wrench{};   // by the wrist's sensor, less tool, payload and bias: likewise, tip axes
   std::array<double, 3> wrist_force_n{};  // flange frame, raw
   std::array<double, 3> wrist_torque_nm{};
   std::array<double, 8> cup_vacuum_kpa{};
   std::uint32_t vacuum_on = 0;
+  Vacuum vacuum;
+  Controller controller = Controller::kTracking;
   double belt_travel_m = 0, belt_speed_m_s = 0;
   bool photo_eye_blocked = false;
   bool watchdog_tripped = false;     // the body's has taken the power off

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
@@ -24,9 +25,6 @@
 
 namespace pons::model {
 namespace {
-
-using AxisMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, static_cast<int>(kMaxAxes),
-                                 static_cast<int>(kMaxAxes)>;
 
 Pose pose_of(const pinocchio::SE3& m) {
   Pose pose = Pose::Identity();
@@ -236,13 +234,13 @@ RobotModel RobotModel::copy() const {
 int RobotModel::axes() const { return impl_->model.nv; }
 const world::Robot& RobotModel::robot() const { return impl_->robot; }
 
-Pose RobotModel::world_from_tip(const AxisVector& q) {
+Pose RobotModel::world_from_tip(const AxisVector& q) PONS_NONBLOCKING {
   impl_->q = q;
   pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);
   return impl_->robot.world_from_base * pose_of(impl_->data.oMi[impl_->last_joint] * impl_->last_joint_from_tip);
 }
 
-Jacobian RobotModel::tip_jacobian(const AxisVector& q) { return impl_->tip_jacobian(q); }
+Jacobian RobotModel::tip_jacobian(const AxisVector& q) PONS_NONBLOCKING { return impl_->tip_jacobian(q); }
 
 RobotModel::InverseMethod RobotModel::inverse_method() const {
   const auto& closed_form = impl_->inverse->closed_form();
@@ -316,6 +314,50 @@ void RobotModel::forward_dynamics(const AxisVector& q, const AxisVector& speed, 
     mass.col(axis) = pinocchio::rnea(impl_->model, impl_->data, impl_->q, impl_->v, impl_->a) - bias;
   }
   acceleration = mass.ldlt().solve(torque_nm - bias);
+}
+
+void RobotModel::momentum(const AxisVector& q, const AxisVector& speed, const Payload& payload,
+                          AxisVector& momentum_nms, AxisVector& rate_nm) PONS_NONBLOCKING {
+  const pinocchio::Model& model = impl_->model;
+  pinocchio::Data& data = impl_->data;
+  impl_->carry(payload);
+  impl_->q = q;
+  pinocchio::computeJointJacobians(model, data, impl_->q);
+  // Of each body and all beyond it, in base axes about the base's origin: momentum, and weight.
+  std::array<pinocchio::Force, kMaxAxes + 1> beyond, weight;
+  std::array<pinocchio::Motion, kMaxAxes + 1> twist;
+  const auto count = static_cast<std::size_t>(model.njoints);
+  twist[0].setZero();
+  for (std::size_t joint = 1; joint < count; ++joint) {
+    const auto axis = static_cast<Eigen::Index>(joint) - 1;
+    twist[joint] = twist[model.parents[joint]];
+    twist[joint].toVector() += data.J.col(axis) * speed[axis];
+    const pinocchio::SE3& base_from_body = data.oMi[joint];
+    const pinocchio::Inertia& inertia = model.inertias[joint];
+    beyond[joint] = base_from_body.act(inertia * base_from_body.actInv(twist[joint]));
+    weight[joint] = base_from_body.act(inertia * base_from_body.actInv(model.gravity));
+  }
+  momentum_nms.resize(model.nv);
+  rate_nm.resize(model.nv);
+  for (std::size_t joint = count - 1; joint > 0; --joint) {
+    const auto axis = static_cast<Eigen::Index>(joint) - 1;
+    const pinocchio::Motion screw(data.J.col(axis));
+    momentum_nms[axis] = screw.toVector().dot(beyond[joint].toVector()) + model.armature[axis] * speed[axis];
+    // Turning the joint moves what lies beyond under the speed that comes from before it.
+    rate_nm[axis] = twist[joint].cross(screw).toVector().dot(beyond[joint].toVector()) +
+                    screw.toVector().dot(weight[joint].toVector());
+    const std::size_t parent = model.parents[joint];
+    if (parent == 0) continue;
+    beyond[parent] += beyond[joint];
+    weight[parent] += weight[joint];
+  }
+}
+
+void RobotModel::mass_matrix(const AxisVector& q, const Payload& payload, AxisMatrix& mass) PONS_NONBLOCKING {
+  impl_->carry(payload);
+  impl_->q = q;
+  pinocchio::crba(impl_->model, impl_->data, impl_->q);
+  mass = impl_->data.M.selfadjointView<Eigen::Upper>();
 }
 
 }  // namespace pons::model

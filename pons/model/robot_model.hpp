@@ -23,6 +23,10 @@ struct Payload {
   std::array<double, 3> com_m{};  // flange frame
 };
 
+// One row and column an axis; storage is inline.
+using AxisMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, static_cast<int>(kMaxAxes),
+                                 static_cast<int>(kMaxAxes)>;
+
 // A capsule placed in the world.
 struct PlacedCapsule {
   Vector3 from, to;  // m, world frame
@@ -43,9 +47,9 @@ class RobotModel {
   [[nodiscard]] const world::Robot& robot() const;
 
   // Forward kinematics of the tool tip. q in rad.
-  [[nodiscard]] Pose world_from_tip(const AxisVector& q);
-  // d(tip)/dq there.
-  [[nodiscard]] Jacobian tip_jacobian(const AxisVector& q);
+  [[nodiscard]] Pose world_from_tip(const AxisVector& q) PONS_NONBLOCKING;
+  // d(tip)/dq there, world axes: speed of the tip in rows 1 to 3, angular speed in rows 4 to 6.
+  [[nodiscard]] Jacobian tip_jacobian(const AxisVector& q) PONS_NONBLOCKING;
 
   // Inverse kinematics, inside position limits, whole turns of 2π considered. A closed form where the arm's axes allow
   // one (axes 2, 3, 4 parallel, or 4, 5, 6 through a point; exact to about 1e-12), otherwise iteration (to 1e-10 as a
@@ -76,6 +80,14 @@ class RobotModel {
   // The reverse: the acceleration that these torques cause, by the mass matrix (Walker and Orin 1982, method 1).
   void forward_dynamics(const AxisVector& q, const AxisVector& speed, const AxisVector& torque_nm,
                         const Payload& payload, AxisVector& acceleration) PONS_NONBLOCKING;
+
+  // The generalised momentum p = M(q) q̇ (N·m·s), and the rate at which it changes of itself, without any torque
+  // (N·m): ṗ = torques + rate, with rate = ∂T/∂q - ∂V/∂q (Lagrange), T the kinetic, V the potential energy. It needs no
+  // acceleration. One pass outward and one back, as in recursive Newton-Euler.
+  void momentum(const AxisVector& q, const AxisVector& speed, const Payload& payload, AxisVector& momentum_nms,
+                AxisVector& rate_nm) PONS_NONBLOCKING;
+  // M(q), kg·m²: rotors, tool and payload included (composite rigid bodies, Walker and Orin 1982, method 3).
+  void mass_matrix(const AxisVector& q, const Payload& payload, AxisMatrix& mass) PONS_NONBLOCKING;
 
  private:
   struct Impl;

@@ -138,6 +138,42 @@ TEST(RobotModel, ARotorAddsItsInertiaToItsOwnAxisOnly) {
   }
 }
 
+TEST(RobotModel, TheMassMatrixIsWhatInverseDynamicsAskForPerAcceleration) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(7);
+  for (int i = 0; i < 100; ++i) {
+    const AxisVector q = random_axes(random, 3), zero = AxisVector::Zero(6);
+    const Payload payload{.mass_kg = random.uniform(0, 3), .com_m = {0, 0.01, 0.2}};
+    AxisMatrix mass;
+    model.mass_matrix(q, payload, mass);
+    AxisVector weight, torque;
+    model.inverse_dynamics(q, zero, zero, payload, weight);
+    const AxisVector acceleration = random_axes(random, 5);
+    model.inverse_dynamics(q, zero, acceleration, payload, torque);
+    EXPECT_TRUE((mass * acceleration).isApprox(torque - weight, 1e-9));
+  }
+}
+
+// dp/dt along a motion with a known acceleration, by differences, is what torques and rate say it is.
+TEST(RobotModel, MomentumChangesByTorquesAndItsOwnRate) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(8);
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 200; ++i) {
+    const AxisVector q = random_axes(random, 3), speed = random_axes(random, 3), gain = random_axes(random, 20);
+    const Payload payload{.mass_kg = random.uniform(0, 3), .com_m = {0, 0.01, 0.2}};
+    AxisVector before, after, here, rate, ignored, torque;
+    model.momentum(q, speed, payload, here, rate);
+    AxisMatrix mass;
+    model.mass_matrix(q, payload, mass);
+    EXPECT_TRUE(here.isApprox(mass * speed, 1e-9));
+    model.momentum(q - kStep * speed, speed - kStep * gain, payload, before, ignored);
+    model.momentum(q + kStep * speed, speed + kStep * gain, payload, after, ignored);
+    model.inverse_dynamics(q, speed, gain, payload, torque);
+    EXPECT_TRUE(((after - before) / (2 * kStep)).isApprox(torque + rate, 1e-6));
+  }
+}
+
 TEST(RobotModel, CapsulesMoveWithTheirLinks) {
   auto model = RobotModel::load(hanging_arm()).value();
   std::vector<PlacedCapsule> capsules;

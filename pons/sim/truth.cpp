@@ -55,6 +55,26 @@ std::uint32_t Truth::cups_on() const {
   return on;
 }
 
+Vector3 Truth::force_on_arm_n() const {
+  const Cell& cell = *simulation_->cell_;
+  const auto is_robot = [&](int geom) {
+    const Part part = cell.composed.parts[static_cast<std::size_t>(geom)];
+    return part == Part::kArm || part == Part::kCup;
+  };
+  Vector3 sum = Vector3::Zero();
+  for (int i = 0; i < cell.data->ncon; ++i) {
+    const mjContact& contact = cell.data->contact[i];
+    if (is_robot(contact.geom[0]) == is_robot(contact.geom[1])) continue;
+    double force[6];
+    mj_contactForce(cell.composed.model.get(), cell.data.get(), i, force);
+    // Of the first geom on the second, in the contact's frame, whose rows are its axes.
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> frame(contact.frame);
+    const Vector3 on_second = frame.transpose() * Vector3(force[0], force[1], force[2]);
+    sum += is_robot(contact.geom[1]) ? on_second : Vector3(-on_second);
+  }
+  return sum;
+}
+
 int Truth::on_belt() const {
   int count = 0;
   for (int i = 0; i < kSlots; ++i) count += simulation_->cell_->ledger.on_belt(i) ? 1 : 0;

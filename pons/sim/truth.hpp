@@ -68,6 +68,8 @@ class Truth {
   [[nodiscard]] Vector3 velocity_m_s(std::size_t parcel) const;
   // Which cups are driven, bit i = cup i.
   [[nodiscard]] std::uint32_t cups_on() const;
+  // What everything else exerts on arm and tool through contacts at this moment: N, world frame.
+  [[nodiscard]] Vector3 force_on_arm_n() const;
   // How many of the manifest lie on the belt, unheld.
   [[nodiscard]] int on_belt() const;
 

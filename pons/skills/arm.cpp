@@ -6,16 +6,10 @@ namespace pons::skills {
 namespace {
 
 constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
-// A cup below this share of the sealed vacuum lets go.
-constexpr double kOpenShare = 0.4;
 // Of an arm that is brought in from outside its limits: so slowly, so far inside, and at rest so long before it is
 // asked where it stands.
 constexpr double kRecoverySpeed = 0.05, kInside_rad = 0.02;
 constexpr Duration kRecoveredRest = std::chrono::milliseconds(200);
-
-AxisState at_rest(const AxisVector& position) {
-  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
-}
 
 }  // namespace
 
@@ -24,11 +18,14 @@ Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
 
 void Arm::refresh(Time now) {
   link_.latest(state_);
-  if (state_.safety != safety_before_) {
-    // After a stop the arm is where it came to rest, whatever was planned.
+  if (state_.safety != safety_before_ || state_.controller != controlled_before_) {
+    // After a stop the arm is where it came to rest, whatever was planned; after it gave way, where that brought it.
     asked_.clear();
     rest_ = at_rest(state_.commanded.position.size() > 0 ? state_.commanded.position : world_.robot.home);
+    const bool armed = operational() && safety_before_ != link::SafetyState::kOperational;
     safety_before_ = state_.safety;
+    controlled_before_ = state_.controller;
+    if (armed && contact_n_ > 0) send({.kind = link::CommandKind::kContact, .contact_n = contact_n_});
   }
   // Segments that ended are history; the last one says where the arm rests.
   const Time reached = now - late();
@@ -95,16 +92,14 @@ void Arm::payload(double mass_kg, const Vector3& com_in_flange_m) {
         .payload_com_m = {com_in_flange_m.x(), com_in_flange_m.y(), com_in_flange_m.z()}});
 }
 
-int Arm::sealed_cups() const {
-  const auto& vacuum = state_.cup_vacuum_kpa;
-  return static_cast<int>(
-      std::count_if(vacuum.begin(), vacuum.end(), [&](double kpa) { return kpa >= world_.robot.tool.sealed_kpa; }));
+void Arm::expect_contact(double force_n) {
+  if (force_n == contact_n_) return;
+  contact_n_ = force_n;
+  if (operational()) send({.kind = link::CommandKind::kContact, .contact_n = force_n});
 }
 
-bool Arm::all_cups_open() const {
-  const auto& vacuum = state_.cup_vacuum_kpa;
-  return std::all_of(vacuum.begin(), vacuum.end(),
-                     [&](double kpa) { return kpa < kOpenShare * world_.robot.tool.sealed_kpa; });
+void Arm::control(link::Controller controller, const link::Compliance& compliance) {
+  send({.kind = link::CommandKind::kControl, .controller = controller, .compliance = compliance});
 }
 
 void Arm::arm(Time) {

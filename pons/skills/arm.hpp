@@ -50,8 +50,12 @@ class Arm {
 
   void vacuum(bool on);
   void payload(double mass_kg, const Vector3& com_in_flange_m);
-  [[nodiscard]] int sealed_cups() const;
-  [[nodiscard]] bool all_cups_open() const;
+  // From now on the tip may meet this force (N) without its being taken for a collision; until told otherwise, also
+  // when the arm is armed again.
+  void expect_contact(double force_n);
+  // By which law the arm follows from now on; it must rest. Parameters: see cerebellum's fault().
+  void control(link::Controller controller, const link::Compliance& compliance = {});
+  [[nodiscard]] const link::Vacuum& cups() const { return state_.vacuum; }
 
   // A protective stop, whatever moves it.
   void halt() { (void)send({.kind = link::CommandKind::kProtectiveStop}); }
@@ -73,6 +77,8 @@ class Arm {
   motion::Trajectory asked_;  // in the motion's time
   AxisState rest_;            // in force when nothing was asked for since arming
   std::uint64_t sequence_ = 0;
+  double contact_n_ = 0;
+  link::Controller controlled_before_ = link::Controller::kTracking;
   link::SafetyState safety_before_ = link::SafetyState::kDisarmed;
 };
 

@@ -220,19 +220,32 @@ TEST_F(ArmTest, GentlerLimitsWaitUntilTheMotionKeepsThem) {
   EXPECT_TRUE((arm_.planned(splice).acceleration.cwiseAbs().array() <= gentle.acceleration_rad_s2.array()).all());
 }
 
-TEST_F(ArmTest, CupsSealAndOpenAtTheirOwnThresholds) {
-  const double sealed_kpa = world_.robot.tool.sealed_kpa;
-  state_.cup_vacuum_kpa = {sealed_kpa, sealed_kpa + 20, 0.5 * sealed_kpa, 0};
+TEST_F(ArmTest, SaysOnceWhatContactItExpectsAndAgainWhenArmedAgain) {
+  const auto told = [&] {
+    std::vector<double> contacts;
+    for (const link::Command& command : received())
+      if (command.kind == CommandKind::kContact) contacts.push_back(command.contact_n);
+    return contacts;
+  };
   hear(Time(kTick), SafetyState::kOperational);
-  EXPECT_EQ(arm_.sealed_cups(), 2);
-  EXPECT_FALSE(arm_.all_cups_open());
-  state_.cup_vacuum_kpa = {0, 0, 0.5 * sealed_kpa, 0};
-  hear(Time(2 * kTick), SafetyState::kOperational);
-  EXPECT_EQ(arm_.sealed_cups(), 0);
-  EXPECT_FALSE(arm_.all_cups_open()) << "half sealed still holds";
-  state_.cup_vacuum_kpa = {};
+  arm_.expect_contact(60);
+  arm_.expect_contact(60);
+  EXPECT_THAT(told(), testing::ElementsAre(60));
+  hear(Time(2 * kTick), SafetyState::kProtectiveStop);
+  EXPECT_THAT(told(), testing::IsEmpty());
   hear(Time(3 * kTick), SafetyState::kOperational);
-  EXPECT_TRUE(arm_.all_cups_open());
+  EXPECT_THAT(told(), testing::ElementsAre(60));
+}
+
+// After it gave way the arm is held elsewhere: the next motion begins there.
+TEST_F(ArmTest, PlansFromWhereGivingWayBroughtIt) {
+  hear(Time(kTick), SafetyState::kOperational);
+  state_.controller = link::Controller::kAdmittance;
+  hear(Time(2 * kTick), SafetyState::kOperational);
+  const AxisVector pushed = world_.robot.home.array() + 0.01;
+  state_.controller = link::Controller::kTracking;
+  hear(Time(3 * kTick), SafetyState::kOperational, pushed);
+  EXPECT_EQ(arm_.planned(Time(4 * kTick)).position, pushed);
 }
 
 TEST_F(ArmTest, ArmsStepByStepAndOnlyOutOfAStop) {

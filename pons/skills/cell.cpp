@@ -50,7 +50,7 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   arm.refresh(now);
-  if (held && !arm.operational() && arm.all_cups_open()) {
+  if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
     held.reset();
     arm.payload(0, Vector3::Zero());

@@ -17,6 +17,9 @@
 
 namespace pons::skills {
 
+// What the tip may meet while cups press on a parcel, lift one whose mass is not known yet, or let go of one.
+inline constexpr double kHandling_n = 100;
+
 // The parcel on the cups.
 struct Held {
   std::string code;

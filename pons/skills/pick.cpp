@@ -285,6 +285,7 @@ class Pick final : public task::Skill {
     if (now + kVacuumLead >= grasp_.contact) {
       cell_.arm.vacuum(true);
       behind_ = Duration{0};
+      cell_.arm.expect_contact(kHandling_n);
       phase_ = Phase::kGrip;
     }
     return {};
@@ -304,13 +305,16 @@ class Pick final : public task::Skill {
 
   Progress grip(Time now) {
     if (to_s(behind_) * cell_.belt_speed_m_s() > kDragged_m) return give_up(now, "slowed over it, and left behind");
-    sealed_ticks_ = cell_.arm.sealed_cups() >= cell_.world.robot.tool.cups_to_lift ? sealed_ticks_ + 1 : 0;
+    const link::Vacuum& cups = cell_.arm.cups();
+    const bool enough =
+        cups.phase == link::VacuumPhase::kSealed && cups.sealed_cups >= cell_.world.robot.tool.cups_to_lift;
+    sealed_ticks_ = enough ? sealed_ticks_ + 1 : 0;
     const int all = static_cast<int>(cell_.world.robot.tool.cups_m.size());
-    const int needed_ticks = cell_.arm.sealed_cups() == all ? 1 : 3;
+    const int needed_ticks = cups.sealed_cups == all ? 1 : 3;
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
-      return give_up(now, fmt::format("{} of {} cups sealed", cell_.arm.sealed_cups(), all));
+      return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};
   }
@@ -363,7 +367,7 @@ class Pick final : public task::Skill {
 
   Progress lift(Time now) {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
-    if (cell_.arm.sealed_cups() == 0 && height > 0) {
+    if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.held.reset();
       cell_.arm.vacuum(false);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
@@ -384,6 +388,7 @@ class Pick final : public task::Skill {
     cell_.held->mass_kg = std::max(0.0, mass);
     const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
     cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * cell_.held->load.size_m.z()));
+    cell_.arm.expect_contact(0);
     if (mass > limit) {
       return begin_put_back(now, overweight(mass));
     }
@@ -424,7 +429,11 @@ class Pick final : public task::Skill {
     return state.belt_travel_m + to_s(time - state.stamp) * state.belt_speed_m_s;
   }
 
-  Progress retreat(Time now) { return now < retreated_at_ ? Progress{} : verdict_; }
+  Progress retreat(Time now) {
+    if (now < retreated_at_) return {};
+    cell_.arm.expect_contact(0);
+    return verdict_;
+  }
 
   static Progress overweight(double mass_kg) {
     return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
@@ -433,7 +442,9 @@ class Pick final : public task::Skill {
   Progress success(Time now) {
     return {Status::kSucceeded,
             {},
-            {{"mass_kg", cell_.held->mass_kg}, {"sealed", cell_.arm.sealed_cups()}, {"seconds", to_s(now - started_)}}};
+            {{"mass_kg", cell_.held->mass_kg},
+             {"sealed", cell_.arm.cups().sealed_cups},
+             {"seconds", to_s(now - started_)}}};
   }
 
   static std::string name_of(const ObjectBelief& object) {

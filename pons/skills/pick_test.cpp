@@ -45,7 +45,7 @@ class PickTest : public ::testing::Test {
     state.belt_speed_m_s = belt_m_s_;
     state.belt_travel_m = belt_travel_m_ += 0.01 * belt_m_s_;
     if (grips_kg_) {
-      std::ranges::fill(state.cup_vacuum_kpa, world_.robot.tool.sealed_kpa);
+      state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
       const Pose flange = cell_.model.world_from_tip(at.position) * world_.robot.tool.flange_from_tip.inverse();
       const Vector3 load_n = flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * *grips_kg_);
       const Vector3 tool_n = flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * world_.robot.tool.mass_kg);

@@ -39,7 +39,6 @@ constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
 constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
-constexpr int kLostTicks = 3;
 constexpr double kMiddle = 0.15;  // of the mouth, from its centre
 
 class Place final : public task::Skill {
@@ -184,8 +183,7 @@ class Place final : public task::Skill {
   }
 
   Progress carry(Time now) {
-    lost_ticks_ = cell_.arm.sealed_cups() == 0 ? lost_ticks_ + 1 : 0;
-    if (lost_ticks_ >= kLostTicks) {
+    if (cell_.arm.cups().phase == link::VacuumPhase::kLost) {
       const std::string code = cell_.held->code;
       cell_.arm.vacuum(false);
       cell_.held.reset();
@@ -203,6 +201,7 @@ class Place final : public task::Skill {
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
+    cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
@@ -231,12 +230,13 @@ class Place final : public task::Skill {
   }
 
   Progress release(Time now) {
-    if (now < arrives_ + kRested || !cell_.arm.all_cups_open()) return late(now);
+    if (now < arrives_ + kRested || !cell_.arm.cups().open) return late(now);
     const double felt_kg = weigh_now(cell_);
     if (felt_kg > std::max(kGoneLeast_kg, kGoneShare * cell_.held->mass_kg)) return late(now);
     const std::string code = cell_.held->code;
     cell_.held.reset();
     cell_.arm.payload(0, Vector3::Zero());
+    cell_.arm.expect_contact(0);
     return {Status::kSucceeded, {}, {{"place", name_}, {"object", code}, {"seconds", to_s(now - started_)}}};
   }
 
@@ -254,7 +254,6 @@ class Place final : public task::Skill {
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
   std::optional<Time> blocked_since_;
-  int lost_ticks_ = 0;
   world::Entry entry_;
   bool cancelled_ = false;
 };

@@ -23,6 +23,12 @@ void Rest::tick(Time now) {
     laying_ = laid && !*laid;
     return;
   }
+  // What a skill that was broken off left behind.
+  cell_.arm.expect_contact(0);
+  if (cell_.arm.state().controller != link::Controller::kTracking) {
+    if (now > cell_.arm.motion_end()) cell_.arm.control(link::Controller::kTracking);
+    return;
+  }
   cell_.keep_clear(now);
   if (!cell_.held || now < since_ + kLeftAlone) return;
   since_ = now;

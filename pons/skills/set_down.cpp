@@ -81,10 +81,12 @@ Expected<bool> SetDown::tick(Time now) {
     if (auto stopped = cell_.arm.stop(now); !stopped) return std::unexpected(stopped.error());
   }
   cell_.arm.vacuum(false);
-  if (!cell_.arm.all_cups_open() && now < released_at_ + kOpensWithin) return false;
+  cell_.arm.expect_contact(kHandling_n);
+  if (!cell_.arm.cups().open && now < released_at_ + kOpensWithin) return false;
   cell_.left_on_belt(cell_.held->load, cell_.model.world_from_tip(cell_.arm.state().position).translation());
   cell_.held.reset();
   cell_.arm.payload(0, Vector3::Zero());
+  cell_.arm.expect_contact(0);
   return true;
 }
 

@@ -4,6 +4,7 @@
 #include "pons/skills/move_to.hpp"
 #include "pons/skills/pick.hpp"
 #include "pons/skills/place.hpp"
+#include "pons/skills/press.hpp"
 
 namespace pons::skills {
 
@@ -12,6 +13,7 @@ void add_skills(task::SkillRegistry& registry, Cell& cell) {
   registry.add(move_to(cell));
   registry.add(pick(cell));
   registry.add(place(cell));
+  registry.add(press(cell));
 }
 
 }  // namespace pons::skills

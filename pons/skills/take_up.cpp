@@ -31,7 +31,7 @@ Json TakeUp::carries() const {
 void TakeUp::restore(const Json& carried) {
   if (!carried.is_object()) return;
   carried_ = carried.value("code", std::string{});
-  if (cell_.arm.all_cups_open()) {
+  if (cell_.arm.cups().open) {
     cell_.arm.payload(0, Vector3::Zero());
     return;
   }

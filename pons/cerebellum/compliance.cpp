@@ -1,0 +1,132 @@
+#include "pons/cerebellum/compliance.hpp"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+
+namespace pons::cerebellum {
+namespace {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr double kSingular = 1e-4;        // squared damping of an inverse near singular poses
+constexpr double kFastest_1_s = 200;      // a damper faster than that, over the tip's inertia, the loop cannot hold
+constexpr double kPosture_1_s = 15;       // of the null space, critically damped
+constexpr double kCloses_1_s = 30;        // the gap between what the tip should have given way and what it has
+constexpr double kAxisSpeedShare = 0.25;  // of each axis's speed limit, for giving way
+
+Vector6 vector6(const std::array<double, 6>& values) { return Eigen::Map<const Vector6>(values.data()); }
+
+// Rows to the axes of `world_from_tip`.
+model::Jacobian in_tip_axes(const model::Jacobian& jacobian, const Eigen::Matrix3d& world_from_tip) {
+  model::Jacobian turned = jacobian;
+  for (Eigen::Index axis = 0; axis < jacobian.cols(); ++axis) {
+    turned.col(axis).head<3>() = world_from_tip.transpose() * jacobian.col(axis).head<3>();
+    turned.col(axis).tail<3>() = world_from_tip.transpose() * jacobian.col(axis).tail<3>();
+  }
+  return turned;
+}
+
+// Turn that takes `from` to `to`, as axis times angle, in world axes.
+Vector3 turn_between(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to) {
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(to * from.transpose()));
+  return turn.angle() * turn.axis();
+}
+
+void bound(Vector6& wrench, double force_n, double lever_m) {
+  const double most = std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / lever_m);
+  if (most > force_n) wrench *= force_n / most;
+}
+
+}  // namespace
+
+std::string_view fault(const link::Compliance& compliance, const ComplianceLimits& limits) PONS_NONBLOCKING {
+  if (!(compliance.force_max_n > 0) || !(compliance.force_max_n <= limits.force_n)) return "no such force limit";
+  for (std::size_t i = 0; i < 6; ++i) {
+    const bool straight = i < 3;
+    const double stiffness = straight ? limits.stiffness_n_m : limits.stiffness_nm_rad;
+    const double damping = straight ? limits.damping_ns_m : limits.damping_nms_rad;
+    const double wrench = straight ? limits.force_n : limits.force_n * limits.lever_m;
+    if (!(compliance.stiffness[i] >= 0) || !(compliance.stiffness[i] <= stiffness)) return "no such stiffness";
+    if (!(compliance.damping[i] > 0) || !(compliance.damping[i] <= damping)) return "no such damping";
+    if (!(std::abs(compliance.wrench[i]) <= wrench)) return "no such wrench";
+  }
+  return {};
+}
+
+void impedance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
+               const AxisState& commanded, const AxisVector& position, const AxisVector& speed,
+               const model::Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING {
+  const Pose wanted = model.world_from_tip(commanded.position);
+  const model::Jacobian wanted_jacobian = in_tip_axes(model.tip_jacobian(commanded.position), wanted.linear());
+  const Pose tip = model.world_from_tip(position);
+  const model::Jacobian jacobian = in_tip_axes(model.tip_jacobian(position), wanted.linear());
+  model::AxisMatrix mass;
+  model.mass_matrix(position, payload, mass);
+  const Eigen::LLT<model::AxisMatrix> factor(mass);
+  const model::AxisMatrix inverse_mass = factor.solve(model::AxisMatrix::Identity(position.size(), position.size()));
+  const Matrix6 mobility = jacobian * inverse_mass * jacobian.transpose();
+  const Matrix6 tip_inertia = Matrix6(mobility + kSingular * Matrix6::Identity()).llt().solve(Matrix6::Identity());
+
+  Vector6 way;
+  way.head<3>() = wanted.linear().transpose() * (wanted.translation() - tip.translation());
+  way.tail<3>() = wanted.linear().transpose() * turn_between(tip.linear(), wanted.linear());
+  const Vector6 rate = wanted_jacobian * commanded.speed - jacobian * speed;
+  const Vector6 damping = vector6(compliance.damping).cwiseMin(kFastest_1_s * tip_inertia.diagonal());
+  Vector6 wrench =
+      vector6(compliance.stiffness).cwiseProduct(way) + damping.cwiseProduct(rate) + vector6(compliance.wrench);
+  bound(wrench, compliance.force_max_n, limits.lever_m);
+
+  model.inverse_dynamics(position, speed, commanded.acceleration, payload, torque_nm);
+  torque_nm += jacobian.transpose() * wrench;
+  if (position.size() <= 6) return;
+  const AxisVector posture = mass * (kPosture_1_s * kPosture_1_s * (commanded.position - position) +
+                                     2 * kPosture_1_s * (commanded.speed - speed));
+  const Vector6 at_tip = tip_inertia * (jacobian * (inverse_mass * posture));
+  torque_nm += posture - jacobian.transpose() * at_tip;
+}
+
+void admittance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
+                const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
+                AxisState& reference) PONS_NONBLOCKING {
+  Vector6 mass;
+  mass << Vector3::Constant(kAdmittanceMass_kg), Vector3::Constant(kAdmittanceInertia_kg_m2);
+  const Vector6 stiffness = vector6(compliance.stiffness);
+  Vector6 push = felt + vector6(compliance.wrench) - stiffness.cwiseProduct(state.way);
+  bound(push, compliance.force_max_n, limits.lever_m);
+  const Vector6 before = state.speed;
+  // Backward Euler in damper and spring.
+  const Vector6 resists = mass + dt_s * vector6(compliance.damping) + dt_s * dt_s * stiffness;
+  state.speed = (mass.cwiseProduct(before) + dt_s * push).cwiseQuotient(resists);
+  const double haste = std::max(state.speed.head<3>().norm() / kAdmittanceSpeed_m_s,
+                                state.speed.tail<3>().norm() / kAdmittanceSpeed_rad_s);
+  if (haste > 1) state.speed /= haste;
+
+  const Pose tip = model.world_from_tip(commanded.position);
+  const AxisVector at = commanded.position + state.axis_way;
+  const model::Jacobian jacobian = in_tip_axes(model.tip_jacobian(at), tip.linear());
+  const Matrix6 square = jacobian * jacobian.transpose() + kSingular * Matrix6::Identity();
+  const auto solver = square.llt();
+  // The axes' way must not drift from the tip's by rounding, or by the damping of the inverse.
+  const Pose there = model.world_from_tip(at);
+  Vector6 gone;
+  gone.head<3>() = tip.linear().transpose() * (there.translation() - tip.translation());
+  gone.tail<3>() = tip.linear().transpose() * turn_between(tip.linear(), there.linear());
+  AxisVector axis_speed = jacobian.transpose() * solver.solve(Vector6(state.speed + kCloses_1_s * (state.way - gone)));
+  const AxisLimits& axes = model.robot().limits;
+  const double share = axis_speed.cwiseAbs().cwiseQuotient(kAxisSpeedShare * axes.speed_rad_s).maxCoeff();
+  if (share > 1) {
+    axis_speed /= share;
+    state.speed /= share;
+  }
+  const AxisVector next = (at + dt_s * axis_speed).cwiseMax(axes.position_min).cwiseMin(axes.position_max);
+  state.axis_way = next - commanded.position;
+  state.way += dt_s * state.speed;
+  reference.position = next;
+  reference.speed = commanded.speed + axis_speed;
+  reference.acceleration =
+      commanded.acceleration + jacobian.transpose() * solver.solve(Vector6((state.speed - before) / dt_s));
+}
+
+}  // namespace pons::cerebellum

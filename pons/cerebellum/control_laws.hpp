@@ -1,0 +1,54 @@
+// By which law the arm follows its commanded motion, and the change from one to another without a jump in torque.
+#pragma once
+
+#include "pons/cerebellum/compliance.hpp"
+#include "pons/cerebellum/tracker.hpp"
+#include "pons/core/axes.hpp"
+#include "pons/core/realtime.hpp"
+#include "pons/link/message.hpp"
+
+namespace pons::cerebellum {
+
+struct ControlSettings {
+  ComplianceLimits compliance;
+  double fade_s = 0.08;  // in which what the torques would have jumped by fades away
+  double bias_s = 0.5;   // time constant of the wrist sensor's bias
+};
+
+class ControlLaws {
+ public:
+  ControlLaws(Tracker& tracker, const ControlSettings& settings);
+
+  // From the next torques() on. Changing the law keeps torques continuous. Parameters must have no fault().
+  void select(link::Controller controller, const link::Compliance& compliance) PONS_NONBLOCKING;
+  // Tracking, with nothing remembered.
+  void reset() PONS_NONBLOCKING;
+  [[nodiscard]] link::Controller controller() const { return controller_; }
+  // Where the arm is held while it is commanded to be at `commanded`: where tracking goes on from when the law changes.
+  [[nodiscard]] AxisVector held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING;
+  // How far measured positions may be from commanded ones before something is wrong, over what tracking allows.
+  [[nodiscard]] const AxisVector& gives_way() const { return admittance_.axis_way; }
+
+  // What the arm does at this tick.
+  struct Now {
+    const AxisState& commanded;
+    const AxisVector &position, &speed;  // as measured, for the same moment
+    const Vector6& felt;                 // WristSense::at_tip()
+    double dt_s;
+    bool presses;  // false: the wrench that was asked for is not exerted, and felt ones move nothing: it is stopping
+  };
+  // Not clamped. `last_nm` are the torques of the tick before.
+  void torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING;
+
+ private:
+  Tracker& tracker_;
+  ControlSettings settings_;
+  link::Controller controller_ = link::Controller::kTracking;
+  link::Compliance compliance_;
+  Admittance admittance_;
+  AxisState reference_;
+  bool changed_ = false;
+  AxisVector fading_nm_;  // what keeps the torques continuous after a change
+};
+
+}  // namespace pons::cerebellum
