@@ -21,6 +21,7 @@ class TakeUpTest : public testing::Test {
     state.position = state.commanded.position = position;
     state.cup_vacuum_kpa.fill(kpa);
     state.vacuum_on = on;
+    state.vacuum.open = kpa == 0;
     state.safety = link::SafetyState::kProtectiveStop;
     link::CerebellumEnd(*link_).publish(state);
     now_ += from_s(0.01);

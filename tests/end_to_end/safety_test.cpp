@@ -26,7 +26,7 @@ TEST(Safety, ARunWithVisitsSlowsAndStopsAndLosesNothing) {
   const Folder folder;
   const Finished run = run_pons({"run", "parcel_cell", "--parcels", "12", "--seed", "1", "--quiet", "--report",
                                  folder / "report.json", "--journal", folder / "j.db", "--log", folder / "log.txt",
-                                 "--visit", "aisle@8+5", "--visit", "aisle@20.3+1", "--visit", "gate@24+1.5"});
+                                 "--visit", "aisle@8+5", "--visit", "aisle@20.3+1", "--visit", "gate@22.2+1.5"});
   EXPECT_EQ(run.code, 0) << run.out << run.err;
   const auto report = read_json(folder / "report.json");
   expect_accounted_for(report);
