@@ -51,7 +51,7 @@ struct Settings {
   Duration following_time = std::chrono::milliseconds(20);      // for so long
   double standstill_rad_s = 0.02;                               // every axis below it,
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
-  Duration confirm_within = std::chrono::milliseconds(500);     // after the commanded stop ended
+  Duration confirm_within = std::chrono::milliseconds(1000);    // after the commanded stop ended
   Duration stall_timeout = std::chrono::milliseconds(20);       // between two steps, while powered
   RateBounds rate;                                              // of a motion that is slowed for a zone
   Duration slow_within = std::chrono::milliseconds(500);        // from somebody's coming to the speed that is allowed

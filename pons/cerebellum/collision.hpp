@@ -15,8 +15,8 @@ struct CollisionSettings {
   double bandwidth_rad_s = 200;  // of the observer
   double torque_share = 0.03;    // of each drive's torque limit: friction, and what else no model has
   double motion_share = 0.15;    // of what accelerates the axis: inertias that are not quite right
-  double force_n = 25;           // at the tip: hoses, brushing past something light
-  double load_share = 1.5;       // of the payload's weight, at the tip: a load that swings, or was lost
+  double force_n = 30;           // at the tip: hoses, brushing past something light
+  double load_share = 4.0;       // of the payload's weight, at the tip: a load that swings, or was lost
   double lever_m = 0.15;         // a force about the tip acts so far from it
   int measurements = 2;          // in a row beyond the bound
   double contact_max_n = 400;    // no skill may expect more

@@ -11,7 +11,7 @@ namespace pons::skills {
 namespace {
 
 constexpr double kHover_m = 0.035;      // the straight part above the parcel
-constexpr double kComeDown_m_s = 0.40;  // speed there
+constexpr double kComeDown_m_s = 0.25;  // speed there
 constexpr double kPress_m = 0.006;      // bellows pressed together at the contact
 constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
