@@ -57,14 +57,16 @@ TEST_P(Collision, ABoxAtTheToolTouchesAndOneBesideItDoesNot) {
   model.surround(std::array{box(tip, {0.1, 0.1, 0.1})});
   EXPECT_FALSE(model.clear(robot_.home));
   EXPECT_THAT(model.touching(robot_.home), HasSubstr("and box 1"));
-  // Below the tool, whose lowest capsule ends 3 mm beyond the tip.
-  const auto below = [&](double gap_m) { return box(tip - Vector3(0, 0, 0.003 + gap_m + 0.05), {0.1, 0.1, 0.1}); };
-  const Pose home = model_.world_from_tip(robot_.home);
-  if (home.linear().col(2).z() > -0.999) GTEST_SKIP() << "the tool does not point straight down there";
-  model.surround(std::array{below(0.02)});
+  // Ahead of the tool, whose farthest capsule ends 3 mm beyond the tip.
+  const auto ahead_of_tool = [&](double gap_m) {
+    Box ahead{.world_from_box = model_.world_from_tip(robot_.home), .size_m = {0.1, 0.1, 0.1}};
+    ahead.world_from_box.translate(Vector3(0, 0, 0.003 + gap_m + 0.05));
+    return ahead;
+  };
+  model.surround(std::array{ahead_of_tool(0.02)});
   EXPECT_TRUE(model.clear(robot_.home));
   EXPECT_NEAR(model.clearance(robot_.home), 0.01, 1e-4);
-  model.surround(std::array{below(0.005)});
+  model.surround(std::array{ahead_of_tool(0.005)});
   EXPECT_FALSE(model.clear(robot_.home)) << "nearer than the margin";
 }
 

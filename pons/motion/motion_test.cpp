@@ -25,9 +25,6 @@ AxisVector draw(Random& random, Eigen::Index axes, double size) {
   return result;
 }
 
-AxisState at_rest(const AxisVector& position) {
-  return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
-}
 Waypoint rest(const AxisVector& position) { return {position, AxisVector::Zero(position.size())}; }
 
 // No gap in time; position and speed to rounding, acceleration to ten nanoseconds of jerk.

@@ -26,8 +26,6 @@ std::uint64_t seed_of(const AxisVector& from, const AxisVector& to) {
   return digest.value();
 }
 
-AxisState at_rest(const AxisVector& q) { return {q, AxisVector::Zero(q.size()), AxisVector::Zero(q.size())}; }
-
 }  // namespace
 
 Detour::Detour(const world::World& world, const model::RobotModel& model)

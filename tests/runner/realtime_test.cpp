@@ -104,25 +104,5 @@ TEST_F(HeldLoop, ALoopThatIsGoneForGoodEndsTheRunWithAnError) {
   EXPECT_LT(advanced, 300 + 1100);
 }
 
-TEST_F(HeldLoop, AFirstTickLongerThanTheLeashDoesNotStopTheRun) {
-  int advanced = 0;
-  Time released;
-  parts_.body.plant.finished = [] { return true; };
-  parts_.body.plant.advance = [&](Time now) {
-    ++advanced;
-    if (advanced == 1) seize_loop();
-    if (advanced == 100) {
-      released = now;
-      let_go();
-    }
-    cell_->body->simulation->advance_to(now);
-  };
-  const auto result = run_realtime(parts_, {});
-  ASSERT_TRUE(result) << result.error().line();
-  EXPECT_GT(released, Time(from_s(0.05))) << "the leash is far shorter";
-  EXPECT_GT(result->end, released + from_s(1));
-  EXPECT_GT(result->loop.ticks, 1000U);
-}
-
 }  // namespace
 }  // namespace pons::runner
