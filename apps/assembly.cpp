@@ -129,13 +129,15 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
 
-  if (socket) self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal);
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
                                                       meeting.pixels, meeting.pace);
   std::function<void(Time)> visitors;
-  if (self->desk) visitors = [desk = self->desk.get()](Time now) { desk->attend(now); };
+  if (socket) visitors = [half = self.get()](Time now) { half->desk->attend(now); };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
                                                            world.zones, options.recovery, visitors);
+  if (socket) {
+    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming());
+  }
   return self;
 }
 
@@ -167,6 +169,8 @@ runner::SkillPort BridgeHalf::skill_port() {
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
           .halt = [this] { cell->arm.halt(); },
+          .raise_emergency = [this] { end.raise_emergency_stop(); },
+          .release_emergency = [this] { end.clear_emergency_stop(); },
           .carries = [this] { return take_up->carries(); },
           .restore = [this](const task::Json& carried) { take_up->restore(carried); },
           .resume = [this](const task::Task& task, std::size_t done) { return resumption(take_up->fate(task, done)); },

@@ -95,9 +95,9 @@ class BridgeHalf {
   task::SkillRegistry registry;
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
-  std::unique_ptr<Desk> desk;
   std::unique_ptr<runner::Observer> observer;
   std::unique_ptr<runner::BridgeSide> bridge_side;
+  std::unique_ptr<Desk> desk;
 
  private:
   explicit BridgeHalf(link::Link& link) : end(link) {}

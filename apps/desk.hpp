@@ -1,4 +1,4 @@
-// Where visitors are answered: requests from the local socket meet bridge and journal.
+// Where visitors are answered: requests from the local socket meet bridge, journal and arm.
 #pragma once
 
 #include <memory>
@@ -7,22 +7,30 @@
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/gate/request.hpp"
+#include "pons/runner/arming.hpp"
 
 namespace pons::apps {
 
 class Desk {
  public:
-  // Bridge and journal must outlive it.
-  Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal);
+  // All but the socket must outlive it.
+  Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
+       runner::Arming& arming);
   // On the bridge's thread, once a period: answers what has come. Never waits.
   void attend(Time now);
 
  private:
   [[nodiscard]] bridge::Json answer(const std::string& text, Time now);
+  [[nodiscard]] bridge::Json submit(const std::string& task, Time now);
+  [[nodiscard]] bridge::Json list() const;
+  [[nodiscard]] bridge::Json show(const std::string& id) const;
+  [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
 
   std::unique_ptr<gate::LocalSocket> socket_;
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
+  runner::Arming& arming_;
 };
 
 }  // namespace pons::apps

@@ -59,27 +59,25 @@ int skills(const std::string& name, const std::string& world_name) {
   return kExitGood;
 }
 
-constexpr const char* kBash = R"bash(_pons() {
+// What a command takes it says itself, in its help.
+constexpr const char* kBash = R"bash(_pons_words() {
+  pons "$@" --help 2>/dev/null | sed -nE 's/^  (-[a-z],)?(-?-?[a-z][a-z-]*).*/\2/p'
+}
+_pons() {
   local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command=${COMP_WORDS[1]}
+  local -a asked=()
   case $before in
     --world) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
-    --manifest|--journal|--report|--picture|--socket) COMPREPLY=($(compgen -f -- "$current")); return ;;
+    --manifest|--journal|--report|--log|--picture|--socket|submit) COMPREPLY=($(compgen -f -- "$current")); return ;;
+    run|body|bridge) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
+    skills) COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
+    completion) COMPREPLY=($(compgen -W "bash zsh" -- "$current")); return ;;
   esac
-  if [ "$COMP_CWORD" -eq 1 ]; then
-    COMPREPLY=($(compgen -W "run worlds skills task doctor completion --help --version" -- "$current"))
-  elif [ "$command" = run ] && [ "$COMP_CWORD" -eq 2 ]; then
-    COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current"))
-  elif [ "$command" = run ]; then
-    COMPREPLY=($(compgen -W "--parcels --manifest --seed --lockstep --realtime --journal --report --picture --socket --explain --quiet --help" -- "$current"))
-  elif [ "$command" = skills ]; then
-    COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1) --world --help" -- "$current"))
-  elif [ "$command" = task ] && [ "$COMP_CWORD" -eq 2 ]; then
-    COMPREPLY=($(compgen -W "submit list show --help" -- "$current"))
-  elif [ "$command" = task ]; then
-    COMPREPLY=($(compgen -f -W "--socket --journal --help" -- "$current"))
-  elif [ "$command" = completion ]; then
-    COMPREPLY=($(compgen -W "bash zsh" -- "$current"))
-  fi
+  case $command in
+    task|robot) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
+    *) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 2 ? 0 : 1))}") ;;
+  esac
+  COMPREPLY=($(compgen -W "$(_pons_words "${asked[@]}")" -- "$current"))
 }
 complete -F _pons pons
 )bash";

@@ -45,6 +45,7 @@ int run_command_line(int argc, char** argv) {
   add_worlds(app, chosen);
   add_skills(app, chosen);
   add_task(app, chosen);
+  add_robot(app, chosen);
   add_doctor(app, chosen);
   add_completion(app, chosen);
   try {

@@ -61,6 +61,7 @@ class Bench {
     std::vector<Time> next;
     for (const auto& camera : world_.cameras) next.emplace_back(from_s(camera.phase_s));
     RgbdFrame frame;
+    simulation_.run_belt();
     for (Time now; !simulation_.finished(); now += from_s(0.01)) {
       simulation_.advance_to(now);
       simulation_.body().read(sensors);

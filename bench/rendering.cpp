@@ -38,6 +38,7 @@ int main() {
   }
   const auto manifest = must(world::draw_manifest(world, 20, 1));
   const auto simulation = must(sim::Simulation::create(world, manifest, 1));
+  simulation->run_belt();
   simulation->advance_to(Time(from_s(4)));
   RgbdFrame frame;
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {

@@ -33,12 +33,13 @@ struct SetPoints {
   AxisVector torque_nm;         // one an axis
   std::uint32_t vacuum_on = 0;  // bit i = cup i
   bool power = false;           // false: drives off, brakes on, whatever the torque says
+  bool belt_runs = false;       // false: the belt is brought to rest, for nobody is there to take from it
 };
 
 // A robot. One thread calls read and write, in turn, once a tick.
 //
 // Its watchdog. A body with power that hears no write() for watchdog() of its own time takes the power off by itself:
-// drives off, brakes on, cups as they were told last. That is latched: the body says so in Sensors, and takes
+// drives off, brakes on, belt to rest, cups as they were told last. That is latched: the body says so in Sensors, and takes
 // set-points with power for ones without until it has heard some without; the next ones with power ask for it anew.
 // Without power silence means nothing. conformance.hpp checks a body against all this.
 class Body {

@@ -7,6 +7,7 @@ namespace pons::body {
 namespace {
 
 constexpr double kStill_rad_s = 0.02;  // slower counts as standing
+constexpr double kStill_m_s = 0.002;   // likewise, of the belt
 constexpr double kMoved_rad = 1e-4;    // a standing arm gives less
 constexpr Duration kComesToRest = std::chrono::milliseconds(500);
 constexpr int kLatePeriods = 4;  // by so many it may notice a silence late
@@ -44,8 +45,8 @@ class Kit {
       wait(subject_.period);
     }
   }
-  [[nodiscard]] SetPoints off() const { return {AxisVector::Zero(subject_.push_nm.size()), kCups, false}; }
-  [[nodiscard]] SetPoints pushed() const { return {subject_.push_nm, kCups, true}; }
+  [[nodiscard]] SetPoints off() const { return {AxisVector::Zero(subject_.push_nm.size()), kCups, false, false}; }
+  [[nodiscard]] SetPoints pushed() const { return {subject_.push_nm, kCups, true, true}; }
   [[nodiscard]] bool stands() const { return sensors_.speed.cwiseAbs().maxCoeff() < kStill_rad_s; }
   [[nodiscard]] Duration late() const { return kLatePeriods * subject_.period; }
 
@@ -103,6 +104,7 @@ class Kit {
     wait(kComesToRest);
     expect((sensors_.position - stood).cwiseAbs().maxCoeff() < kMoved_rad, "its brakes do not hold it after that");
     expect(subject_.cups_on() == kCups, "the cups let go when its watchdog trips");
+    expect(std::abs(sensors_.belt_speed_m_s) < kStill_m_s, "the belt runs on after its watchdog has tripped");
   }
 
   void stays_off_until_asked_anew() {

@@ -1,5 +1,9 @@
 #include "pons/gate/request.hpp"
 
+#include <functional>
+#include <map>
+#include <string>
+
 #include "pons/task/json_text.hpp"
 #include "pons/task/schema.hpp"
 
@@ -12,11 +16,18 @@ using task::Schema;
 constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
-    "op": {"enum": ["submit", "list", "show"]},
+    "op": {"enum": ["submit", "list", "show", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
     "id": {"type": "string", "minLength": 1, "maxLength": 64}
   }
 })";
+
+// Those with nothing beside their name.
+const std::map<std::string, Operation, std::less<>> kBare = {
+    {"list", Operation::kList},   {"robot", Operation::kRobot},
+    {"stop", Operation::kStop},   {"emergency_stop", Operation::kEmergencyStop},
+    {"reset", Operation::kReset}, {"arm", Operation::kArm},
+};
 
 const Schema& schema() {
   static const Schema compiled = Schema::compile(Json::parse(kSchema)).value();
@@ -39,7 +50,7 @@ Expected<Asked> asked_from(std::string_view text) {
   }
   if (submit) return Asked{Operation::kSubmit, json->at("task").dump()};
   if (show) return Asked{Operation::kShow, json->at("id").get<std::string>()};
-  return Asked{Operation::kList, {}};
+  return Asked{kBare.at(operation), {}};
 }
 
 Json refusal(const Error& error) { return {{"ok", false}, {"error", error.line()}}; }

@@ -2,7 +2,9 @@
 //   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already"}
 //   {"op":"list"}                → {"ok":true,"tasks":[…]}
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
-//   anything wrong               → {"ok":false,"error":"…"}
+//   {"op":"robot"}               → {"ok":true,"robot":{"state":…,"cause":…,"standstill":…,"epoch":…,"needs":…}}
+//   {"op":"stop"}, {"op":"emergency_stop"}, {"op":"reset"}, {"op":"arm"}: a person's words to the arm; answered like
+//   robot anything wrong               → {"ok":false,"error":"…"}
 #pragma once
 
 #include <cstdint>
@@ -14,7 +16,7 @@
 
 namespace pons::gate {
 
-enum class Operation : std::uint8_t { kSubmit, kList, kShow };
+enum class Operation : std::uint8_t { kSubmit, kList, kShow, kRobot, kStop, kEmergencyStop, kReset, kArm };
 
 struct Asked {
   Operation operation = Operation::kList;

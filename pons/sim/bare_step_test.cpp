@@ -53,6 +53,7 @@ TEST_F(BareStepTest, CopyBringsItBackToItsOriginal) {
   bare.write(torque(5));
   bare.advance_to(Time(from_s(0.02)));
   EXPECT_NE(bare.state_digest(), simulation->state_digest());
+  simulation->run_belt();
   simulation->advance_to(Time(from_s(3)));
   ASSERT_GT(simulation->offered(), 0) << "the feeder rewrote a spare parcel's size and mass";
   bare.copy();

@@ -32,6 +32,7 @@ world::Manifest one_box() {
 std::unique_ptr<Simulation> create(const world::World& world) {
   auto simulation = Simulation::create(world, one_box(), 5);
   if (!simulation) throw std::runtime_error(simulation.error().line());
+  (*simulation)->run_belt();
   return std::move(*simulation);
 }
 
@@ -130,6 +131,7 @@ Reading read_labels(const world::World& world, std::uint64_t seed) {
   if (!manifest) throw std::runtime_error(manifest.error().line());
   auto simulation = Simulation::create(world, *manifest, seed);
   if (!simulation) throw std::runtime_error(simulation.error().line());
+  (*simulation)->run_belt();
   const Truth truth(**simulation);
   const auto hints = ZXing::DecodeHints().setFormats(ZXing::BarcodeFormat::QRCode);
   Reading reading;

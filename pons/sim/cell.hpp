@@ -64,6 +64,7 @@ struct Cell {
  private:
   std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom
 
+  void drive_belt();
   void watch_loop();
   void drive();
   void brake();

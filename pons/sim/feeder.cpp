@@ -35,7 +35,7 @@ double hidden_end_m(const world::World& world) {
 
 }  // namespace
 
-BeltDrive::BeltDrive(const world::Belt& belt, std::uint64_t seed) : belt_(belt), speed_m_s_(belt.speed_m_s) {
+BeltDrive::BeltDrive(const world::Belt& belt, std::uint64_t seed) : belt_(belt) {
   Random random = Random(seed).fork(kBeltStream);
   for (double& phase : phase_) phase = random.uniform(0, kTau);
 }
@@ -45,7 +45,9 @@ void BeltDrive::step(mjModel* model, int geom, Time now, double step_s) {
   const double turn = kTau * now.s() / std::max(belt_.speed_period_s, 1e-3);
   const double wander = 0.55 * std::sin(turn + phase_[0]) + 0.30 * std::sin(1.618 * turn + phase_[1]) +
                         0.15 * std::sin(0.377 * turn + phase_[2]);
-  speed_m_s_ = belt_.speed_m_s * (1 + belt_.speed_variation * wander);
+  const double change = belt_.ramp_m_s2 / belt_.speed_m_s * step_s;
+  share_ += std::clamp(wanted_ - share_, -change, change);
+  speed_m_s_ = share_ * belt_.speed_m_s * (1 + belt_.speed_variation * wander);
   travel_m_ += speed_m_s_ * step_s;
   model->geom_surfacevel[6 * geom] = speed_m_s_;
 }

@@ -15,18 +15,24 @@
 
 namespace pons::sim {
 
-// A belt whose speed wanders smoothly within ± speed_variation of the nominal one.
+// A belt whose speed wanders smoothly within ± speed_variation of the nominal one while it is let run, and which starts
+// and stops along a ramp.
 class BeltDrive {
  public:
   BeltDrive(const world::Belt& belt, std::uint64_t seed);
+  void let_run() { wanted_ = 1; }
+  void stop() { wanted_ = 0; }
   // Sets the surface's speed for the coming step and counts the travel.
   void step(mjModel* model, int geom, Time now, double step_s);
+  // From rest, with the coming step.
+  [[nodiscard]] bool starts() const { return wanted_ > 0 && share_ == 0; }
   [[nodiscard]] double speed_m_s() const { return speed_m_s_; }
   [[nodiscard]] double travel_m() const { return travel_m_; }
 
  private:
   world::Belt belt_;
   std::array<double, 3> phase_{};
+  double wanted_ = 0, share_ = 0;  // of the speed that it would have if it always ran
   double speed_m_s_ = 0, travel_m_ = 0;
 };
 

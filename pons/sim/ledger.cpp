@@ -56,6 +56,7 @@ struct Ledger::Impl {
   std::array<Track, kSlots> tracks;
   std::vector<int> leaving;
   int in_transit = 0;
+  bool belt_stands = false;
   AxisVector last_speed;
   std::array<AxisVector, kWindow> window;
   std::size_t window_at = 0;
@@ -214,6 +215,7 @@ void Ledger::Impl::locate(Track& track, ParcelTruth& parcel, const Vector3& at, 
   const world::Belt& belt = world.belt;
   const bool over_belt = at.x() > belt.x_start_m && at.x() < belt.x_end_m &&
                          std::abs(at.y() - belt.y_center_m) < 0.5 * belt.width_m && at.z() > belt.surface_z_m;
+  if (over_belt && belt_stands) track.moved = now;  // where it belongs, on a belt that does not move
   const bool stray = now - track.moved >= kStrayCleared || at.z() < 0.0;
   if (over_belt && !track.sinking && !stray) return set(Whereabouts::kBelt, name(Whereabouts::kBelt));
   if (stray) return set(Whereabouts::kFloor, name(Whereabouts::kFloor));
@@ -270,6 +272,7 @@ void Ledger::Impl::work(const Composed& cell, const mjData* data, const AxisVect
 void Ledger::update(const Composed& cell, const mjData* data, const Gripper& gripper, std::uint32_t vacuum_on,
                     const AxisVector& torque_nm, Time now) {
   impl_->work(cell, data, torque_nm);
+  impl_->belt_stands = cell.model->geom_surfacevel[6 * cell.belt_geom] == 0;
   impl_->leaving.clear();
   impl_->in_transit = 0;
   std::array<Touch, kSlots> touches{};

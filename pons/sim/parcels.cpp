@@ -140,6 +140,11 @@ void activate(mjModel* model, mjData* data, const Slot& slot, const world::Manif
   set_state(data, slot, world_from_middle, std::max(speed_m_s, kWake_m_s));
 }
 
+void wake(mjData* data, const Slot& slot) {
+  double& speed = data->qvel[slot.dof];
+  if (speed == 0) speed = kWake_m_s;
+}
+
 void park(mjModel* model, mjData* data, const Slot& slot, int index) {
   for (const int geom : {slot.main, slot.rim, slot.label}) {
     model->geom_contype[geom] = model->geom_conaffinity[geom] = 0;

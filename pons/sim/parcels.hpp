@@ -15,6 +15,9 @@ namespace pons::sim {
 // `world_from_middle` with the belt's speed along x.
 void activate(mjModel* model, mjData* data, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
               double label_m, const Pose& world_from_middle, double speed_m_s);
+// So that it feels what moves below it: the surface of a belt wakes nothing that sleeps on it.
+void wake(mjData* data, const Slot& slot);
+
 // Far away, weightless, touching nothing; `index` is the slot's number.
 void park(mjModel* model, mjData* data, const Slot& slot, int index);
 

@@ -71,7 +71,7 @@ void Puppet::step(const AxisVector& position, const AxisVector& speed) {
     cell_.set_points.torque_nm[i] = torque[static_cast<std::size_t>(dof)] + cell_.data->qfrc_bias[dof];
   }
   cell_.set_points.vacuum_on = vacuum_;
-  cell_.set_points.power = true;
+  cell_.set_points.power = cell_.set_points.belt_runs = true;
   cell_.heard = cell_.stepped;
   cell_.step();
 }

@@ -45,9 +45,9 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
 void Cell::step() {
   mjModel* model = composed.model.get();
   feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
-  belt.step(model, composed.belt_geom, stepped, world.physics_step_s);
-  gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
   watch_loop();
+  drive_belt();
+  gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
   drive();
   mj_step(model, data.get());
   stepped += step_length;
@@ -56,10 +56,20 @@ void Cell::step() {
   ledger.update(composed, data.get(), gripper, set_points.vacuum_on, set_points.torque_nm, stepped);
 }
 
+void Cell::drive_belt() {
+  set_points.belt_runs ? belt.let_run() : belt.stop();
+  if (belt.starts()) {
+    for (int i = 0; i < kSlots; ++i) {
+      if (ledger.on_belt(i)) wake(data.get(), composed.slots[static_cast<std::size_t>(i)]);
+    }
+  }
+  belt.step(composed.model.get(), composed.belt_geom, stepped, world.physics_step_s);
+}
+
 void Cell::watch_loop() {
   if (!set_points.power || stepped + step_length - heard <= body.watchdog()) return;
   watchdog_tripped = true;
-  set_points.power = false;
+  set_points.power = set_points.belt_runs = false;
 }
 
 void Cell::drive() {
@@ -142,7 +152,7 @@ void SimBody::write(const body::SetPoints& set_points) {
   cell_->set_points = set_points;
   cell_->heard = cell_->now;
   if (!set_points.power) cell_->watchdog_tripped = false;
-  if (cell_->watchdog_tripped) cell_->set_points.power = false;
+  if (cell_->watchdog_tripped) cell_->set_points.power = cell_->set_points.belt_runs = false;
 }
 
 Duration SimBody::watchdog() const { return from_s(cell_->world.robot.watchdog_s); }
@@ -179,6 +189,9 @@ void Simulation::advance_to(Time time) {
 
 body::Body& Simulation::body() { return cell_->body; }
 const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
+void Simulation::run_belt() {
+  cell_->body.write({.torque_nm = AxisVector::Zero(cell_->world.robot.home.size()), .belt_runs = true});
+}
 void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
 
 void Simulation::expect_visits(std::vector<Visit> visits) { cell_->visits = std::move(visits); }

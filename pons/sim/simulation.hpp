@@ -44,6 +44,8 @@ class Simulation {
   // In the order of world.cameras. They live as long as the simulation.
   [[nodiscard]] const std::vector<body::Camera*>& cameras() const;
 
+  // As set-points without power that let the belt run: what rides by an arm that stands.
+  void run_belt();
   // The stop input as a person presses (true) or releases (false) it.
   void press_stop(bool pressed);
   // Who will come, told by the safety scanner's bits in body::Sensors.

@@ -42,6 +42,7 @@ world::Manifest one_box(double mass_kg) {
 std::unique_ptr<Simulation> create(const world::World& world, const world::Manifest& manifest, std::uint64_t seed) {
   auto simulation = Simulation::create(world, manifest, seed);
   if (!simulation) throw std::runtime_error(simulation.error().line());
+  (*simulation)->run_belt();
   return std::move(*simulation);
 }
 
@@ -62,11 +63,41 @@ TEST(Simulation, BeltCarriesAParcelAsFarAsTheEncoderSays) {
   EXPECT_EQ(truth.parcels()[0].where, Whereabouts::kBelt);
 }
 
+// Along its ramp, and what lies on it comes along, stays where it is, and goes on.
+TEST(Simulation, BeltStandsUnlessItIsLetRun) {
+  const world::World world = without_cameras("small_cell");
+  auto simulation = create(world, draw(world, 8, 3), 3);
+  const Truth truth(*simulation);
+  const body::SetPoints stand{.torque_nm = AxisVector::Zero(world.robot.home.size())};
+  body::Sensors sensors;
+  double now_s = 0, lies_m = 0;
+  const auto pass = [&](double seconds) {
+    simulation->advance_to(Time(from_s(now_s += seconds)));
+    simulation->body().read(sensors);
+    lies_m = truth.top(0)->translation().x();
+  };
+  pass(0.1);
+  ASSERT_TRUE(truth.top(0));
+  for (const double runs_s : {0.3, 2.0}) {
+    simulation->body().write(stand);
+    pass(world.belt.speed_m_s / world.belt.ramp_m_s2 + 0.3);
+    EXPECT_EQ(sensors.belt_speed_m_s, 0);
+    const double stood_m = lies_m, travel_m = sensors.belt_travel_m;
+    pass(10);
+    EXPECT_NEAR(lies_m, stood_m, 5e-4);
+    EXPECT_EQ(sensors.belt_travel_m, travel_m);
+    simulation->run_belt();
+    pass(runs_s);
+    EXPECT_NEAR(lies_m - stood_m, sensors.belt_travel_m - travel_m, 0.002);
+    EXPECT_GT(sensors.belt_speed_m_s, 0.7 * world.belt.speed_m_s);
+  }
+}
+
 TEST(Simulation, SpeedWandersWithinItsBounds) {
   const world::World world = without_cameras("parcel_cell");
   auto simulation = create(world, one_box(1.0), 3);
   double slowest = 1, fastest = 0;
-  for (int i = 1; i <= 300; ++i) {
+  for (int i = 10; i <= 300; ++i) {  // it has started by then
     simulation->advance_to(Time(from_s(0.1 * i)));
     body::Sensors sensors;
     simulation->body().read(sensors);

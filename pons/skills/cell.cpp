@@ -90,10 +90,20 @@ const ObjectBelief* Cell::find(std::string_view code) const {
   return found == objects_.end() ? nullptr : &*found;
 }
 
+// By how much farther the belt gets within that time than at its present speed. It starts and stops along a ramp, which
+// ends at the speed that it may have at most, or at none.
+double Cell::gain_m(double ahead_s) const {
+  const double a = belt_acceleration_m_s2_, speed = belt_speed_m_s();
+  if (a == 0) return 0;
+  const double end = a > 0 ? world.belt.speed_m_s * (1 + world.belt.speed_variation) : 0.0;
+  const double changes_s = std::clamp((end - speed) / a, 0.0, ahead_s);
+  return a * changes_s * (ahead_s - 0.5 * changes_s);
+}
+
 Vector3 Cell::predict(const ObjectBelief& object, Time time) const {
   const double ahead_s = to_s(time - object.stamp);
   Vector3 position = object.world_from_top.translation() + ahead_s * object.velocity_m_s;
-  if (object.velocity_m_s.x() != 0) position.x() += 0.5 * belt_acceleration_m_s2_ * ahead_s * ahead_s;
+  if (object.velocity_m_s.x() != 0) position.x() += gain_m(ahead_s);
   return position;
 }
 

@@ -90,6 +90,8 @@ class Cell {
 
   double view_end_m_;
   Time now_, looked_at_;
+  [[nodiscard]] double gain_m(double ahead_s) const;
+
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;

@@ -20,6 +20,7 @@ namespace {
 constexpr double kReach = 100;        // m
 constexpr double kMaxSeconds = 3600;  // of a period, a phase, a latency
 constexpr double kMaxMass = 1000;     // kg
+constexpr double kMaxBeltRamp = 50;   // m/s²
 constexpr double kSlowest = 0.05;     // share of the speed limits: slower, nothing gets anywhere
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
@@ -32,8 +33,10 @@ std::string new_name(const YamlValue& value, std::set<std::string>& taken) {
 }
 
 Belt read_belt(const YamlValue& value) {
-  const YamlMap map(value, {"x_start_m", "x_end_m", "y_center_m", "width_m", "surface_z_m", "speed_m_s",
-                            "speed_variation", "speed_period_s", "pick_x_min_m", "pick_x_max_m"});
+  const YamlMap map(value,
+                    {"x_start_m", "x_end_m", "y_center_m", "width_m", "surface_z_m", "speed_m_s", "speed_variation",
+                     "speed_period_s", "pick_x_min_m", "pick_x_max_m"},
+                    {"ramp_m_s2"});
   Belt belt;
   belt.x_start_m = map["x_start_m"].number(-kReach, kReach);
   belt.x_end_m = map["x_end_m"].number(-kReach, kReach);
@@ -44,6 +47,7 @@ Belt read_belt(const YamlValue& value) {
   belt.speed_m_s = map["speed_m_s"].positive(5);
   belt.speed_variation = map["speed_variation"].number(0, 0.9);
   belt.speed_period_s = map["speed_period_s"].positive(kMaxSeconds);
+  if (map.has("ramp_m_s2")) belt.ramp_m_s2 = map["ramp_m_s2"].positive(kMaxBeltRamp);
   belt.pick_x_min_m = map["pick_x_min_m"].number(belt.x_start_m, belt.x_end_m);
   belt.pick_x_max_m = map["pick_x_max_m"].number(belt.x_start_m, belt.x_end_m);
   if (belt.pick_x_max_m <= belt.pick_x_min_m) {
@@ -59,7 +63,8 @@ PlaceKind read_place_kind(const YamlValue& value) {
   if (word == "tray") return PlaceKind::kTray;
   if (word == "region") return PlaceKind::kRegion;
   if (word == "obstacle") return PlaceKind::kObstacle;
-  value.refuse(fmt::format("'{}' is no kind of place", printable(word)), "write chute, exception, tray, region or obstacle");
+  value.refuse(fmt::format("'{}' is no kind of place", printable(word)),
+               "write chute, exception, tray, region or obstacle");
 }
 
 bool mouths_overlap(const Place& a, const Place& b) {

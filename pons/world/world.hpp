@@ -68,6 +68,7 @@ struct Belt {
   double speed_m_s = 0;                       // nominal
   double speed_variation = 0;                 // 0.3: ± 30 %
   double speed_period_s = 0;                  // how quickly it wanders
+  double ramp_m_s2 = 1;                       // how quickly it starts and stops
   double pick_x_min_m = 0, pick_x_max_m = 0;  // where the arm may take hold
 };
 

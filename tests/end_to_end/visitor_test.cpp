@@ -8,6 +8,7 @@
 namespace pons::tests {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class Visitor : public ::testing::Test {
@@ -23,6 +24,11 @@ class Visitor : public ::testing::Test {
   Finished submit(const std::string& task) {
     write_text(folder_ / "task.json", task);
     return run_pons({"task", "submit", folder_ / "task.json", "--socket", folder_ / "s"});
+  }
+  Finished robot(const std::string& word, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> line = {"robot", word, "--socket", folder_ / "s"};
+    line.insert(line.end(), more.begin(), more.end());
+    return run_pons(line);
   }
   Finished show(const std::string& id) { return run_pons({"task", "show", id, "--journal", folder_ / "j.db"}); }
 
@@ -72,6 +78,27 @@ TEST_F(Visitor, HasTheToolGoAlongALine) {
   EXPECT_THAT(told, HasSubstr(R"("path":"line")"));
   EXPECT_THAT(show("far").out, HasSubstr("FAILED"));
   EXPECT_EQ(report_["limits"]["violations"], 0);
+}
+
+// A stop that a person asked for lasts until that person resets and arms; meanwhile nothing rides by, for the belt
+// stands, too.
+TEST_F(Visitor, StopsResetsAndArmsTheArm) {
+  during_a_run([&] {
+    EXPECT_THAT(robot("arm").err, HasSubstr("only a disarmed arm is armed"));
+    EXPECT_THAT(robot("reset").err, HasSubstr("only a stop that needs a person"));
+    EXPECT_THAT(robot("stop").out, AllOf(HasSubstr("protective stop"), HasSubstr("commanded")));
+    EXPECT_THAT(robot("show").out, HasSubstr("a person who resets it"));
+    EXPECT_THAT(robot("arm").err, HasSubstr("pons robot reset"));
+    EXPECT_THAT(robot("reset").out, AllOf(HasSubstr("disarmed"), HasSubstr("a person who arms it")));
+    EXPECT_THAT(robot("arm").out, HasSubstr("operational"));
+
+    EXPECT_THAT(robot("stop", {"--emergency"}).out, AllOf(HasSubstr("emergency stop"), HasSubstr("epoch       2")));
+    EXPECT_THAT(robot("reset").out, HasSubstr("disarmed"));
+    EXPECT_THAT(robot("arm").out, HasSubstr("operational"));
+  });
+  EXPECT_EQ(report_["parcels"]["lost"], 0) << report_.dump(2);
+  EXPECT_EQ(report_["parcels"]["missorted"], 0);
+  EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "nothing has ridden by";
 }
 
 // The brain asks for its parcels under their own names. One that is taken costs it a try, not the parcel.

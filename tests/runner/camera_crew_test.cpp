@@ -54,6 +54,7 @@ struct Scene {
     auto created = sim::Simulation::create(world, *manifest, 1);
     EXPECT_TRUE(created) << created.error().line();
     simulation = std::move(*created);
+    simulation->run_belt();
     perception.emplace(world, model::RobotModel::load(world.robot).value());
     for (body::Camera* const camera : simulation->cameras()) cameras.emplace_back(*camera);
     std::vector<body::Camera*> counted;

@@ -1,0 +1,191 @@
+#include "pons/runner/arming.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "pons/cerebellum/cerebellum.hpp"
+#include "pons/cerebellum/safety_machine.hpp"
+
+namespace pons::runner {
+namespace {
+
+using bridge::Json;
+using link::SafetyState;
+
+// A stop whose cause has passed is left again after this long at standstill.
+constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
+
+constexpr std::string_view kArm = "arm";  // the word after which no person is needed any more
+
+bool is_stopped(const link::State& state) {
+  return state.safety == SafetyState::kProtectiveStop || state.safety == SafetyState::kEmergencyStop;
+}
+
+bool stands(const link::State& state) { return is_stopped(state) && state.stop_result == link::StopResult::kConfirmed; }
+
+cerebellum::Resumes resumes(const link::State& state) {
+  const cerebellum::CauseRow* const row = cerebellum::cause_row(state.cause);
+  return row == nullptr ? cerebellum::Resumes::kPerson : row->resumes;
+}
+
+}  // namespace
+
+Arming::Arming(bridge::Bridge& bridge, const SkillPort& skills, const std::vector<world::Zone>& zones,
+               Recovery recovery)
+    : bridge_(bridge), skills_(skills), zones_(zones), recovery_(recovery) {}
+
+void Arming::take_over(Time now) {
+  took_over_ = true;
+  yielding_ = skills_.state().safety == SafetyState::kOperational;
+  if (yielding_) skills_.halt();
+  look_around(now);
+}
+
+Expected<void> Arming::tick(Time now) {
+  look_around(now);
+  const link::State& state = skills_.state();
+  yielding_ = yielding_ && state.safety == SafetyState::kOperational;
+  needs_person_ = needs_person_ || (is_stopped(state) && resumes(state) == cerebellum::Resumes::kPerson);
+  const bool operational = state.safety == SafetyState::kOperational && !yielding_ && !needs_person_;
+  if (operational && took_over_) {
+    skills_.settle();
+    took_over_ = false;
+  }
+  bridge_.hold(operational ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
+  note_changes(state, now);
+  if (operational) {
+    stopped_since_.reset();
+    return {};
+  }
+  if (!stopped_since_) stopped_since_ = now;
+  return lead_out(state, now);
+}
+
+void Arming::note_changes(const link::State& state, Time now) {
+  const bool operational = state.safety == SafetyState::kOperational && !yielding_;
+  if (was_operational_ && !operational) {
+    ++stops_;
+    bridge_.note("stop", {{"state", link::name(state.safety)}, {"cause", link::name(state.cause)}}, now);
+  } else if (!was_operational_ && operational) {
+    bridge_.note("armed", {{"epoch", state.epoch}}, now);
+  }
+  was_operational_ = operational;
+}
+
+Expected<void> Arming::lead_out(const link::State& state, Time now) {
+  if (needs_person_) {
+    if (state.safety == SafetyState::kOperational) skills_.halt();
+    return {};
+  }
+  const bool recovers = state.safety == SafetyState::kRecovery;
+  if (recovers || (state.safety == SafetyState::kDisarmed && skills_.outside_rad() > cerebellum::kArmTolerance_rad))
+    return bring_in(now);
+  if (state.safety == SafetyState::kDisarmed || (stands(state) && may_resume(state, now))) skills_.arm(now);
+  return {};
+}
+
+Expected<void> Arming::bring_in(Time now) {
+  const double outside_rad = skills_.outside_rad();
+  if (recovery_ == Recovery::kRefused) {
+    return fail(fmt::format("an axis stands {:.3f} rad outside its position limits", outside_rad), "arm",
+                "see that its way in is clear and allow it with --recover, or bring it in by hand");
+  }
+  if (!recovering_) bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
+  recovering_ = true;
+  return skills_.recover(now);
+}
+
+// From a stop at rest.
+bool Arming::may_resume(const link::State& state, Time now) const {
+  if (resumes(state) == cerebellum::Resumes::kZone && !zones_are_empty(now)) return false;
+  return now - *stopped_since_ >= kStandstillBeforeReset;
+}
+
+// Who is where, into the journal.
+void Arming::look_around(Time now) {
+  const std::uint32_t occupied = skills_.state().zones_occupied;
+  for (std::size_t i = 0; i < zones_.size(); ++i) {
+    const bool is = ((occupied >> i) & 1U) != 0, was = ((zones_occupied_ >> i) & 1U) != 0;
+    if (is) occupied_at_[i] = now;
+    if (is != was) bridge_.note("zone", {{"zone", zones_[i].name}, {"occupied", is}}, now);
+  }
+  zones_occupied_ = occupied;
+}
+
+bool Arming::zones_are_empty(Time now) const {
+  for (std::size_t i = 0; i < zones_.size(); ++i) {
+    const world::Zone& zone = zones_[i];
+    if (zone.speed_share > 0 || !occupied_at_[i]) continue;
+    if (!zone.resume_after_s || now - *occupied_at_[i] < from_s(*zone.resume_after_s)) return false;
+  }
+  return true;
+}
+
+void Arming::recall(std::string_view word) { needs_person_ = word != kArm; }
+
+// Durable at once: a bridge that comes after this one must wait for the same person.
+void Arming::note_person(std::string_view word, Time now) {
+  bridge_.note("person", {{"asks", word}}, now);
+  bridge_.keep_notes(now);
+}
+
+void Arming::stop(Time now) {
+  note_person("stop", now);
+  needs_person_ = true;
+  skills_.halt();
+}
+
+void Arming::emergency_stop(Time now) {
+  skills_.raise_emergency();
+  needs_person_ = true;
+  note_person("emergency stop", now);
+}
+
+Expected<void> Arming::reset(Time now) {
+  const link::State& state = skills_.state();
+  const std::string is = fmt::format("the arm's state is: {}", link::name(state.safety));
+  if (!needs_person_) return fail(is, "reset", "only a stop that needs a person is reset by one");
+  if (!is_stopped(state))
+    return fail(is, "reset", "there is nothing to reset; ask again when it has stopped, or arm it");
+  if (!stands(state)) {
+    return fail(fmt::format("standstill is {}", link::name(state.stop_result)), "reset",
+                "ask again when the arm stands; pons robot show says so");
+  }
+  note_person("reset", now);
+  skills_.release_emergency();
+  skills_.arm(now);
+  return {};
+}
+
+Expected<void> Arming::arm(Time now) {
+  const link::State& state = skills_.state();
+  if (state.safety != SafetyState::kDisarmed) {
+    return fail(fmt::format("the arm's state is: {}", link::name(state.safety)), "arm",
+                is_stopped(state) ? "reset it first: pons robot reset" : "only a disarmed arm is armed");
+  }
+  note_person(kArm, now);
+  needs_person_ = false;
+  return {};
+}
+
+Json Arming::describe() const {
+  const link::State& state = skills_.state();
+  const auto needs = [&]() -> std::string_view {
+    if (state.safety == SafetyState::kOperational) return needs_person_ ? "standstill" : "";
+    if (state.safety == SafetyState::kRecovery) return "to come inside its position limits";
+    if (state.safety == SafetyState::kDisarmed)
+      return needs_person_ ? "a person who arms it: pons robot arm" : "arming";
+    if (!stands(state)) return "standstill";
+    if (needs_person_) return "a person who resets it: pons robot reset";
+    return resumes(state) == cerebellum::Resumes::kZone ? "the zone to be empty" : "a moment";
+  };
+  return {{"state", link::name(state.safety)},
+          {"cause", link::name(state.cause)},
+          {"standstill", link::name(state.stop_result)},
+          {"epoch", state.epoch},
+          {"needs", needs()}};
+}
+
+}  // namespace pons::runner

@@ -1,0 +1,35 @@
+// The skills as the runner sees them; it knows none by name.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "pons/bridge/bridge.hpp"
+#include "pons/core/belief.hpp"
+#include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
+#include "pons/link/message.hpp"
+
+namespace pons::runner {
+
+struct SkillPort {
+  // Before any skill is ticked: the beliefs, and after them what is only an obstacle.
+  std::function<void(Time, std::vector<ObjectBelief>)> refresh;
+  std::function<const link::State&()> state;                   // as of the last refresh
+  std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
+  std::function<void(Time)> arm;                               // one step out of a stop, towards operational
+  std::function<double()> outside_rad;                         // how far the arm stands outside its position limits
+  std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
+  std::function<void(Time)> rest;                              // once a period while no skill runs
+  std::function<void()> halt;                                  // a protective stop
+  std::function<void()> raise_emergency, release_emergency;    // the link's emergency word
+  std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is
+  // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
+  // begun; and, once the arm is armed, lets go of what nobody knows.
+  std::function<void(const bridge::Json&)> restore;
+  bridge::Resume resume;
+  std::function<void()> settle;
+};
+
+}  // namespace pons::runner
