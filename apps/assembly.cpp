@@ -168,6 +168,7 @@ runner::SkillPort BridgeHalf::skill_port() {
           .outside_rad = [this] { return cell->arm.outside_rad(); },
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
+          .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
           .halt = [this] { cell->arm.halt(); },
           .raise_emergency = [this] { end.raise_emergency_stop(); },
           .release_emergency = [this] { end.clear_emergency_stop(); },

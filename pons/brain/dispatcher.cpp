@@ -14,6 +14,8 @@ namespace {
 constexpr int kFramesToTrust = 3;
 constexpr int kMostTries = 3;
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
+constexpr double kHeard_s = 0.02;                         // from a decision to the belt's drive
+constexpr double kBeltStands_s = 3600;                    // for so long at most, altogether, while a task waits
 constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
 
 double label_view_end_m(const world::World& world) {
@@ -99,6 +101,7 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
+    decisions.belt_waits = decisions.belt_waits || would_ride_past(belief);
   }
   return decisions;
 }
@@ -187,15 +190,24 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
   return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
 }
 
+// Asked for, and where the belt must stop now to keep it in the zone.
+bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
+  const auto known = known_.find(belief.code);
+  if (known == known_.end() || !known->second.asked) return false;
+  const world::Belt& belt = world_.belt;
+  const double speed_m_s = std::max(belief.velocity_m_s.x(), 0.0);
+  const double stops_m = speed_m_s * (kHeard_s + speed_m_s / (2 * belt.ramp_m_s2));
+  const double x_m = belief.world_from_top.translation().x();
+  return x_m + stops_m > belt.waits_at_m() && x_m < belt.pick_x_max_m;
+}
+
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
   const world::Belt& belt = world_.belt;
-  // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner. The
-  // slack, too, is the same for all: what a belt that slows down may add.
+  // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner.
   const double nominal_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
-  const double slack_s = (belt.pick_x_max_m - belt.x_start_m) / belt.speed_m_s * (1 / (1 - belt.speed_variation) - 1);
   return {{"id", id_of(belief.code, tries)},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
-          {"deadline_s", now.s() + nominal_s + slack_s},
+          {"deadline_s", now.s() + nominal_s + kBeltStands_s},
           {"steps",
            {{{"skill", "pick"}, {"arguments", {{"object", belief.code}}}},
             {{"skill", "place"}, {"arguments", {{"place", order.destination}, {"object", belief.code}}}}}}};

@@ -52,6 +52,7 @@ struct Tally {
 struct Decisions {
   std::vector<Json> tasks;  // to submit, in this order; an id comes once in the dispatcher's life
   std::vector<Ride> rides;
+  bool belt_waits = false;  // what is asked for would ride past the pick zone
 };
 
 // Asks for a parcel by its code; for one whose task failed and that turns up again, by code and try ("P000123.2"). What
@@ -93,6 +94,7 @@ class Dispatcher {
   [[nodiscard]] bool too_large(const Vector3& size_m, const Order& order) const;
   // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
+  [[nodiscard]] bool would_ride_past(const ObjectBelief& belief) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);

@@ -340,7 +340,7 @@ void Cerebellum::judge_stop(Time now) {
 void Cerebellum::control(Time now, body::SetPoints& set_points) {
   set_points.power = powered_;
   set_points.vacuum_on = vacuum_on_;
-  set_points.belt_runs = state_.safety == SafetyState::kOperational;
+  set_points.belt_runs = state_.safety == SafetyState::kOperational && state_.belt == link::Belt::kRuns;
   if (!powered_) {
     set_points.torque_nm = driven_nm_ = AxisVector::Zero(commanded_.position.size());
     return;

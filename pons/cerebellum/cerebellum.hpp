@@ -89,6 +89,7 @@ class Cerebellum {
   //                    CollisionSettings::contact_max_n: protective stop kBadCommand
   //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
   //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm.
+  //   kBelt            operational only, and forgotten when armed
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
   //                    nobody in a zone that stops

@@ -53,6 +53,9 @@ bool Cerebellum::take(const link::Command& command, Time now) {
       return operational && take_contact(command, now);
     case CommandKind::kControl:
       return operational && take_control(command, now);
+    case CommandKind::kBelt:
+      if (operational) state_.belt = command.belt;
+      return operational;
     case CommandKind::kReset:
       return is_standing(now) && reset(now);
     case CommandKind::kArm:
@@ -168,6 +171,7 @@ bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) 
   collision_.reset();
   collision_.expect(0);
   laws_.reset();
+  state_.belt = link::Belt::kRuns;
   gives_way_ = false;
   commanded_ = before_ = at_rest(position);
   queue_.rest(position, stepped_);

@@ -22,7 +22,11 @@ enum class CommandKind : std::uint8_t {
   kRecover,         // likewise, wherever the arm is, for slow motion towards the inside of its limits
   kContact,         // the force that the tip may meet from now on without its being a collision
   kControl,         // by which law the arm follows its commanded motion from now on
+  kBelt,            // whether the belt runs or waits for the arm
 };
+
+// What the belt does while the arm is operational; else it stands.
+enum class Belt : std::uint8_t { kRuns, kWaits };
 
 // How the arm follows its commanded motion. Pushed by the force f, the tip gives way
 //   kTracking    not at all, as far as the drives can: computed torque
@@ -66,6 +70,7 @@ struct Command {
   double contact_n = 0;                           // kContact; 0: none is expected
   Controller controller = Controller::kTracking;  // kControl
   Compliance compliance;                          // kControl, unless tracking
+  Belt belt = Belt::kRuns;                        // kBelt
 };
 
 enum class SafetyState : std::uint8_t {
@@ -128,6 +133,7 @@ struct State {
   std::uint32_t vacuum_on = 0;
   Vacuum vacuum;
   Controller controller = Controller::kTracking;
+  Belt belt = Belt::kRuns;  // as told
   double belt_travel_m = 0, belt_speed_m_s = 0;
   bool photo_eye_blocked = false;
   bool watchdog_tripped = false;     // the body's has taken the power off

@@ -51,7 +51,10 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   std::ranges::copy(predicted(seen_.coming, now, belt_travel_m), std::back_inserter(obstacles));
   skills_.refresh(now, std::move(obstacles));
   if (auto good = arming_.tick(now); !good) return good;
-  if (!stopping_) ask_brain(objects, now);
+  if (stopping_)
+    skills_.belt(link::Belt::kRuns);
+  else
+    ask_brain(objects, now);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
@@ -102,6 +105,7 @@ void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
+  skills_.belt(decisions.belt_waits ? link::Belt::kWaits : link::Belt::kRuns);
   for (const brain::Ride& ride : decisions.rides) {
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now);

@@ -22,6 +22,7 @@ struct SkillPort {
   std::function<double()> outside_rad;                         // how far the arm stands outside its position limits
   std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
   std::function<void(Time)> rest;                              // once a period while no skill runs
+  std::function<void(link::Belt)> belt;                        // once a period
   std::function<void()> halt;                                  // a protective stop
   std::function<void()> raise_emergency, release_emergency;    // the link's emergency word
   std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is

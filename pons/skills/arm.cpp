@@ -98,6 +98,10 @@ void Arm::expect_contact(double force_n) {
   if (operational()) send({.kind = link::CommandKind::kContact, .contact_n = force_n});
 }
 
+void Arm::belt(link::Belt wanted) {
+  if (operational() && state_.belt != wanted) send({.kind = link::CommandKind::kBelt, .belt = wanted});
+}
+
 void Arm::control(link::Controller controller, const link::Compliance& compliance) {
   send({.kind = link::CommandKind::kControl, .controller = controller, .compliance = compliance});
 }

@@ -55,6 +55,8 @@ class Arm {
   void expect_contact(double force_n);
   // By which law the arm follows from now on; it must rest. Parameters: see cerebellum's fault().
   void control(link::Controller controller, const link::Compliance& compliance = {});
+  // Once a bridge tick while it matters.
+  void belt(link::Belt wanted);
   [[nodiscard]] const link::Vacuum& cups() const { return state_.vacuum; }
 
   // A protective stop, whatever moves it.

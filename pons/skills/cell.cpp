@@ -93,7 +93,8 @@ const ObjectBelief* Cell::find(std::string_view code) const {
 // By how much farther the belt gets within that time than at its present speed. It starts and stops along a ramp, which
 // ends at the speed that it may have at most, or at none.
 double Cell::gain_m(double ahead_s) const {
-  const double a = belt_acceleration_m_s2_, speed = belt_speed_m_s();
+  const bool stops = arm.state().belt == link::Belt::kWaits;
+  const double a = stops ? -world.belt.ramp_m_s2 : belt_acceleration_m_s2_, speed = belt_speed_m_s();
   if (a == 0) return 0;
   const double end = a > 0 ? world.belt.speed_m_s * (1 + world.belt.speed_variation) : 0.0;
   const double changes_s = std::clamp((end - speed) / a, 0.0, ahead_s);

@@ -48,6 +48,7 @@ constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
+constexpr double kStops_m = 0.02;     // before where the belt waits, and so far before that it begins to stop
 constexpr double kAside_m = 0.30;     // over the belt
 constexpr double kWaitOver_m = 0.06;  // the others, which pass below
 constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
@@ -148,8 +149,7 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
     if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
-    Progress late{Status::kException, "would ride past the pick zone", {}};
-    if (soonest && soonest->hover.x() > belt.pick_x_max_m) return late;
+    if (soonest && comes_too_late(soonest->hover.x())) return {};
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
     if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
@@ -162,8 +162,13 @@ class Pick final : public task::Skill {
       return now - *blocked_since_ < kBlockedFor ? Progress{} : Progress{Status::kFailed, grasp.error().line(), {}};
     }
     if (grasp->contact_point.x() < belt.pick_x_min_m) return wait_for(*object, *grasp, now);
-    if (grasp->contact_point.x() > belt.pick_x_max_m) return late;
+    if (comes_too_late(grasp->contact_point.x())) return {};
     return start(*grasp, *object, now);
+  }
+
+  // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
+  [[nodiscard]] bool comes_too_late(double x_m) const {
+    return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > 0;
   }
 
   // What would come along with it.

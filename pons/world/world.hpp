@@ -70,6 +70,9 @@ struct Belt {
   double speed_period_s = 0;                  // how quickly it wanders
   double ramp_m_s2 = 1;                       // how quickly it starts and stops
   double pick_x_min_m = 0, pick_x_max_m = 0;  // where the arm may take hold
+
+  // Where it brings to rest what is asked for and was not taken by then.
+  [[nodiscard]] double waits_at_m() const { return pick_x_max_m - 0.02; }
 };
 
 struct CameraSpec {
