@@ -119,7 +119,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     seen_ = true;
     const bool free = state_.safety == SafetyState::kOperational && laws_.controller() == Controller::kTracking &&
                       collision_.expected_n() == 0 && vacuum_on_ == 0;
-    wrist_.feel(tracker_.robot_model(), {measured_position_, measured_speed_, commanded_.acceleration},
+    wrist_.feel(collision_.robot_model(), {measured_position_, measured_speed_, commanded_.acceleration},
                 tracker_.payload(), sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep, dt_s_);
     const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
     if (still && !is_still_) still_since_ = now;

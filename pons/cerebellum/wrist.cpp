@@ -8,14 +8,12 @@ namespace pons::cerebellum {
 
 Vector6 carried_wrench(model::RobotModel& model, const AxisState& motion,
                        const model::Payload& payload) PONS_NONBLOCKING {
-  constexpr double kAhead_s = 1e-5;  // for the Jacobian's rate of change
   const world::Tool& tool = model.robot().tool;
   const Pose world_from_flange = model.world_from_tip(motion.position) * tool.flange_from_tip.inverse();
   const Vector3 tip = world_from_flange * tool.flange_from_tip.translation();
   const model::Jacobian here = model.tip_jacobian(motion.position);
-  const model::Jacobian ahead = model.tip_jacobian(motion.position + kAhead_s * motion.speed);
   const Vector6 twist = here * motion.speed;
-  const Vector6 gain = here * motion.acceleration + (ahead - here) * motion.speed / kAhead_s;
+  const Vector6 gain = here * motion.acceleration + model.tip_acceleration(motion.position, motion.speed);
   const Vector3 turning = twist.tail<3>(), turning_up = gain.tail<3>();
   Vector6 wrench = Vector6::Zero();
   const auto add = [&](double mass_kg, const Vector3& com_in_flange_m) {
