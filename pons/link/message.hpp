@@ -116,7 +116,7 @@ struct State {
   StopCause cause = StopCause::kNone;
   StopResult stop_result = StopResult::kNone;
   Time motion_end;                        // when the queued motion ends; in the past when it is done
-  AxisState commanded;                    // what the loop asks of the arm now
+  AxisState commanded;                    // what the loop asks of the arm: for now, or a drive's delay later
   AxisVector position, speed;             // measured
   AxisVector torque_nm;                   // asked of the drives
   AxisVector external_nm;                 // on each axis from outside, as the momentum observer has it

@@ -7,6 +7,7 @@
 
 #include "pons/body/body.hpp"
 #include "pons/core/random.hpp"
+#include "pons/sim/bus.hpp"
 #include "pons/sim/camera.hpp"
 #include "pons/sim/compose.hpp"
 #include "pons/sim/feeder.hpp"
@@ -35,6 +36,8 @@ struct Cell {
 
   // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
   void step();
+  // Set-points reach the drives.
+  void hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING;
 
   world::World world;
   Composed composed;
@@ -49,6 +52,7 @@ struct Cell {
   std::vector<body::Camera*> camera_list;
   SimBody body;
   Random noise;                // of wrist and vacuum
+  Bus bus;                     // set-points on their way
   body::SetPoints set_points;  // in force
   body::Sensors measured;      // at the last step
   Duration step_length;
@@ -56,7 +60,7 @@ struct Cell {
   Time now;      // last time advanced to
   bool stop_pressed = false;
   std::vector<Visit> visits;
-  Time heard;                     // when set-points were last written
+  Time heard;                     // when set-points last reached the drives
   bool watchdog_tripped = false;  // until set-points without power are heard
   AxisVector held;                // where the brakes hold the arm; empty while it moves
   std::string failure;            // what MuJoCo said when it gave up

@@ -31,6 +31,7 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       feeder(world, manifest, arrivals),
       body(this),
       noise(Random(seed).fork(kNoiseStream)),
+      bus(from_s(world.robot.drive_delay_s)),
       step_length(from_s(world.physics_step_s)),
       brake_acceleration_(static_cast<std::size_t>(composed.model->nv)),
       brake_torque_(brake_acceleration_) {
@@ -45,6 +46,7 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
 void Cell::step() {
   mjModel* model = composed.model.get();
   feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
+  for (; const Bus::Told* told = bus.next(stepped + step_length); bus.drop_oldest()) hear(told->set_points, told->acts);
   belt.step(model, composed.belt_geom, stepped, world.physics_step_s);
   gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
   watch_loop();
@@ -54,6 +56,13 @@ void Cell::step() {
   gripper.measure(composed, data.get());
   measure();
   ledger.update(composed, data.get(), gripper, set_points.vacuum_on, set_points.torque_nm, stepped);
+}
+
+void Cell::hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING {
+  set_points = told;
+  heard = at;
+  if (!told.power) watchdog_tripped = false;
+  if (watchdog_tripped) set_points.power = false;
 }
 
 void Cell::watch_loop() {
@@ -139,10 +148,10 @@ void SimBody::read(body::Sensors& sensors) {
 }
 
 void SimBody::write(const body::SetPoints& set_points) {
-  cell_->set_points = set_points;
-  cell_->heard = cell_->now;
-  if (!set_points.power) cell_->watchdog_tripped = false;
-  if (cell_->watchdog_tripped) cell_->set_points.power = false;
+  if (cell_->bus.delay() > Duration{0})
+    cell_->bus.send(set_points, cell_->now);
+  else
+    cell_->hear(set_points, cell_->now);
 }
 
 Duration SimBody::watchdog() const { return from_s(cell_->world.robot.watchdog_s); }

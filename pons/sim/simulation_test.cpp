@@ -277,6 +277,29 @@ TEST(Simulation, DrivesHaveTheRotorsOfTheWorldsFile) {
   }
 }
 
+// Told to fall, an arm held by brakes starts so much later, and so much later holds again.
+TEST(Simulation, SetPointsActAfterTheDriveDelay) {
+  const auto falls_at_ms = [](double delay_s) {
+    world::World world = without_cameras("parcel_cell");
+    world.robot.drive_delay_s = delay_s;
+    auto simulation = create(world, one_box(1.0), 3);
+    body::SetPoints told{.torque_nm = AxisVector::Zero(6)};
+    body::Sensors sensors;
+    for (int ms = 1; ms < 100; ++ms) {
+      simulation->advance_to(Time(std::chrono::milliseconds(ms)));
+      simulation->body().read(sensors);
+      if (sensors.speed.cwiseAbs().maxCoeff() > 1e-3) return ms;
+      told.power = ms >= 20;
+      simulation->body().write(told);
+    }
+    return 0;
+  };
+  const int at_once = falls_at_ms(0);
+  EXPECT_GT(at_once, 20);
+  EXPECT_EQ(falls_at_ms(0.004), at_once + 4);
+  EXPECT_EQ(falls_at_ms(0.010), at_once + 10);
+}
+
 TEST(Simulation, TheSmallWorldRunsToo) {
   const world::World world = without_cameras("small_cell");
   auto simulation = create(world, draw(world, 6, 2), 2);

@@ -274,6 +274,17 @@ TEST_F(BrokenWorld, TheBodysWatchdogIsTheFilesOrElseTheUsualOne) {
   EXPECT_THAT(error(put("10")), HasSubstr("robot.watchdog_s"));
 }
 
+TEST_F(BrokenWorld, ADriveDelayIsShort) {
+  EXPECT_EQ(load_text(text_)->robot.drive_delay_s, 0);
+  const auto put = [&](const char* line) {
+    std::string with = text_;
+    return with.replace(with.find("  payload_kg:"), 0, std::string("  ") + line + "\n");
+  };
+  EXPECT_EQ(load_text(put("drive_delay_s: 0.004"))->robot.drive_delay_s, 0.004);
+  EXPECT_THAT(error(put("drive_delay_s: 0.011")), HasSubstr("robot.drive_delay_s"));
+  EXPECT_THAT(error(put("drive_delay_s: -0.001")), HasSubstr("robot.drive_delay_s"));
+}
+
 TEST_F(BrokenWorld, RefusesImpossibleCameras) {
   EXPECT_THAT(changed("watches: tray", "watches: attic"),
               HasSubstr("cameras[2].watches: there is no place 'attic'; choose from belt, chute_1"));
