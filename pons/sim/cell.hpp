@@ -59,6 +59,7 @@ struct Cell {
   Time stepped;  // end of the last step
   Time now;      // last time advanced to
   bool stop_pressed = false;
+  Vector3 push_n = Vector3::Zero();  // of a person on the tip
   std::vector<Visit> visits;
   Time heard;                     // when set-points last reached the drives
   bool watchdog_tripped = false;  // until set-points without power are heard
@@ -70,6 +71,7 @@ struct Cell {
 
   void watch_loop();
   void drive();
+  void push();
   void brake();
   void measure();
 };

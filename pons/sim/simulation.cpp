@@ -51,6 +51,7 @@ void Cell::step() {
   gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
   watch_loop();
   drive();
+  push();
   mj_step(model, data.get());
   stepped += step_length;
   gripper.measure(composed, data.get());
@@ -82,6 +83,18 @@ void Cell::drive() {
   } else {
     brake();
   }
+}
+
+void Cell::push() {
+  const int body_id = composed.tool_body;
+  const double* turn = data->site_xmat + 9 * composed.wrist_site;
+  const Eigen::Map<const Vector3> flange(data->site_xpos + 3 * composed.wrist_site), com(data->xipos + 3 * body_id);
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_flange(turn);
+  const Vector3 tip = flange + world_from_flange * world.robot.tool.flange_from_tip.translation();
+  const Vector3 moment = Vector3(tip - com).cross(push_n);
+  double* applied = data->xfrc_applied + 6 * body_id;
+  std::copy_n(push_n.data(), 3, applied);
+  std::copy_n(moment.data(), 3, applied + 3);
 }
 
 // Brakes slow the joints at once and then hold them where they stand, with at most kBrake times the drives' torque. Dry
@@ -189,6 +202,8 @@ void Simulation::advance_to(Time time) {
 body::Body& Simulation::body() { return cell_->body; }
 const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
 void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
+
+void Simulation::push_tip(const Vector3& force_n) { cell_->push_n = force_n; }
 
 void Simulation::expect_visits(std::vector<Visit> visits) { cell_->visits = std::move(visits); }
 
