@@ -128,8 +128,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     seen_ = true;
     const bool free = state_.safety == SafetyState::kOperational && laws_.controller() == Controller::kTracking &&
                       collision_.expected_n() == 0 && vacuum_on_ == 0;
-    wrist_.feel(collision_.robot_model(), {measured_position_, measured_speed_, laws_.acting().acceleration},
-                tracker_.payload(), sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep, dt_s_);
+    feel(sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep);
     const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
     if (still && !is_still_) still_since_ = now;
     is_still_ = still;
@@ -143,6 +142,15 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     position_now_ += age_s * (measured_speed_ + age_s / 2 * laws_.acting().acceleration);
     speed_now_ += age_s * laws_.acting().acceleration;
   }
+}
+
+void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {
+  model::RobotModel& model = collision_.robot_model();
+  if (model.robot().wrist_sensor)
+    wrist_.feel(model, {measured_position_, measured_speed_, laws_.acting().acceleration}, tracker_.payload(), sensors,
+                bias, dt_s_);
+  else
+    wrist_.infer(collision_.wrench(), model.world_from_tip(measured_position_).linear(), bias, dt_s_);
 }
 
 bool Cerebellum::is_silent(Time now) const { return !seen_ || now - fresh_at_ >= settings_.silence_timeout; }

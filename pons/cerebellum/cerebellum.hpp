@@ -111,6 +111,7 @@ class Cerebellum {
  private:
   void watch_loop(Time now);
   void take_measurement(Time now, const body::Sensors& sensors);
+  void feel(const body::Sensors& sensors, WristSense::Bias bias);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
   void watch_zones(Time now);

@@ -1,7 +1,5 @@
 #include "pons/cerebellum/wrist.hpp"
 
-#include <cmath>
-
 #include "pons/core/gravity.hpp"
 
 namespace pons::cerebellum {
@@ -36,13 +34,21 @@ void WristSense::feel(model::RobotModel& model, const AxisState& motion, const m
       sensors.wrist_torque_nm[1], sensors.wrist_torque_nm[2];
   if (!felt.allFinite()) return;  // what was felt before stays in force
   const Vector6 rest = felt - carried_wrench(model, motion, payload);
-  if (bias == Bias::kLearn) bias_ += (1 - std::exp(-dt_s / bias_s_)) * (rest - bias_);
+  learn(rest, bias, dt_s);
   const Vector6 at_flange = rest - bias_;
   const Pose& flange_from_tip = model.robot().tool.flange_from_tip;
   const Vector3 force = at_flange.head<3>();
   const Vector3 moment = at_flange.tail<3>() - flange_from_tip.translation().cross(force);
   at_tip_.head<3>() = flange_from_tip.linear().transpose() * force;
   at_tip_.tail<3>() = flange_from_tip.linear().transpose() * moment;
+}
+
+void WristSense::infer(const Vector6& wrench, const Eigen::Matrix3d& world_from_tip, Bias bias,
+                       double dt_s) PONS_NONBLOCKING {
+  Vector6 rest;
+  rest << world_from_tip.transpose() * wrench.head<3>(), world_from_tip.transpose() * wrench.tail<3>();
+  learn(rest, bias, dt_s);
+  at_tip_ = rest - bias_;
 }
 
 }  // namespace pons::cerebellum

@@ -27,7 +27,7 @@ enum class CommandKind : std::uint8_t {
 // How the arm follows its commanded motion. Pushed by the force f, the tip gives way
 //   kTracking    not at all, as far as the drives can: computed torque
 //   kImpedance   as a spring and damper at the drives' torques would (Hogan 1985)
-//   kAdmittance  as a mass, spring and damper would, which the wrist's sensor moves and the drives track
+//   kAdmittance  as a mass, spring and damper would, which what the wrist feels moves and the drives track
 enum class Controller : std::uint8_t { kTracking, kImpedance, kAdmittance };
 
 // Of the two compliant laws, in the tip's axes: x, y, z, and about them.
@@ -121,7 +121,8 @@ struct State {
   AxisVector torque_nm;                   // asked of the drives
   AxisVector external_nm;                 // on each axis from outside, as the momentum observer has it
   std::array<double, 6> tip_wrench{};     // what explains it: force (N), moment about the tip (N·m), world axes
-  std::array<double, 6> wrist_wrench{};   // by the wrist's sensor, less tool, payload and bias: likewise, tip axes
+  std::array<double, 6> wrist_wrench{};   // on the tip, less tool, payload and bias: likewise, tip axes; by the
+                                          // wrist's sensor, or, of an arm without one, by the observer
   std::array<double, 3> wrist_force_n{};  // flange frame, raw
   std::array<double, 3> wrist_torque_nm{};
   std::array<double, 8> cup_vacuum_kpa{};

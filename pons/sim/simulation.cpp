@@ -132,7 +132,7 @@ void Cell::measure() {
     measured.speed[i] = data->qvel[composed.arm_dof[static_cast<std::size_t>(i)]];
   }
   const std::array<double, 6> wrist = gripper.wrist(composed, data.get());
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3 && world.robot.wrist_sensor; ++i) {
     measured.wrist_force_n[i] = wrist[i] + kForceNoise_n * noise.normal();
     measured.wrist_torque_nm[i] = wrist[i + 3] + kTorqueNoise_nm * noise.normal();
   }

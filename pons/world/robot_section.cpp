@@ -122,7 +122,7 @@ Pose read_pose(const YamlValue& value) {
 Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   const YamlMap map(
       value, {"name", "urdf", "flange_link", "world_from_base", "home", "limits", "payload_kg", "tool", "capsules"},
-      {"rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s"});
+      {"rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s", "wrist_sensor"});
   Robot robot;
   robot.name = map["name"].name();
   robot.urdf = map["urdf"].existing_file(folder);
@@ -140,6 +140,7 @@ Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   robot.payload_kg = map["payload_kg"].positive(kMaxMass);
   if (map.has("watchdog_s")) robot.watchdog_s = map["watchdog_s"].number(kShortestWatchdog_s, kLongestWatchdog_s);
   if (map.has("drive_delay_s")) robot.drive_delay_s = map["drive_delay_s"].number(0, kLongestDriveDelay_s);
+  if (map.has("wrist_sensor")) robot.wrist_sensor = map["wrist_sensor"].boolean();
   if (robot.payload_kg <= robot.tool.mass_kg) {
     map["payload_kg"].refuse(fmt::format("is used up by the tool's {} kg", robot.tool.mass_kg),
                              "it counts the tool; raise it or lower tool.mass_kg");

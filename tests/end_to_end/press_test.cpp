@@ -57,5 +57,13 @@ TEST(PressTest, HoldsALargerForce) {
   EXPECT_LT(pressed.peak_n, 65);
 }
 
+// By what its drives' torques tell, which is less exact.
+TEST(PressTest, AnArmWithoutAWristSensorFeelsByItsDrives) {
+  TaskRun cell(small_cell_with_block("  wrist_sensor: no\n"));
+  const Pressed pressed = press(cell, 20, 2);
+  EXPECT_GE(pressed.within_ms, 1000);
+  EXPECT_LT(pressed.peak_n, 40);
+}
+
 }  // namespace
 }  // namespace pons::tests
