@@ -277,7 +277,7 @@ TEST(Simulation, DrivesHaveTheRotorsOfTheWorldsFile) {
   }
 }
 
-// Told to fall, an arm held by brakes starts so much later, and so much later holds again.
+// Told to let go of its brakes, an arm begins to fall so much later.
 TEST(Simulation, SetPointsActAfterTheDriveDelay) {
   const auto falls_at_ms = [](double delay_s) {
     world::World world = without_cameras("parcel_cell");
@@ -285,17 +285,17 @@ TEST(Simulation, SetPointsActAfterTheDriveDelay) {
     auto simulation = create(world, one_box(1.0), 3);
     body::SetPoints told{.torque_nm = AxisVector::Zero(6)};
     body::Sensors sensors;
-    for (int ms = 1; ms < 100; ++ms) {
+    for (int ms = 1; ms < 200; ++ms) {
       simulation->advance_to(Time(std::chrono::milliseconds(ms)));
       simulation->body().read(sensors);
-      if (sensors.speed.cwiseAbs().maxCoeff() > 1e-3) return ms;
-      told.power = ms >= 20;
+      if (ms > 100 && sensors.speed.cwiseAbs().maxCoeff() > 0.02) return ms;  // it sags a little into its brakes first
+      told.power = ms >= 100;
       simulation->body().write(told);
     }
     return 0;
   };
   const int at_once = falls_at_ms(0);
-  EXPECT_GT(at_once, 20);
+  EXPECT_GT(at_once, 101);
   EXPECT_EQ(falls_at_ms(0.004), at_once + 4);
   EXPECT_EQ(falls_at_ms(0.010), at_once + 10);
 }
