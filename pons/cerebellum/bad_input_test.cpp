@@ -220,6 +220,8 @@ const BadSetting kSettings[] = {
     {"LimitNegative", [](auto& r, auto&) { r.limits.torque_nm[4] = -28; }, "limits.torque_nm: holds a limit"},
     {"HomeOutside", [](auto& r, auto&) { r.home[1] = 7; }, "home: lies outside"},
     {"DrivesTooWeak", [](auto& r, auto&) { r.limits.torque_nm.setConstant(1); }, "to hold the arm at home"},
+    {"DrivesTooLate", [](auto& r, auto&) { r.drive_delay_s = 0.0106; }, "drive_delay_s: is 0.0106 s, more than 10"},
+    {"DriveDelayNan", [](auto& r, auto&) { r.drive_delay_s = kNan; }, "drive_delay_s"},
     {"NoHeartbeat", [](auto&, auto& s) { s.heartbeat_timeout = Duration{0}; }, "settings.heartbeat_timeout"},
     {"StallBelowAPeriod", [](auto&, auto& s) { s.stall_timeout = s.period; }, "settings.stall_timeout - period"},
     {"GainNan", [](auto&, auto& s) { s.gains.speed_1_s = kNan; }, "settings.gains.speed_1_s"},

@@ -32,20 +32,28 @@ bool is_finite(const body::Sensors& sensors, Eigen::Index axes) {
          std::isfinite(sensors.belt_speed_m_s);
 }
 
+ControlSettings with_delay(ControlSettings settings, double delay_s) {
+  settings.compliance = with_delay(settings.compliance, delay_s);
+  return settings;
+}
+
 }  // namespace
 
 Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time start)
     : settings_(settings),
-      tracker_(std::move(model), settings.gains),
+      delay_ticks_(delay_ticks(model.robot().drive_delay_s, settings.period)),
+      delay_(static_cast<std::int64_t>(delay_ticks_) * settings.period),
+      tracker_(std::move(model), settings.gains, delay_ticks_),
       limits_(tracker_.robot_model().robot().limits),
       limit_watch_(limits_),
       collision_(tracker_.robot_model().copy(), settings.collision),
-      laws_(tracker_, settings.control),
+      laws_(tracker_, with_delay(settings.control, to_s(delay_)), delay_ticks_),
       wrist_(settings.control.bias_s),
       vacuum_settings_(VacuumSettings::of(tracker_.robot_model().robot().tool)),
       motion_time_(settings.rate),
       stepped_(start),
       fresh_at_(start),
+      driven_(delay_ticks_, {.torque_nm = AxisVector::Zero(tracker_.robot_model().axes())}),
       heard_at_(start) {
   const AxisVector zero = AxisVector::Zero(tracker_.robot_model().axes());
   commanded_ = before_ = at_rest(zero);
@@ -92,7 +100,8 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   stop_input_ = sensors.stop_input;
   watchdog_tripped_ = sensors.watchdog_tripped;
   zones_ = sensors.zones_occupied;
-  if (powered_) collision_.drive(driven_nm_, dt_s_);
+  const bool driven = powered_ && driven_.out().powered;
+  if (driven) collision_.drive(driven_.out().torque_nm, dt_s_);
   const Eigen::Index axes = commanded_.position.size();
   const bool good = is_finite(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
                     sensors.stamp <= now + settings_.silence_timeout;
@@ -110,7 +119,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
       statistics_.measured_acceleration = std::max(
           statistics_.measured_acceleration, rate.cwiseAbs().cwiseQuotient(limits().acceleration_rad_s2).maxCoeff());
     }
-    if (powered_) collision_.measure(sensors.stamp, sensors.position, sensors.speed);
+    if (driven) collision_.measure(sensors.stamp, sensors.position, sensors.speed);
     measured_position_ = sensors.position;
     publish_measurement(sensors);
     measured_speed_ = sensors.speed;
@@ -119,8 +128,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     seen_ = true;
     const bool free = state_.safety == SafetyState::kOperational && laws_.controller() == Controller::kTracking &&
                       collision_.expected_n() == 0 && vacuum_on_ == 0;
-    wrist_.feel(tracker_.robot_model(), {measured_position_, measured_speed_, commanded_.acceleration},
-                tracker_.payload(), sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep, dt_s_);
+    feel(sensors, free ? WristSense::Bias::kLearn : WristSense::Bias::kKeep);
     const bool still = measured_speed_.cwiseAbs().maxCoeff() < settings_.standstill_rad_s;
     if (still && !is_still_) still_since_ = now;
     is_still_ = still;
@@ -131,9 +139,18 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   position_now_ = measured_position_;
   speed_now_ = measured_speed_;
   if (carries) {
-    position_now_ += age_s * (measured_speed_ + age_s / 2 * commanded_.acceleration);
-    speed_now_ += age_s * commanded_.acceleration;
+    position_now_ += age_s * (measured_speed_ + age_s / 2 * laws_.acting().acceleration);
+    speed_now_ += age_s * laws_.acting().acceleration;
   }
+}
+
+void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {
+  model::RobotModel& model = collision_.robot_model();
+  if (model.robot().wrist_sensor)
+    wrist_.feel(model, {measured_position_, measured_speed_, laws_.acting().acceleration}, tracker_.payload(), sensors,
+                bias, dt_s_);
+  else
+    wrist_.infer(collision_.wrench(), model.world_from_tip(measured_position_).linear(), bias, dt_s_);
 }
 
 bool Cerebellum::is_silent(Time now) const { return !seen_ || now - fresh_at_ >= settings_.silence_timeout; }
@@ -203,10 +220,10 @@ void Cerebellum::watch_following(Time now) {
     strays_ = false;
     return;
   }
-  // commanded_ is still the last step's: compare it with where the arm was then.
+  // What acts is still the last step's: compare it with where the arm was then.
   const AxisVector then = position_now_ - dt_s_ * speed_now_;
   Eigen::Index axis = 0;
-  const double error = (commanded_.position + laws_.gives_way() - then).cwiseAbs().maxCoeff(&axis);
+  const double error = (laws_.acting().position - then).cwiseAbs().maxCoeff(&axis);
   const bool springs = laws_.controller() == Controller::kImpedance;
   if (!springs) statistics_.following_error_rad = std::max(statistics_.following_error_rad, error);
   const bool strays = error > (springs ? settings_.yielding_error_rad : settings_.following_error_rad);
@@ -256,6 +273,7 @@ void Cerebellum::advance(Time now) {
   before_ = commanded_;
   if (!powered_) {
     commanded_ = before_ = at_rest(seen_ ? measured_position_ : commanded_.position);
+    laws_.rest(commanded_);
     return;
   }
   if (moves(state_.safety)) follow(now);
@@ -292,6 +310,7 @@ void Cerebellum::hold_measured(Time now) {
   tracker_.reset();
   laws_.reset();
   commanded_ = before_ = at_rest(measured_position_);
+  laws_.rest(commanded_);
   motion::plan_stop(commanded_, limits(),
                     std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
   queue_.rest(commanded_.position, now);
@@ -333,6 +352,7 @@ void Cerebellum::judge_stop(Time now) {
     commanded_ = at_rest(measured_position_);
     tracker_.reset();
     laws_.reset();
+    laws_.rest(commanded_);
   }
   queue_.rest(commanded_.position, now);
 }
@@ -343,27 +363,29 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
   set_points.belt_runs = state_.safety == SafetyState::kOperational && state_.belt == link::Belt::kRuns;
   if (!powered_) {
     set_points.torque_nm = driven_nm_ = AxisVector::Zero(commanded_.position.size());
+    driven_.push({.torque_nm = driven_nm_, .powered = false});
     return;
   }
   AxisVector& torque = set_points.torque_nm;
+  const ControlLaws::Now does{.commanded = commanded_,
+                              .position = position_now_,
+                              .speed = speed_now_,
+                              .felt = wrist_.at_tip(),
+                              .dt_s = dt_s_,
+                              .presses = state_.safety == SafetyState::kOperational};
   if (is_silent(now))
-    tracker_.track_blind(commanded_, torque);
+    laws_.blind(commanded_, torque);
   else if (gives_way_)
-    tracker_.yield(position_now_, speed_now_, torque);
+    laws_.yield(does, torque);
   else
-    laws_.torques({.commanded = commanded_,
-                   .position = position_now_,
-                   .speed = speed_now_,
-                   .felt = wrist_.at_tip(),
-                   .dt_s = dt_s_,
-                   .presses = state_.safety == SafetyState::kOperational},
-                  driven_nm_, torque);
+    laws_.torques(does, driven_nm_, torque);
   const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
   const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
   statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));
   statistics_.commanded.torque = std::max(statistics_.commanded.torque, share(clamped));
   if (clamped != torque) ++statistics_.saturated;
   torque = driven_nm_ = clamped;
+  driven_.push({.torque_nm = clamped, .powered = true});
 }
 
 // What a good measurement says stays until the next good one.
@@ -382,7 +404,7 @@ void Cerebellum::publish_measurement(const body::Sensors& sensors) {
 void Cerebellum::publish(link::CerebellumEnd& link, const body::SetPoints& set_points) {
   const bool follows = moves(state_.safety);
   state_.rate = follows ? motion_time_.rate() : 1;
-  state_.late = follows ? stepped_ - motion_time_.time() : Duration{0};
+  state_.late = follows ? stepped_ + delay_ - motion_time_.time() : Duration{0};
   state_.motion_end = queue_.end() + state_.late;
   state_.commanded = commanded_;
   state_.torque_nm = set_points.torque_nm;

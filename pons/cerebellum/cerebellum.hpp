@@ -12,6 +12,7 @@
 #include "pons/body/body.hpp"
 #include "pons/cerebellum/collision.hpp"
 #include "pons/cerebellum/control_laws.hpp"
+#include "pons/cerebellum/delay_line.hpp"
 #include "pons/cerebellum/limit_watch.hpp"
 #include "pons/cerebellum/motion_queue.hpp"
 #include "pons/cerebellum/motion_time.hpp"
@@ -62,7 +63,8 @@ struct Settings {
 };
 
 // Whether a cerebellum can work so. Errors: a setting that is not finite or out of range; limits that are not finite,
-// not positive or contradict each other; a home outside them; drives too weak to hold the arm at home.
+// not positive or contradict each other; a home outside them; drives too weak to hold the arm at home, or that delay
+// set-points for more than kMaxDelayTicks.
 [[nodiscard]] Expected<void> check(const model::RobotModel& model, const Settings& settings);
 
 class Cerebellum {
@@ -73,8 +75,9 @@ class Cerebellum {
   Cerebellum& operator=(const Cerebellum&) = delete;
 
   // One tick at `now`, which grows from call to call: takes in the measurement and all commands, moves the commanded
-  // state to `now`, and says what the drives shall do until the next. Measurements that are not finite, of another
-  // length, from the future or not newer than the last count as none. One thread.
+  // state on, and says what the drives shall do until the next. What is commanded, checked and sent is the motion of
+  // `now` and the robot's drive delay, for it acts by then; a measurement is held against what acts now. Measurements
+  // that are not finite, of another length, from the future or not newer than the last count as none. One thread.
   //
   // Which commands do what, and what refuses them (refused = counted in State::dropped; all need the present epoch
   // unless stated; another kind is refused):
@@ -109,6 +112,7 @@ class Cerebellum {
  private:
   void watch_loop(Time now);
   void take_measurement(Time now, const body::Sensors& sensors);
+  void feel(const body::Sensors& sensors, WristSense::Bias bias);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
   void watch_zones(Time now);
@@ -147,6 +151,8 @@ class Cerebellum {
   [[nodiscard]] const AxisLimits& robot_limits() const;
 
   const Settings settings_;
+  const std::size_t delay_ticks_;
+  const Duration delay_;  // of the drives
   Tracker tracker_;
   AxisLimits limits_;  // in force: the robot's, or what recovery makes of them
   LimitWatch limit_watch_;
@@ -162,7 +168,7 @@ class Cerebellum {
   rt::EventLog log_;
   link::Command command_;  // scratch
 
-  // The commanded state at stepped_, the last step's time; before_ is the one a step earlier.
+  // The commanded state as of the last step, at stepped_, for delay_ later; before_ is the one a step earlier.
   AxisState commanded_, before_;
   Time stepped_;
   double dt_s_ = 0;
@@ -181,6 +187,11 @@ class Cerebellum {
   // After a collision the arm gives way while it brakes, and then holds where that brought it.
   bool gives_way_ = false;
   AxisVector driven_nm_;  // what the drives were told last
+  struct Driven {
+    AxisVector torque_nm;
+    bool powered = false;
+  };
+  DelayLine<Driven> driven_;  // until it acts
   SafetyMachine machine_;
   bool powered_ = false;  // the machine's
   bool word_raised_ = false, stop_input_ = false, watchdog_tripped_ = false, zone_stops_ = false;

@@ -94,6 +94,10 @@ Expected<void> check_settings(const Settings& settings) {
 Expected<void> check(const model::RobotModel& model, const Settings& settings) {
   if (auto good = check_limits(model.robot(), model.axes()); !good) return good;
   if (auto good = check_settings(settings); !good) return good;
+  if (const double delay_s = model.robot().drive_delay_s;
+      !(delay_s >= 0 && delay_s <= 1) || delay_ticks(delay_s, settings.period) > kMaxDelayTicks)
+    return fail(fmt::format("is {} s, more than {} ticks", delay_s, kMaxDelayTicks),
+                model.robot().name + ": drive_delay_s", "what acts later than that cannot be foreseen");
   return check_strength(model);
 }
 

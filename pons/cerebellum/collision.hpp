@@ -39,6 +39,8 @@ class CollisionWatch {
   // The force that a skill expects at the tip from now on; 0: none.
   void expect(double contact_n) PONS_NONBLOCKING { contact_n_ = contact_n; }
 
+  // What it reckons with; after measure() it still has where the measured links and axes are.
+  [[nodiscard]] model::RobotModel& robot_model() { return model_; }
   [[nodiscard]] double expected_n() const { return contact_n_; }
 
   // The drives gave this torque for so long. Call before measure() of what was measured at the end of it.

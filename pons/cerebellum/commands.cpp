@@ -16,6 +16,8 @@ using link::StopResult;
 
 // A burst longer than this waits for the next tick, so that a tick stays short whatever a bridge sends.
 constexpr int kCommandsPerTick = 64;
+// With drives that act later than that, a spring and damper by torques swing.
+constexpr Duration kLatestImpedance = std::chrono::milliseconds(5);
 
 }  // namespace
 
@@ -116,6 +118,7 @@ bool Cerebellum::take_control(const link::Command& command, Time now) {
   std::string_view wrong = known ? std::string_view{} : "no such controller";
   if (known && command.controller != Controller::kTracking)
     wrong = fault(command.compliance, settings_.control.compliance);
+  if (command.controller == Controller::kImpedance && delay_ > kLatestImpedance) wrong = "the drives act too late";
   if (!wrong.empty()) {
     if (stop(StopCause::kBadCommand, now)) log_.write(now, "command {}, control: {}", command.sequence, wrong);
     return false;
@@ -127,6 +130,7 @@ bool Cerebellum::take_control(const link::Command& command, Time now) {
   if (command.controller != laws_.controller()) {
     const AxisVector held = laws_.held(commanded_.position, position_now_);
     commanded_ = before_ = at_rest(held.cwiseMax(limits().position_min).cwiseMin(limits().position_max));
+    laws_.rest(commanded_);
     queue_.rest(commanded_.position, stepped_);
     log_.write(now, "control: {}", name(command.controller));
   }
@@ -174,8 +178,9 @@ bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) 
   state_.belt = link::Belt::kRuns;
   gives_way_ = false;
   commanded_ = before_ = at_rest(position);
+  laws_.rest(commanded_);
   queue_.rest(position, stepped_);
-  motion_time_.restart(stepped_);
+  motion_time_.restart(stepped_ + delay_);
   heard_at_ = now;
   return true;
 }

@@ -12,6 +12,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kSingular = 1e-4;        // squared damping of an inverse near singular poses
 constexpr double kFastest_1_s = 200;      // a damper faster than that, over the tip's inertia, the loop cannot hold
+constexpr double kDamperPhase = 0.7;      // rad, that a drive's delay may take from the dampers
 constexpr double kPosture_1_s = 15;       // of the null space, critically damped
 constexpr double kCloses_1_s = 30;        // the gap between what the tip should have given way and what it has
 constexpr double kAxisSpeedShare = 0.25;  // of each axis's speed limit, for giving way
@@ -32,6 +33,15 @@ model::Jacobian in_tip_axes(const model::Jacobian& jacobian, const Eigen::Matrix
 Vector3 turn_between(const Eigen::Matrix3d& from, const Eigen::Matrix3d& to) {
   const Eigen::AngleAxisd turn(Eigen::Matrix3d(to * from.transpose()));
   return turn.angle() * turn.axis();
+}
+
+// So that no motion of the tip is braked faster: a tool far out turns and moves at once, and all six dampers brake it.
+// The Frobenius norm is at least the fastest eigenvalue.
+Vector6 slowed(const Vector6& damping, const Matrix6& mobility, double fastest_1_s) {
+  const Vector6 root = damping.cwiseSqrt();
+  const Matrix6 rates = root.asDiagonal() * mobility * root.asDiagonal();
+  const double fastest = rates.norm();
+  return fastest > fastest_1_s ? Vector6(damping * (fastest_1_s / fastest)) : damping;
 }
 
 void bound(Vector6& wrench, double force_n, double lever_m) {
@@ -55,6 +65,11 @@ std::string_view fault(const link::Compliance& compliance, const ComplianceLimit
   return {};
 }
 
+ComplianceLimits with_delay(ComplianceLimits limits, double delay_s) {
+  if (delay_s > 0) limits.fastest_1_s = std::min(limits.fastest_1_s, kDamperPhase / delay_s);
+  return limits;
+}
+
 void impedance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
                const AxisState& commanded, const AxisVector& position, const AxisVector& speed,
                const model::Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING {
@@ -73,7 +88,8 @@ void impedance(model::RobotModel& model, const link::Compliance& compliance, con
   way.head<3>() = wanted.linear().transpose() * (wanted.translation() - tip.translation());
   way.tail<3>() = wanted.linear().transpose() * turn_between(tip.linear(), wanted.linear());
   const Vector6 rate = wanted_jacobian * commanded.speed - jacobian * speed;
-  const Vector6 damping = vector6(compliance.damping).cwiseMin(kFastest_1_s * tip_inertia.diagonal());
+  const Vector6 damping =
+      slowed(vector6(compliance.damping).cwiseMin(kFastest_1_s * tip_inertia.diagonal()), mobility, limits.fastest_1_s);
   Vector6 wrench =
       vector6(compliance.stiffness).cwiseProduct(way) + damping.cwiseProduct(rate) + vector6(compliance.wrench);
   bound(wrench, compliance.force_max_n, limits.lever_m);

@@ -1,6 +1,7 @@
 // The two compliant laws, as pure functions of model, states and parameters; what they remember is handed in and out.
 #pragma once
 
+#include <limits>
 #include <string_view>
 
 #include "pons/core/axes.hpp"
@@ -16,7 +17,12 @@ struct ComplianceLimits {
   double damping_ns_m = 5000, damping_nms_rad = 300;  // and above 0
   double force_n = 200;                               // of Compliance::force_max_n, above 0, and of the wrench
   double lever_m = 0.15;                              // a moment counts as a force so far from the tip
+  // All dampers of an impedance are scaled down where they would brake some motion of the tip faster than that.
+  double fastest_1_s = std::numeric_limits<double>::infinity();
 };
+
+// With drives that act so much later: faster dampers would push instead of brake.
+[[nodiscard]] ComplianceLimits with_delay(ComplianceLimits limits, double delay_s);
 
 // What is wrong with it; empty when nothing.
 [[nodiscard]] std::string_view fault(const link::Compliance& compliance,

@@ -6,8 +6,11 @@ namespace pons::cerebellum {
 
 using link::Controller;
 
-ControlLaws::ControlLaws(Tracker& tracker, const ControlSettings& settings)
-    : tracker_(tracker), settings_(settings), fading_nm_(AxisVector::Zero(tracker.robot_model().axes())) {
+ControlLaws::ControlLaws(Tracker& tracker, const ControlSettings& settings, std::size_t delay)
+    : tracker_(tracker),
+      settings_(settings),
+      asked_(delay, at_rest(AxisVector::Zero(tracker.robot_model().axes()))),
+      fading_nm_(AxisVector::Zero(tracker.robot_model().axes())) {
   admittance_.axis_way = fading_nm_;
 }
 
@@ -45,22 +48,35 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
   if (!now.presses) compliance.wrench = {};
   switch (controller_) {
     case Controller::kTracking:
-      tracker_.track(now.commanded, now.position, now.speed, now.dt_s, torque_nm);
+      asked_.push(now.commanded);
+      tracker_.track(now.commanded, acting(), now.position, now.speed, now.dt_s, torque_nm);
       break;
     case Controller::kImpedance:
-      impedance(tracker_.robot_model(), compliance, settings_.compliance, now.commanded, now.position, now.speed,
+      asked_.push(now.commanded);
+      impedance(tracker_.robot_model(), compliance, settings_.compliance, acting(), now.position, now.speed,
                 tracker_.payload(), torque_nm);
       break;
     case Controller::kAdmittance:
       admittance(tracker_.robot_model(), compliance, settings_.compliance, now.commanded,
                  now.presses ? now.felt : Vector6(Vector6::Zero()), now.dt_s, admittance_, reference_);
-      tracker_.track(reference_, now.position, now.speed, now.dt_s, torque_nm);
+      asked_.push(reference_);
+      tracker_.track(reference_, acting(), now.position, now.speed, now.dt_s, torque_nm);
       break;
   }
   if (changed_) fading_nm_ = last_nm - torque_nm;
   changed_ = false;
   torque_nm += fading_nm_;
   fading_nm_ *= std::exp(-now.dt_s / settings_.fade_s);
+}
+
+void ControlLaws::blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING {
+  asked_.push(commanded);
+  tracker_.track_blind(commanded, torque_nm);
+}
+
+void ControlLaws::yield(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING {
+  asked_.push(now.commanded);
+  tracker_.yield(now.position, now.speed, torque_nm);
 }
 
 }  // namespace pons::cerebellum

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pons/cerebellum/compliance.hpp"
+#include "pons/cerebellum/delay_line.hpp"
 #include "pons/cerebellum/tracker.hpp"
 #include "pons/core/axes.hpp"
 #include "pons/core/realtime.hpp"
@@ -17,7 +18,8 @@ struct ControlSettings {
 
 class ControlLaws {
  public:
-  ControlLaws(Tracker& tracker, const ControlSettings& settings);
+  // What it asks of the drives acts `delay` ticks later.
+  ControlLaws(Tracker& tracker, const ControlSettings& settings, std::size_t delay);
 
   // From the next torques() on. Changing the law keeps torques continuous. Parameters must have no fault().
   void select(link::Controller controller, const link::Compliance& compliance) PONS_NONBLOCKING;
@@ -26,19 +28,25 @@ class ControlLaws {
   [[nodiscard]] link::Controller controller() const { return controller_; }
   // Where the arm is held while it is commanded to be at `commanded`: where tracking goes on from when the law changes.
   [[nodiscard]] AxisVector held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING;
-  // How far measured positions may be from commanded ones before something is wrong, over what tracking allows.
-  [[nodiscard]] const AxisVector& gives_way() const { return admittance_.axis_way; }
+  // What the arm was asked to do by now, as of the last tick: what was commanded so much earlier as the drives delay
+  // it, with what admittance gave way.
+  [[nodiscard]] const AxisState& acting() const { return asked_.out(); }
+  // The arm is where `commanded` has it; what is on its way no longer counts.
+  void rest(const AxisState& commanded) PONS_NONBLOCKING { asked_.fill(commanded); }
 
   // What the arm does at this tick.
   struct Now {
-    const AxisState& commanded;
-    const AxisVector &position, &speed;  // as measured, for the same moment
+    const AxisState& commanded;          // for when these torques will act
+    const AxisVector &position, &speed;  // as measured, for this moment
     const Vector6& felt;                 // WristSense::at_tip()
     double dt_s;
     bool presses;  // false: the wrench that was asked for is not exerted, and felt ones move nothing: it is stopping
   };
   // Not clamped. `last_nm` are the torques of the tick before.
   void torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING;
+  // Instead of torques(): without a measurement; and giving way to what pushes.
+  void blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING;
+  void yield(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING;
 
  private:
   Tracker& tracker_;
@@ -47,6 +55,7 @@ class ControlLaws {
   link::Compliance compliance_;
   Admittance admittance_;
   AxisState reference_;
+  DelayLine<AxisState> asked_;
   bool changed_ = false;
   AxisVector fading_nm_;  // what keeps the torques continuous after a change
 };

@@ -56,6 +56,12 @@ std::filesystem::path scaled_urdf(const std::filesystem::path& urdf, double by) 
   return path;
 }
 
+model::RobotModel controller_model(const PlantSettings& plant) {
+  world::Robot robot = bench_robot();
+  robot.drive_delay_s = to_s(plant.told_delay);
+  return model::RobotModel::load(robot).value();
+}
+
 }  // namespace
 
 const world::Robot& bench_robot() {
@@ -76,6 +82,7 @@ Plant::Plant(const PlantSettings& settings, const AxisVector& position)
     : extra_torque_nm(AxisVector::Zero(position.size())),
       settings_(settings),
       model_(bench_model(settings.masses)),
+      told_(delay_ticks(to_s(settings.drive_delay), std::chrono::milliseconds(1)), {}),
       position_(position),
       speed_(AxisVector::Zero(position.size())) {
   sensors.position = position_;
@@ -85,11 +92,12 @@ Plant::Plant(const PlantSettings& settings, const AxisVector& position)
 void Plant::advance_to(Time time) {
   AxisVector acceleration;
   const double dt = to_s(settings_.step);
+  told_.push(set_points);
+  const body::SetPoints& acts = told_.out();
   while (time_ + settings_.step <= time) {
     time_ += settings_.step;
-    if (set_points.power && !blocked) {
-      model_.forward_dynamics(position_, speed_, set_points.torque_nm + extra_torque_nm, settings_.payload,
-                              acceleration);
+    if (acts.power && !blocked) {
+      model_.forward_dynamics(position_, speed_, acts.torque_nm + extra_torque_nm, settings_.payload, acceleration);
       speed_ += dt * acceleration;
       position_ += dt * speed_;
     } else {
@@ -108,7 +116,7 @@ void Plant::place(const AxisVector& position) {
 }
 
 Bench::Bench(const PlantSettings& plant_settings, const Settings& settings)
-    : cerebellum(bench_model(), settings, Time{}), plant(plant_settings, bench_robot().home) {}
+    : cerebellum(controller_model(plant_settings), settings, Time{}), plant(plant_settings, bench_robot().home) {}
 
 void Bench::tick() {
   now += std::chrono::milliseconds(1);

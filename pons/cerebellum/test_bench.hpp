@@ -19,13 +19,15 @@ struct PlantSettings {
   Duration step{2'000'000};  // the plant's own; measurements are as old as that
   double masses = 1;         // of the plant over the controller's model
   model::Payload payload;    // what the plant carries, told or not
+  Duration drive_delay{0};   // whole milliseconds: set-points act so much later
+  Duration told_delay{0};    // what the controller takes that for
 };
 
 // Integrates the arm's dynamics (semi-implicit Euler); brakes hold it while the drives are off.
 class Plant {
  public:
   Plant(const PlantSettings& settings, const AxisVector& position);
-  void advance_to(Time time);
+  void advance_to(Time time);              // once a tick of the controller
   void place(const AxisVector& position);  // at rest there, without a way
   body::Sensors sensors;
   body::SetPoints set_points;
@@ -36,6 +38,7 @@ class Plant {
  private:
   PlantSettings settings_;
   model::RobotModel model_;
+  DelayLine<body::SetPoints> told_;
   AxisVector position_, speed_;
   Time time_;
 };

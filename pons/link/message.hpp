@@ -31,7 +31,7 @@ enum class Belt : std::uint8_t { kRuns, kWaits };
 // How the arm follows its commanded motion. Pushed by the force f, the tip gives way
 //   kTracking    not at all, as far as the drives can: computed torque
 //   kImpedance   as a spring and damper at the drives' torques would (Hogan 1985)
-//   kAdmittance  as a mass, spring and damper would, which the wrist's sensor moves and the drives track
+//   kAdmittance  as a mass, spring and damper would, which what the wrist feels moves and the drives track
 enum class Controller : std::uint8_t { kTracking, kImpedance, kAdmittance };
 
 // Of the two compliant laws, in the tip's axes: x, y, z, and about them.
@@ -121,12 +121,13 @@ struct State {
   StopCause cause = StopCause::kNone;
   StopResult stop_result = StopResult::kNone;
   Time motion_end;                        // when the queued motion ends; in the past when it is done
-  AxisState commanded;                    // what the loop asks of the arm now
+  AxisState commanded;                    // what the loop asks of the arm: for now, or a drive's delay later
   AxisVector position, speed;             // measured
   AxisVector torque_nm;                   // asked of the drives
   AxisVector external_nm;                 // on each axis from outside, as the momentum observer has it
   std::array<double, 6> tip_wrench{};     // what explains it: force (N), moment about the tip (N·m), world axes
-  std::array<double, 6> wrist_wrench{};   // by the wrist's sensor, less tool, payload and bias: likewise, tip axes
+  std::array<double, 6> wrist_wrench{};   // on the tip, less tool, payload and bias: likewise, tip axes; by the
+                                          // wrist's sensor, or, of an arm without one, by the observer
   std::array<double, 3> wrist_force_n{};  // flange frame, raw
   std::array<double, 3> wrist_torque_nm{};
   std::array<double, 8> cup_vacuum_kpa{};

@@ -15,6 +15,7 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -68,6 +69,8 @@ struct RobotModel::Impl {
   pinocchio::Inertia last_inertia;  // last link and tool, without payload
   std::vector<pinocchio::FrameIndex> capsule_frames;
   Eigen::VectorXd q, v, a;
+  Eigen::VectorXd placed_at;  // the q that data.oMi holds; not a number: none
+  bool axes_placed = false;   // and data.J
   std::optional<InverseKinematics> inverse;
 
   Impl(world::Robot robot_in, const pinocchio::Model& model_in)
@@ -84,6 +87,7 @@ struct RobotModel::Impl {
     for (const auto& capsule : robot.capsules)
       capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
     q = v = a = Eigen::VectorXd::Zero(model.nv);
+    forget();
     inverse.emplace(chain());
   }
 
@@ -100,7 +104,9 @@ struct RobotModel::Impl {
         q(other.q),
         v(other.v),
         a(other.a),
-        inverse(other.inverse) {}
+        inverse(other.inverse) {
+    forget();
+  }
   Impl& operator=(const Impl&) = delete;
   ~Impl() = default;
 
@@ -115,9 +121,26 @@ struct RobotModel::Impl {
     model.inertias[last_joint] += last_joint_from_flange.act(pinocchio::Inertia(payload.mass_kg, com, cube));
   }
 
+  // A tick asks for several things of one q: what was reckoned for it stays until another is asked for.
+  void place_links(const AxisVector& at) PONS_NONBLOCKING {
+    if (placed_at == at) return;
+    placed_at = at;
+    axes_placed = false;
+    pinocchio::forwardKinematics(model, data, placed_at);
+  }
+  void place_axes(const AxisVector& at) PONS_NONBLOCKING {
+    if (axes_placed && placed_at == at) return;
+    placed_at = at;
+    axes_placed = true;
+    pinocchio::computeJointJacobians(model, data, placed_at);
+  }
+  void forget() PONS_NONBLOCKING {
+    placed_at.setConstant(model.nv, std::numeric_limits<double>::quiet_NaN());
+    axes_placed = false;
+  }
+
   Jacobian tip_jacobian(const AxisVector& at) {
-    q = at;
-    pinocchio::computeJointJacobians(model, data, q);
+    place_axes(at);
     const pinocchio::SE3 base_from_tip = data.oMi[last_joint] * last_joint_from_tip;
     Jacobian jacobian(6, model.nv);
     const Eigen::Matrix3d turn = robot.world_from_base.linear();
@@ -235,12 +258,30 @@ int RobotModel::axes() const { return impl_->model.nv; }
 const world::Robot& RobotModel::robot() const { return impl_->robot; }
 
 Pose RobotModel::world_from_tip(const AxisVector& q) PONS_NONBLOCKING {
-  impl_->q = q;
-  pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);
+  impl_->place_links(q);
   return impl_->robot.world_from_base * pose_of(impl_->data.oMi[impl_->last_joint] * impl_->last_joint_from_tip);
 }
 
 Jacobian RobotModel::tip_jacobian(const AxisVector& q) PONS_NONBLOCKING { return impl_->tip_jacobian(q); }
+
+Vector6 RobotModel::tip_acceleration(const AxisVector& q, const AxisVector& speed) PONS_NONBLOCKING {
+  impl_->place_axes(q);
+  const pinocchio::Data& data = impl_->data;
+  // Of what hangs on the last joint: twist, and its rate, in base axes about the base's origin.
+  pinocchio::Motion twist = pinocchio::Motion::Zero(), rate = twist;
+  for (Eigen::Index axis = 0; axis < impl_->model.nv; ++axis) {
+    const pinocchio::Motion turn(data.J.col(axis) * speed[axis]);
+    rate += twist.cross(turn);
+    twist += turn;
+  }
+  const Vector3 tip = (data.oMi[impl_->last_joint] * impl_->last_joint_from_tip).translation();
+  const Vector3 velocity = twist.linear() + twist.angular().cross(tip);
+  const Eigen::Matrix3d to_world = impl_->robot.world_from_base.linear();
+  Vector6 acceleration;
+  acceleration.head<3>() = to_world * (rate.linear() + rate.angular().cross(tip) + twist.angular().cross(velocity));
+  acceleration.tail<3>() = to_world * rate.angular();
+  return acceleration;
+}
 
 RobotModel::InverseMethod RobotModel::inverse_method() const {
   const auto& closed_form = impl_->inverse->closed_form();
@@ -278,8 +319,7 @@ std::vector<int> RobotModel::capsule_axes() const {
 }
 
 void RobotModel::place_capsules(const AxisVector& q, std::vector<PlacedCapsule>& capsules) {
-  impl_->q = q;
-  pinocchio::forwardKinematics(impl_->model, impl_->data, impl_->q);
+  impl_->place_links(q);
   capsules.clear();
   for (std::size_t i = 0; i < impl_->robot.capsules.size(); ++i) {
     const auto& capsule = impl_->robot.capsules[i];
@@ -321,8 +361,7 @@ void RobotModel::momentum(const AxisVector& q, const AxisVector& speed, const Pa
   const pinocchio::Model& model = impl_->model;
   pinocchio::Data& data = impl_->data;
   impl_->carry(payload);
-  impl_->q = q;
-  pinocchio::computeJointJacobians(model, data, impl_->q);
+  impl_->place_axes(q);
   // Of each body and all beyond it, in base axes about the base's origin: momentum, and weight.
   std::array<pinocchio::Force, kMaxAxes + 1> beyond, weight;
   std::array<pinocchio::Motion, kMaxAxes + 1> twist;
@@ -356,6 +395,7 @@ void RobotModel::momentum(const AxisVector& q, const AxisVector& speed, const Pa
 void RobotModel::mass_matrix(const AxisVector& q, const Payload& payload, AxisMatrix& mass) PONS_NONBLOCKING {
   impl_->carry(payload);
   impl_->q = q;
+  impl_->forget();  // it keeps its own in the same places
   pinocchio::crba(impl_->model, impl_->data, impl_->q);
   mass = impl_->data.M.selfadjointView<Eigen::Upper>();
 }

@@ -33,7 +33,8 @@ struct PlacedCapsule {
   double radius_m;
 };
 
-// Holds Pinocchio's model and a scratch pad of its own, so one object serves one thread; copy() for another.
+// Holds Pinocchio's model and a scratch pad of its own, so one object serves one thread; copy() for another. What
+// several calls in a row need of the same q (where links and axes are) is reckoned once.
 class RobotModel {
  public:
   // Errors: no file, broken URDF, flange link missing, more than kMaxAxes axes, limits of another length.
@@ -50,6 +51,8 @@ class RobotModel {
   [[nodiscard]] Pose world_from_tip(const AxisVector& q) PONS_NONBLOCKING;
   // d(tip)/dq there, world axes: speed of the tip in rows 1 to 3, angular speed in rows 4 to 6.
   [[nodiscard]] Jacobian tip_jacobian(const AxisVector& q) PONS_NONBLOCKING;
+  // How the tip accelerates (m/s², rad/s², world axes) by these speeds alone, while no axis does: J̇ q̇.
+  [[nodiscard]] Vector6 tip_acceleration(const AxisVector& q, const AxisVector& speed) PONS_NONBLOCKING;
 
   // Inverse kinematics, inside position limits, whole turns of 2π considered. A closed form where the arm's axes allow
   // one (axes 2, 3, 4 parallel, or 4, 5, 6 through a point; exact to about 1e-12), otherwise iteration (to 1e-10 as a

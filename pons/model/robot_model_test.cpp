@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -64,6 +65,52 @@ TEST(RobotModel, JacobianIsTheDerivativeOfTheTip) {
 
 // At rest the torques must balance the weight of every part: tau = -sum(J_com^T m g), and a known load adds J_load^T m
 // g.
+TEST(RobotModel, SpeedsAloneAccelerateTheTipByTheJacobiansRate) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(3);
+  constexpr double kStep = 1e-6;
+  for (int i = 0; i < 100; ++i) {
+    const AxisVector q = random_axes(random, 3), speed = random_axes(random, 2);
+    const Jacobian rate = (model.tip_jacobian(q + kStep * speed) - model.tip_jacobian(q - kStep * speed)) / (2 * kStep);
+    EXPECT_LT((model.tip_acceleration(q, speed) - rate * speed).norm(), 1e-6) << q.transpose();
+  }
+}
+
+// Whatever was asked before, and of whichever q: each answer is the one that a model gives which was asked nothing.
+TEST(RobotModel, WhatWasReckonedForOneQIsNotTakenForAnother) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  Random random(4);
+  const std::array<AxisVector, 2> q{random_axes(random, 3), random_axes(random, 3)};
+  const AxisVector speed = random_axes(random, 2);
+  for (int i = 0; i < 500; ++i) {
+    auto fresh = model.copy();
+    const AxisVector& at = q[random.uniform(0, 1) < 0.5 ? 0 : 1];
+    const int what = static_cast<int>(random.uniform(0, 5));
+    AxisVector of[2], rate[2];
+    AxisMatrix mass[2];
+    if (what == 0) {
+      EXPECT_EQ(model.world_from_tip(at).matrix(), fresh.world_from_tip(at).matrix());
+    }
+    if (what == 1) {
+      EXPECT_EQ(model.tip_jacobian(at), fresh.tip_jacobian(at));
+    }
+    if (what == 2) {
+      EXPECT_EQ(model.tip_acceleration(at, speed), fresh.tip_acceleration(at, speed));
+    }
+    if (what == 3) {
+      model.momentum(at, speed, {}, of[0], rate[0]);
+      fresh.momentum(at, speed, {}, of[1], rate[1]);
+      EXPECT_EQ(of[0], of[1]);
+      EXPECT_EQ(rate[0], rate[1]);
+    }
+    if (what == 4) {
+      model.mass_matrix(at, {}, mass[0]);
+      fresh.mass_matrix(at, {}, mass[1]);
+      EXPECT_EQ(mass[0], mass[1]);
+    }
+  }
+}
+
 TEST(RobotModel, PayloadAddsExactlyItsWeight) {
   const auto robot = hanging_arm();
   auto model = RobotModel::load(robot).value();

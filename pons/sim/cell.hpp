@@ -7,6 +7,7 @@
 
 #include "pons/body/body.hpp"
 #include "pons/core/random.hpp"
+#include "pons/sim/bus.hpp"
 #include "pons/sim/camera.hpp"
 #include "pons/sim/compose.hpp"
 #include "pons/sim/feeder.hpp"
@@ -35,6 +36,8 @@ struct Cell {
 
   // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
   void step();
+  // Set-points reach the drives.
+  void hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING;
 
   world::World world;
   Composed composed;
@@ -49,14 +52,16 @@ struct Cell {
   std::vector<body::Camera*> camera_list;
   SimBody body;
   Random noise;                // of wrist and vacuum
+  Bus bus;                     // set-points on their way
   body::SetPoints set_points;  // in force
   body::Sensors measured;      // at the last step
   Duration step_length;
   Time stepped;  // end of the last step
   Time now;      // last time advanced to
   bool stop_pressed = false;
+  Vector3 push_n = Vector3::Zero();  // of a person on the tip
   std::vector<Visit> visits;
-  Time heard;                     // when set-points were last written
+  Time heard;                     // when set-points last reached the drives
   bool watchdog_tripped = false;  // until set-points without power are heard
   AxisVector held;                // where the brakes hold the arm; empty while it moves
   std::string failure;            // what MuJoCo said when it gave up
@@ -67,6 +72,7 @@ struct Cell {
   void drive_belt();
   void watch_loop();
   void drive();
+  void push();
   void brake();
   void measure();
 };

@@ -31,6 +31,7 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       feeder(world, manifest, arrivals),
       body(this),
       noise(Random(seed).fork(kNoiseStream)),
+      bus(from_s(world.robot.drive_delay_s)),
       step_length(from_s(world.physics_step_s)),
       brake_acceleration_(static_cast<std::size_t>(composed.model->nv)),
       brake_torque_(brake_acceleration_) {
@@ -45,10 +46,12 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
 void Cell::step() {
   mjModel* model = composed.model.get();
   feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
+  for (; const Bus::Told* told = bus.next(stepped + step_length); bus.drop_oldest()) hear(told->set_points, told->acts);
   watch_loop();
   drive_belt();
   gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
   drive();
+  push();
   mj_step(model, data.get());
   stepped += step_length;
   gripper.measure(composed, data.get());
@@ -64,6 +67,13 @@ void Cell::drive_belt() {
     }
   }
   belt.step(composed.model.get(), composed.belt_geom, stepped, world.physics_step_s);
+}
+
+void Cell::hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING {
+  set_points = told;
+  heard = at;
+  if (!told.power) watchdog_tripped = false;
+  if (watchdog_tripped) set_points.power = set_points.belt_runs = false;
 }
 
 void Cell::watch_loop() {
@@ -83,6 +93,18 @@ void Cell::drive() {
   } else {
     brake();
   }
+}
+
+void Cell::push() {
+  const int body_id = composed.tool_body;
+  const double* turn = data->site_xmat + 9 * composed.wrist_site;
+  const Eigen::Map<const Vector3> flange(data->site_xpos + 3 * composed.wrist_site), com(data->xipos + 3 * body_id);
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_flange(turn);
+  const Vector3 tip = flange + world_from_flange * world.robot.tool.flange_from_tip.translation();
+  const Vector3 moment = Vector3(tip - com).cross(push_n);
+  double* applied = data->xfrc_applied + 6 * body_id;
+  std::copy_n(push_n.data(), 3, applied);
+  std::copy_n(moment.data(), 3, applied + 3);
 }
 
 // Brakes slow the joints at once and then hold them where they stand, with at most kBrake times the drives' torque. Dry
@@ -120,7 +142,7 @@ void Cell::measure() {
     measured.speed[i] = data->qvel[composed.arm_dof[static_cast<std::size_t>(i)]];
   }
   const std::array<double, 6> wrist = gripper.wrist(composed, data.get());
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3 && world.robot.wrist_sensor; ++i) {
     measured.wrist_force_n[i] = wrist[i] + kForceNoise_n * noise.normal();
     measured.wrist_torque_nm[i] = wrist[i + 3] + kTorqueNoise_nm * noise.normal();
   }
@@ -149,10 +171,10 @@ void SimBody::read(body::Sensors& sensors) {
 }
 
 void SimBody::write(const body::SetPoints& set_points) {
-  cell_->set_points = set_points;
-  cell_->heard = cell_->now;
-  if (!set_points.power) cell_->watchdog_tripped = false;
-  if (cell_->watchdog_tripped) cell_->set_points.power = cell_->set_points.belt_runs = false;
+  if (cell_->bus.delay() > Duration{0})
+    cell_->bus.send(set_points, cell_->now);
+  else
+    cell_->hear(set_points, cell_->now);
 }
 
 Duration SimBody::watchdog() const { return from_s(cell_->world.robot.watchdog_s); }
@@ -193,6 +215,8 @@ void Simulation::run_belt() {
   cell_->body.write({.torque_nm = AxisVector::Zero(cell_->world.robot.home.size()), .belt_runs = true});
 }
 void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
+
+void Simulation::push_tip(const Vector3& force_n) { cell_->push_n = force_n; }
 
 void Simulation::expect_visits(std::vector<Visit> visits) { cell_->visits = std::move(visits); }
 

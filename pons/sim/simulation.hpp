@@ -48,6 +48,8 @@ class Simulation {
   void run_belt();
   // The stop input as a person presses (true) or releases (false) it.
   void press_stop(bool pressed);
+  // A person pushes the tip with this force, N, world frame, until told otherwise.
+  void push_tip(const Vector3& force_n);
   // Who will come, told by the safety scanner's bits in body::Sensors.
   void expect_visits(std::vector<Visit> visits);
   // Places the arm at rest there, without moving through space; `position` must have one value an axis.

@@ -308,6 +308,29 @@ TEST(Simulation, DrivesHaveTheRotorsOfTheWorldsFile) {
   }
 }
 
+// Told to let go of its brakes, an arm begins to fall so much later.
+TEST(Simulation, SetPointsActAfterTheDriveDelay) {
+  const auto falls_at_ms = [](double delay_s) {
+    world::World world = without_cameras("parcel_cell");
+    world.robot.drive_delay_s = delay_s;
+    auto simulation = create(world, one_box(1.0), 3);
+    body::SetPoints told{.torque_nm = AxisVector::Zero(6)};
+    body::Sensors sensors;
+    for (int ms = 1; ms < 200; ++ms) {
+      simulation->advance_to(Time(std::chrono::milliseconds(ms)));
+      simulation->body().read(sensors);
+      if (ms > 100 && sensors.speed.cwiseAbs().maxCoeff() > 0.02) return ms;  // it sags a little into its brakes first
+      told.power = ms >= 100;
+      simulation->body().write(told);
+    }
+    return 0;
+  };
+  const int at_once = falls_at_ms(0);
+  EXPECT_GT(at_once, 101);
+  EXPECT_EQ(falls_at_ms(0.004), at_once + 4);
+  EXPECT_EQ(falls_at_ms(0.010), at_once + 10);
+}
+
 TEST(Simulation, TheSmallWorldRunsToo) {
   const world::World world = without_cameras("small_cell");
   auto simulation = create(world, draw(world, 6, 2), 2);

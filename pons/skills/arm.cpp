@@ -14,7 +14,10 @@ constexpr Duration kRecoveredRest = std::chrono::milliseconds(200);
 }  // namespace
 
 Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
-    : link_(link), world_(world), splice_lead_(splice_lead), rest_(at_rest(world.robot.home)) {}
+    : link_(link),
+      world_(world),
+      splice_lead_(splice_lead + from_s(world.robot.drive_delay_s)),
+      rest_(at_rest(world.robot.home)) {}
 
 void Arm::refresh(Time now) {
   link_.latest(state_);

@@ -20,7 +20,7 @@ inline constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
 class Arm {
  public:
   // Both must outlive it. A motion that arrives after its begin is refused and stops the arm, so where ticks may come
-  // late `splice_lead` must be longer than they do.
+  // late `splice_lead` must be longer than they do. The robot's drive delay is added: so far ahead the loop commands.
   Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead = kSpliceLead);
 
   // Once a bridge tick, before any skill: takes in the newest state and shows the cerebellum that the bridge lives.

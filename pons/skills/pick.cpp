@@ -112,6 +112,8 @@ class Pick final : public task::Skill {
   }
 
   Progress find(Time now) {
+    if (!cell_.world.robot.wrist_sensor)
+      return {Status::kFailed, "the robot has no wrist sensor to weigh a load with: see robot.wrist_sensor", {}};
     cell_.keep_clear(now);
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};

@@ -87,6 +87,16 @@ TEST_F(PickTest, WhatMayBeTwoIsNotTaken) {
   EXPECT_THAT(progress.reason, HasSubstr("P2"));
 }
 
+TEST_F(PickTest, ARobotThatCannotWeighSaysSo) {
+  world::World world = world_;
+  world.robot.wrist_sensor = false;
+  Cell cell(bridge_, world, model::RobotModel::load(world.robot).value());
+  cell.refresh(now_, {parcel(1, 0.1, 0, {0.2, 0.11, 0.11})});
+  const Progress progress = pick(cell).start(task::Json{{"object", "P1"}}, now_)->tick(now_);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, HasSubstr("robot.wrist_sensor"));
+}
+
 TEST_F(PickTest, WhatIsOnlyAnObstacleTiesNothing) {
   ObjectBelief coming = parcel(0, 0, 0.01, {0.2, 0.11, 0.112});
   coming.code.clear();

@@ -5,6 +5,7 @@
 #include "pons/skills/pick.hpp"
 #include "pons/skills/place.hpp"
 #include "pons/skills/press.hpp"
+#include "pons/skills/yield.hpp"
 
 namespace pons::skills {
 
@@ -14,6 +15,7 @@ void add_skills(task::SkillRegistry& registry, Cell& cell) {
   registry.add(pick(cell));
   registry.add(place(cell));
   registry.add(press(cell));
+  registry.add(yield(cell));
 }
 
 }  // namespace pons::skills

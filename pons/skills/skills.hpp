@@ -6,7 +6,7 @@
 
 namespace pons::skills {
 
-// Adds detect, move_to, pick, place and press. `cell` must outlive the registry.
+// Adds detect, move_to, pick, place, press and yield. `cell` must outlive the registry.
 void add_skills(task::SkillRegistry& registry, Cell& cell);
 
 }  // namespace pons::skills

@@ -20,6 +20,8 @@ constexpr double kRotorInertia_kg_m2 = 0.01;
 constexpr std::size_t kMaxCapsules = 64;
 // Shorter than a few ticks, every hiccup of the loop takes the power off; longer, an arm without a loop goes far.
 constexpr double kShortestWatchdog_s = 0.005, kLongestWatchdog_s = 0.5;
+// So much the control step foresees; a drive that is slower cannot hold an arm at 1 kHz.
+constexpr double kLongestDriveDelay_s = 0.010;
 
 double rad(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -120,7 +122,7 @@ Pose read_pose(const YamlValue& value) {
 Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   const YamlMap map(
       value, {"name", "urdf", "flange_link", "world_from_base", "home", "limits", "payload_kg", "tool", "capsules"},
-      {"rotor_inertia_kg_m2", "watchdog_s"});
+      {"rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s", "wrist_sensor"});
   Robot robot;
   robot.name = map["name"].name();
   robot.urdf = map["urdf"].existing_file(folder);
@@ -137,6 +139,8 @@ Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   robot.tool = read_tool(map["tool"], folder);
   robot.payload_kg = map["payload_kg"].positive(kMaxMass);
   if (map.has("watchdog_s")) robot.watchdog_s = map["watchdog_s"].number(kShortestWatchdog_s, kLongestWatchdog_s);
+  if (map.has("drive_delay_s")) robot.drive_delay_s = map["drive_delay_s"].number(0, kLongestDriveDelay_s);
+  if (map.has("wrist_sensor")) robot.wrist_sensor = map["wrist_sensor"].boolean();
   if (robot.payload_kg <= robot.tool.mass_kg) {
     map["payload_kg"].refuse(fmt::format("is used up by the tool's {} kg", robot.tool.mass_kg),
                              "it counts the tool; raise it or lower tool.mass_kg");

@@ -47,6 +47,8 @@ struct Robot {
   AxisVector rotor_inertia_kg_m2;  // one an axis: what the drive's rotor adds about the joint, behind the gears
   double payload_kg = 0;           // at the flange, tool included
   double watchdog_s = 0.02;        // without set-points for so long, the body takes the power off
+  double drive_delay_s = 0;        // from a set-point's being sent to its acting: bus and drive
+  bool wrist_sensor = true;        // at the flange; without one, forces are known from the drives' torques alone
   Tool tool;
   std::vector<Capsule> capsules;
 };

@@ -274,6 +274,20 @@ TEST_F(BrokenWorld, TheBodysWatchdogIsTheFilesOrElseTheUsualOne) {
   EXPECT_THAT(error(put("10")), HasSubstr("robot.watchdog_s"));
 }
 
+TEST_F(BrokenWorld, ADriveDelayIsShortAndAWristSensorIsThereUnlessTheFileSaysOtherwise) {
+  EXPECT_EQ(load_text(text_)->robot.drive_delay_s, 0);
+  EXPECT_TRUE(load_text(text_)->robot.wrist_sensor);
+  const auto put = [&](const char* line) {
+    std::string with = text_;
+    return with.replace(with.find("  payload_kg:"), 0, std::string("  ") + line + "\n");
+  };
+  EXPECT_EQ(load_text(put("drive_delay_s: 0.004"))->robot.drive_delay_s, 0.004);
+  EXPECT_THAT(error(put("drive_delay_s: 0.011")), HasSubstr("robot.drive_delay_s"));
+  EXPECT_THAT(error(put("drive_delay_s: -0.001")), HasSubstr("robot.drive_delay_s"));
+  EXPECT_FALSE(load_text(put("wrist_sensor: no"))->robot.wrist_sensor);
+  EXPECT_THAT(error(put("wrist_sensor: maybe")), HasSubstr("robot.wrist_sensor"));
+}
+
 TEST_F(BrokenWorld, RefusesImpossibleCameras) {
   EXPECT_THAT(changed("watches: tray", "watches: attic"),
               HasSubstr("cameras[2].watches: there is no place 'attic'; choose from belt, chute_1"));

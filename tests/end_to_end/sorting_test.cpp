@@ -96,6 +96,26 @@ TEST(Sorting, AnotherRobotAndLayoutAreOtherFiles) {
   EXPECT_GE(report["parcels"]["sorted"], 8) << run.out;
 }
 
+// Both cells with drives that act 4 ms after they were told.
+TEST(Sorting, DrivesThatActLateSortAsWell) {
+  const Folder folder;
+  const auto worlds = folder / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  for (const char* world : {"parcel_cell", "small_cell"}) {
+    std::string text = read_text(worlds / world / "world.yaml");
+    write_text(worlds / world / "world.yaml", text.insert(text.find("  payload_kg:"), "  drive_delay_s: 0.004\n"));
+    const Finished run = run_pons(
+        {"run", world, "--parcels", "12", "--seed", "3", "--quiet", "--explain", "--report", folder / "report.json"},
+        {"PONS_WORLDS=" + worlds.string()});
+    EXPECT_EQ(run.code, 0) << run.out << run.err;
+    const json report = read_json(folder / "report.json");
+    expect_accounted_for(report);
+    EXPECT_GE(report["parcels"]["sorted"], 10) << run.out;
+    EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
+    std::filesystem::remove(folder / "report.json");
+  }
+}
+
 TEST(Sorting, OneSeedGivesOneResult) {
   const Folder folder;
   const auto hash = [&](const char* seed, const char* name) -> std::string {
