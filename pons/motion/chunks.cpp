@@ -187,6 +187,12 @@ bool ChunkPath::starved(Time time) const {
   return std::max({at(i - 1).want, at(i).want, at(i + 1).want, at(i + 2).want}) == Want::kActions;
 }
 
+Time ChunkPath::enough_until() const {
+  const auto enough = std::find_if(knots_.rbegin(), knots_.rend(), [](const Knot& k) { return k.want == Want::kNone; });
+  if (enough == knots_.rbegin()) return end();
+  return origin_ + (first_ + (knots_.rend() - enough) - 2) * kKnot;
+}
+
 Time ChunkPath::end() const { return origin_ + (first_ + static_cast<std::int64_t>(knots_.size()) - 2) * kKnot; }
 
 // The new motion for a candidate: at the wanted pace, which is taken up over the blend, with a brake before the end.

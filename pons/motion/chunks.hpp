@@ -50,6 +50,8 @@ class ChunkPath {
   // Whether the motion is slower there than the policy's pace for want of actions: it brakes for the end of what has
   // come, rests there, or takes up speed again. Not before the first chunk, nor at the end of the last one.
   [[nodiscard]] bool starved(Time time) const;
+  // From when on it is starved if nothing more comes, or end().
+  [[nodiscard]] Time enough_until() const;
   // When it comes to rest.
   [[nodiscard]] Time end() const;
   // Up to which number of actions it leads.

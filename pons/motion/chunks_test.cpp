@@ -304,7 +304,7 @@ TEST(Chunks, StopComesToRestOnThePath) {
     const auto way = path.stop(now + kLead, limits);
     ASSERT_TRUE(way) << way.error().line();
     follower.queue(*way);
-    EXPECT_LE(path.end() - now, milliseconds(1000));
+    EXPECT_LE(path.end() - now, milliseconds(1500));
     while (follower.now() < path.end()) follower.step();
     EXPECT_TRUE(follower.state().speed.isZero(1e-9));
     EXPECT_FALSE(path.starved(follower.now()));
