@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kRate_hz = 10, kLatency_s = 0.15, kFirstLatency_s = 0.6;  // where a task does not say
 // From a chunk's arrival to its first effect: a bridge tick, the splice lead, the knots of the motion that stay.
-constexpr Duration kMargin = std::chrono::milliseconds(100);
+constexpr Duration kMargin = std::chrono::milliseconds(200);
 constexpr double kForget = 0.2;  // how much of it a shorter latency takes off the usual one
 
 }  // namespace
@@ -31,7 +31,8 @@ void PolicyRunner::begin(const task::ChunkStream& stream) {
 bool PolicyRunner::is_time(const task::Observation& seen, Time now) const {
   if (!asked_at_) return true;
   if (answered_ == 0) return false;
-  if (now >= *asked_at_ + every_) return true;
+  // The second at once: its latency is the first that tells what is usual.
+  if (asked_ == 1 || now >= *asked_at_ + every_) return true;
   return asked_ == answered_ && seen.enough <= usual_ + kMargin;
 }
 

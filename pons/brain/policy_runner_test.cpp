@@ -85,8 +85,8 @@ TEST_F(PolicyRunnerTest, TheFirstInferenceIsNotTakenForTheUsualOne) {
   EXPECT_EQ(runner_.asked(), 1);
   run(stream, 12);
   EXPECT_LE(stream.starved_, 6);  // before it knew the usual one
-  EXPECT_GE(runner_.asked(), 18);
-  EXPECT_LE(runner_.asked(), 22);
+  EXPECT_GE(runner_.asked(), 23);
+  EXPECT_LE(runner_.asked(), 27);
 }
 
 TEST_F(PolicyRunnerTest, WhatWasAskedForAnEarlierStreamIsDropped) {

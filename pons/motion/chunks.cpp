@@ -20,6 +20,8 @@ constexpr double kSame = 1e-9;           // actions
 // What is tried, in this order: paces from the fastest that the chunk itself allows, and for each the shortest way to
 // brake at its end and the shortest to blend into it (knots).
 constexpr double kSlower = 0.75, kSlowest = 0.04;
+constexpr int kRamp = 8;                 // knots, to take up the pace again
+constexpr double kPace = 1 - 1e-6;       // of the pace, and it is the pace
 constexpr double kReserve = 0.9;         // of the limits: what the next blend adds needs room
 constexpr std::size_t kEnd = kRest + 2;  // control points of an end without a brake
 constexpr std::array kBrakes{4, 6, 9, 13, 19, 28, 40, 60};
@@ -211,7 +213,9 @@ void ChunkPath::draw(const Chunk& chunk, const Candidate& candidate) {
   for (int i = 1; i < kMostKnots && resting < kRest; ++i) {
     const double blended = smooth(static_cast<double>(i) / (candidate.blend + 1));
     const double old_step = between(old + 1).progress - between(old).progress;
-    const double step = old_step + blended * (pace - old_step), before = progress;
+    // Up to the pace again at once; down to it only as fast as what goes on of the old motion can be slowed with it.
+    const int ramp = pace >= old_step ? candidate.ramp : candidate.blend;
+    const double step = old_step + smooth(static_cast<double>(i) / (ramp + 1)) * (pace - old_step), before = progress;
     if (braking == 0 && end - progress - step <= 0.5 * step * candidate.brake) {
       brake_pace = step;
       brake_knots = 2 * (end - progress) / step;
@@ -225,25 +229,25 @@ void ChunkPath::draw(const Chunk& chunk, const Candidate& candidate) {
       progress += step;
     }
     // Where the new motion is slower than the old one was, the old one is slowed with it.
-    old += old_step > kSame ? std::min(1.0, (progress - before) / old_step) : 1.0;
+    old += old_step > kSame && braking == 0 ? std::min(1.0, (progress - before) / old_step) : 1.0;
     const Knot from = between(old);
-    const Want want = braking > 0 && !chunk.last ? Want::kActions : Want::kNone;
+    const bool brakes = braking > 0 && !chunk.last, recovers = from.want == Want::kActions && step < kPace * pace;
+    const Want want = brakes || recovers ? Want::kActions : Want::kNone;
     plain_.push_back({course.at(progress), progress, want});
-    drawn_.push_back({from.position + blended * (plain_.back().position - from.position), progress,
-                      blended < 1 ? std::max(want, from.want) : want});
+    drawn_.push_back({from.position + blended * (plain_.back().position - from.position), progress, want});
   }
 }
 
 // Whether a candidate keeps the limits; if so it is what was drawn last.
 bool ChunkPath::draw_within(const Chunk& chunk, const AxisLimits& limits) {
   const auto body = [&](double pace) {
-    draw(chunk, {pace, 0, 0});
+    draw(chunk, {pace, 0, 0, 0});
     return use_of(std::span<const Knot>(plain_).first(plain_.size() - std::min(plain_.size(), kEnd)), limits);
   };
   for (double pace = fastest_pace(body(1)); pace > kSlowest; pace *= kSlower) {
     // The brake may ask for as much as the chunk itself does.
     const double most = std::clamp(body(pace).worst(), kReserve, 1.0);
-    Candidate candidate{pace, 0, 0};
+    Candidate candidate{pace, 0, 0, 0};
     for (const int brake : kBrakes) {
       candidate.brake = brake;
       draw(chunk, candidate);
@@ -251,8 +255,11 @@ bool ChunkPath::draw_within(const Chunk& chunk, const AxisLimits& limits) {
     }
     for (const int blend : kBlends) {
       candidate.blend = blend;
-      draw(chunk, candidate);
-      if (use_of(drawn_, limits).worst() <= 1) return true;
+      for (const int ramp : {std::min(blend, kRamp), blend}) {
+        candidate.ramp = ramp;
+        draw(chunk, candidate);
+        if (use_of(drawn_, limits).worst() <= 1) return true;
+      }
     }
   }
   return false;

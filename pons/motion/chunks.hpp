@@ -68,7 +68,8 @@ class ChunkPath {
   struct Candidate {
     double pace;  // share of the policy's
     int brake;    // knots
-    int blend;    // knots
+    int blend;    // knots, from the old motion to the new one
+    int ramp;     // knots, to take the pace up
   };
   [[nodiscard]] const Knot& at(std::int64_t index) const;
   [[nodiscard]] std::int64_t knot_at(Time time) const;
