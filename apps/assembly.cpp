@@ -132,7 +132,9 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
 
-  if (socket) self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal);
+  if (socket)
+    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal,
+                                        [above = self.get()] { return above->cell->stream; });
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
                                                       meeting.pixels, meeting.pace);
   if (realtime) {

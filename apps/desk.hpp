@@ -1,28 +1,37 @@
 // Where visitors are answered: requests from the local socket meet bridge and journal.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/gate/request.hpp"
+#include "pons/task/policy.hpp"
 
 namespace pons::apps {
 
 class Desk {
  public:
+  // The stream of chunks that goes on, or null.
+  using Stream = std::function<task::ChunkStream*()>;
   // Bridge and journal must outlive it.
-  Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal);
+  Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
+       Stream stream);
   // On the bridge's thread, once a period: answers what has come. Never waits.
   void attend(Time now);
 
  private:
   [[nodiscard]] bridge::Json answer(const std::string& text, Time now);
+  [[nodiscard]] bridge::Json observe(Time now) const;
+  [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
 
   std::unique_ptr<gate::LocalSocket> socket_;
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
+  Stream stream_;
 };
 
 }  // namespace pons::apps
