@@ -48,7 +48,7 @@ int skills(const std::string& name, const std::string& world_name) {
   task::SkillRegistry registry;
   skills::add_skills(registry, cell, policy_names());
   if (name.empty()) {
-    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<10} {}\n", skill_name, type.summary);
+    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<13} {}\n", skill_name, type.summary);
     return kExitGood;
   }
   const task::SkillType* type = registry.find(name);

@@ -19,13 +19,13 @@ constexpr int kRest = 3;                 // equal control points at which the sp
 constexpr double kSame = 1e-9;           // actions
 // What is tried, in this order: paces from the fastest that the chunk itself allows, and for each the shortest way to
 // brake at its end and the shortest to blend into it (knots).
-constexpr double kSlower = 0.75, kSlowest = 0.04;
+constexpr double kSlower = 0.65, kSlowest = 0.04;
 constexpr int kRamp = 8;                 // knots, to take up the pace again
 constexpr double kPace = 1 - 1e-6;       // of the pace, and it is the pace
 constexpr double kReserve = 0.9;         // of the limits: what the next blend adds needs room
 constexpr std::size_t kEnd = kRest + 2;  // control points of an end without a brake
-constexpr std::array kBrakes{4, 6, 9, 13, 19, 28, 40, 60};
-constexpr std::array kBlends{3, 5, 8, 12, 18, 27, 40, 60, 90, 135};
+constexpr std::array kBrakes{4, 7, 12, 20, 34, 60};
+constexpr std::array kBlends{3, 5, 9, 16, 28, 50, 90, 135};
 constexpr std::array kStops{6, 8, 11, 15, 20, 28, 38, 50, 70, 100};
 
 // From 0 to 1 with neither speed nor acceleration at either end.
@@ -174,6 +174,12 @@ ChunkPath::Knot ChunkPath::between(double index) const {
           interpolate(a.progress, b.progress, c.progress, d.progress, t), std::max(b.want, c.want)};
 }
 
+double ChunkPath::progress_between(double index) const {
+  const auto i = static_cast<std::int64_t>(std::floor(index));
+  return interpolate(at(i - 1).progress, at(i).progress, at(i + 1).progress, at(i + 2).progress,
+                     index - std::floor(index));
+}
+
 double ChunkPath::progress(Time time) const {
   const std::int64_t i = knot_at(time);
   const double t = std::clamp(to_s(time - origin_ - i * kKnot) / kKnot_s, 0.0, 1.0);
@@ -212,7 +218,7 @@ void ChunkPath::draw(const Chunk& chunk, const Candidate& candidate) {
   int braking = 0, resting = 0;
   for (int i = 1; i < kMostKnots && resting < kRest; ++i) {
     const double blended = smooth(static_cast<double>(i) / (candidate.blend + 1));
-    const double old_step = between(old + 1).progress - between(old).progress;
+    const double old_step = progress_between(old + 1) - progress_between(old);
     // Up to the pace again at once; down to it only as fast as what goes on of the old motion can be slowed with it.
     const int ramp = pace >= old_step ? candidate.ramp : candidate.blend;
     const double step = old_step + smooth(static_cast<double>(i) / (ramp + 1)) * (pace - old_step), before = progress;

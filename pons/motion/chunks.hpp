@@ -74,6 +74,7 @@ class ChunkPath {
   [[nodiscard]] const Knot& at(std::int64_t index) const;
   [[nodiscard]] std::int64_t knot_at(Time time) const;
   [[nodiscard]] Knot between(double index) const;
+  [[nodiscard]] double progress_between(double index) const;
   void draw(const Chunk& chunk, const Candidate& candidate);
   [[nodiscard]] bool draw_within(const Chunk& chunk, const AxisLimits& limits);
   [[nodiscard]] Trajectory take_over(std::int64_t free);

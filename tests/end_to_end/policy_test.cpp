@@ -21,6 +21,12 @@ using task::Json;
 
 class PolicyRun {
  public:
+  explicit PolicyRun(const std::string& name = "small_cell", std::vector<sim::Visit> visits = {})
+      : world(world::load("worlds", name).value()),
+        cell(apps::Assembly::build(world, world::draw_manifest(world, 1, 1).value(),
+                                   {.journal = ":memory:", .body = {.visits = std::move(visits)}})
+                 .value()) {}
+
   // What happens between control steps, each bridge period.
   using Meanwhile = std::function<void(Time)>;
 
@@ -62,9 +68,8 @@ class PolicyRun {
     EXPECT_EQ(cell->body->cerebellum->statistics().refused, 0u);
   }
 
-  world::World world = world::load("worlds", "small_cell").value();
-  std::unique_ptr<apps::Assembly> cell =
-      apps::Assembly::build(world, world::draw_manifest(world, 1, 1).value(), {.journal = ":memory:"}).value();
+  world::World world;
+  std::unique_ptr<apps::Assembly> cell;
   Time now;
   Json detail;
   task::Outcome outcome = task::Outcome::kCancelled;
@@ -192,6 +197,41 @@ TEST(Policy, WhoseChunksAreRefusedDoesNotMoveTheArm) {
   EXPECT_EQ(run.reason, "no chunk came for 10 s");
   EXPECT_EQ(run.told("refused"), 4);
   EXPECT_LT(run.cell->body->cerebellum->statistics().commanded.speed, 1e-12);
+  run.expect_no_limit_broken();
+}
+
+// While somebody is near, the arm is slow; so it executes fewer actions than the clock would have it, and each in its
+// place.
+TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
+  PolicyRun run("parcel_cell", {{.zone = 0, .from = Time(from_s(4)), .stays = from_s(4)}});
+  const auto sway = [](std::int64_t executed) {
+    return 0.3 * (1 - std::cos(4 * 0.05 * static_cast<double>(executed)));
+  };
+  double off = 0;
+  run.follow({{"policy", "outside"}, {"seconds", 10}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || now < Time(from_s(1))) return;
+    const std::int64_t executed = stream->observe(now).executed;
+    const double at = run.cell->body->cerebellum->state().commanded.position[0] - run.world.robot.home[0];
+    const auto [least, most] =
+        std::minmax({sway(executed - 1), sway(executed), sway(executed + 1), sway(executed + 2)});
+    off = std::max({off, least - at, at - most});
+    if (now.ns() % std::chrono::nanoseconds(std::chrono::milliseconds(200)).count() != 0) return;
+    Chunk chunk{.observed = executed, .period = std::chrono::milliseconds(50)};
+    for (std::int64_t j = 1; j <= 20; ++j) {
+      chunk.actions.push_back(run.world.robot.home);
+      chunk.actions.back()[0] += sway(executed + j);
+    }
+    const auto taken = stream->take(chunk, now);
+    ASSERT_TRUE(taken || taken.error().where == "chunk_stopped") << taken.error().line();
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+  std::printf("slowed for 4 of 10 s: %s, at most %.4f rad out of place\n", run.detail.dump().c_str(), off);
+  EXPECT_LT(run.told("executed"), 190);
+  EXPECT_GT(run.told("executed"), 120);
+  EXPECT_EQ(run.told("starved_ticks"), 0);
+  EXPECT_LT(off, 0.01);
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
   run.expect_no_limit_broken();
 }
 
