@@ -42,10 +42,10 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
       if (motion_time(now) < path_->end()) return {};
       return verdict_;
     }
-    if (over_ && motion_time(now) >= path_->end()) return succeeded();
+    if (last_ && motion_time(now) >= path_->end()) return whole();
     if (first_chunk_ && now >= *first_chunk_ + for_) {
       end(now, succeeded());
-    } else if (!over_ && now >= heard_ + kSilence) {
+    } else if (!last_ && now >= heard_ + kSilence) {
       end(now, {Status::kFailed, fmt::format("no chunk came for {:.0f} s", to_s(kSilence)), detail()});
     }
     return {};
@@ -87,7 +87,8 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     ++chunks_;
     heard_ = now;
     if (!first_chunk_) first_chunk_ = now;
-    over_ = chunk.last;
+    last_.reset();
+    if (chunk.last) last_ = chunk.observed + static_cast<std::int64_t>(chunk.actions.size());
     return {};
   }
 
@@ -148,6 +149,11 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     for (; counted_ < motion_time(now); counted_ += kTick) starved_ += path_->starved(counted_) ? 1 : 0;
   }
 
+  // What is played slowly may be longer than what can be queued.
+  [[nodiscard]] Progress whole() const {
+    if (path_->executed(path_->end()) >= *last_) return succeeded();
+    return {Status::kFailed, "the limits make the last chunk too slow to be queued whole", detail()};
+  }
   [[nodiscard]] Progress succeeded() const { return {Status::kSucceeded, {}, detail()}; }
   [[nodiscard]] task::Json detail() const {
     task::Json told{{"policy", arguments_.at("policy")},
@@ -169,7 +175,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   std::optional<Time> first_chunk_;
   std::int64_t chunks_ = 0, refused_ = 0, starved_ = 0;
   std::string last_refusal_;
-  bool over_ = false;  // the policy has said its last
+  std::optional<std::int64_t> last_;  // how many actions the stream has, once the policy has said its last
   bool ending_ = false;
   Progress verdict_;
 };

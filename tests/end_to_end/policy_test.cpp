@@ -171,6 +171,28 @@ TEST(Policy, ThatIsOutsideSendsItsChunksAndItsLast) {
   run.expect_no_limit_broken();
 }
 
+// To and fro fifty times a second, for four seconds: the limits allow a seventh of that pace.
+TEST(Policy, WhoseLastChunkIsTooRoughToBeQueuedWholeIsNotSaidToHaveSucceeded) {
+  PolicyRun run;
+  bool sent = false;
+  run.follow({{"policy", "outside"}, {"seconds", 30}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || sent || now < Time(from_s(1))) return;
+    Chunk chunk = chunk_of(run, 0, 200, 0);
+    chunk.period = std::chrono::milliseconds(20);
+    for (std::size_t j = 0; j < chunk.actions.size(); ++j) chunk.actions[j].array() += j % 2 == 0 ? 0.05 : -0.05;
+    chunk.last = true;
+    const auto taken = stream->take(chunk, now);
+    ASSERT_TRUE(taken) << taken.error().line();
+    sent = true;
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kFailed);
+  EXPECT_EQ(run.reason, "the limits make the last chunk too slow to be queued whole");
+  EXPECT_GE(run.told("executed"), 3);
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+  run.expect_no_limit_broken();
+}
+
 TEST(Policy, WhoseChunksAreRefusedDoesNotMoveTheArm) {
   PolicyRun run;
   std::vector<std::string> named;
