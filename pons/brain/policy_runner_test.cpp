@@ -23,36 +23,36 @@ class Standing final : public task::Policy {
 // Executes actions at the policy's pace as long as there are some.
 class Stream final : public task::ChunkStream {
  public:
-  explicit Stream(Json arguments) : arguments_(std::move(arguments)) { arguments_["policy"] = "standing"; }
-  [[nodiscard]] std::uint64_t number() const override { return number_; }
-  [[nodiscard]] const Json& arguments() const override { return arguments_; }
+  explicit Stream(Json arguments) : told(std::move(arguments)) { told["policy"] = "standing"; }
+  [[nodiscard]] std::uint64_t number() const override { return id; }
+  [[nodiscard]] const Json& arguments() const override { return told; }
   [[nodiscard]] task::Observation observe(Time now) const override {
     return {.stamp = now,
             .position = AxisVector::Zero(6),
             .speed = AxisVector::Zero(6),
-            .executed = executed_,
-            .enough = (end_ - executed_) * kPeriod};
+            .executed = executed,
+            .enough = (end - executed) * kPeriod};
   }
   [[nodiscard]] Expected<void> take(const Chunk& chunk, Time now) override {
-    EXPECT_LE(chunk.observed, executed_);
-    end_ = chunk.observed + static_cast<std::int64_t>(chunk.actions.size());
-    if (!began_) began_ = now;
-    ++taken_;
+    EXPECT_LE(chunk.observed, executed);
+    end = chunk.observed + static_cast<std::int64_t>(chunk.actions.size());
+    if (!began) began = now;
+    ++taken;
     return {};
   }
   void step(Time now) {
-    if (!began_ || now == *began_ || (now - *began_).count() % kPeriod.count() != 0) return;
-    if (executed_ < end_) {
-      ++executed_;
+    if (!began || now == *began || (now - *began).count() % kPeriod.count() != 0) return;
+    if (executed < end) {
+      ++executed;
     } else {
-      ++starved_;
+      ++starved;
     }
   }
 
-  Json arguments_;
-  std::uint64_t number_ = 1;
-  std::int64_t executed_ = 0, end_ = 0, taken_ = 0, starved_ = 0;
-  std::optional<Time> began_;
+  Json told;
+  std::uint64_t id = 1;
+  std::int64_t executed = 0, end = 0, taken = 0, starved = 0;
+  std::optional<Time> began;
 };
 
 class PolicyRunnerTest : public testing::Test {
@@ -73,7 +73,7 @@ TEST_F(PolicyRunnerTest, AsksAtItsRateWhateverTheLatency) {
   Stream stream({{"rate_hz", 10}, {"latency_s", 0.3}, {"first_latency_s", 0.3}});
   run(stream, 5.3);
   EXPECT_NEAR(static_cast<double>(runner_.asked()), 51, 1);
-  EXPECT_EQ(stream.starved_, 0);
+  EXPECT_EQ(stream.starved, 0);
 }
 
 // Only once in five seconds of itself; so it asks when its motion needs it, with the usual latency to spare. Taken for
@@ -81,10 +81,10 @@ TEST_F(PolicyRunnerTest, AsksAtItsRateWhateverTheLatency) {
 TEST_F(PolicyRunnerTest, TheFirstInferenceIsNotTakenForTheUsualOne) {
   Stream stream({{"rate_hz", 0.2}, {"latency_s", 0.3}, {"first_latency_s", 1.5}});
   run(stream, 1.5);
-  EXPECT_EQ(stream.taken_, 0);
+  EXPECT_EQ(stream.taken, 0);
   EXPECT_EQ(runner_.asked(), 1);
   run(stream, 12);
-  EXPECT_LE(stream.starved_, 6);  // before it knew the usual one
+  EXPECT_LE(stream.starved, 6);  // before it knew the usual one
   EXPECT_GE(runner_.asked(), 23);
   EXPECT_LE(runner_.asked(), 27);
 }
@@ -93,19 +93,19 @@ TEST_F(PolicyRunnerTest, WhatWasAskedForAnEarlierStreamIsDropped) {
   Stream first({{"rate_hz", 10}, {"latency_s", 1.0}, {"first_latency_s", 1.0}});
   run(first, 0.5);
   Stream second({{"rate_hz", 10}, {"latency_s", 1.0}, {"first_latency_s", 1.0}});
-  second.number_ = 2;
+  second.id = 2;
   run(second, 0.9);
-  EXPECT_EQ(first.taken_ + second.taken_, 0);
+  EXPECT_EQ(first.taken + second.taken, 0);
   run(second, 0.2);
-  EXPECT_GT(second.taken_, 0);
+  EXPECT_GT(second.taken, 0);
 }
 
 TEST_F(PolicyRunnerTest, LeavesAStreamAloneThatSomebodyElseFeeds) {
   Stream stream(Json::object());
-  stream.arguments_["policy"] = "outside";
+  stream.told["policy"] = "outside";
   run(stream, 1);
   EXPECT_EQ(runner_.asked(), 0);
-  EXPECT_EQ(stream.taken_, 0);
+  EXPECT_EQ(stream.taken, 0);
 }
 
 }  // namespace

@@ -288,7 +288,7 @@ Segment ChunkPath::segment(std::int64_t index) const {
 
 Trajectory ChunkPath::take_over(std::int64_t free) {
   knots_.reserve(static_cast<std::size_t>(kRemember + kMostKnots));
-  while (first_ + static_cast<std::int64_t>(knots_.size()) < free) knots_.push_back(Knot(knots_.back()));
+  while (first_ + static_cast<std::int64_t>(knots_.size()) < free) knots_.push_back(knots_.back());
   knots_.erase(knots_.begin() + (free - first_), knots_.end());
   knots_.insert(knots_.end(), drawn_.begin() + kFixed, drawn_.end());
   if (const std::int64_t old = free - kRemember - first_; old > 0) {

@@ -41,7 +41,8 @@ class ChunkPath {
   // is then as it was.
   [[nodiscard]] Expected<Trajectory> splice(const Chunk& chunk, Time now, Time from, const AxisLimits& limits);
 
-  // To rest along the present path: what replaces the queued motion. Error, chunk_limits: as it ends soon anyhow.
+  // To rest along the present path: what replaces the queued motion. Error, chunk_limits: none was found that keeps
+  // them; the motion, which ends at rest by itself, is as it was.
   [[nodiscard]] Expected<Trajectory> stop(Time from, const AxisLimits& limits);
 
   // How many actions have been executed at `time`, as a real number.

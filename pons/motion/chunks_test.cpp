@@ -33,7 +33,7 @@ AxisVector all(Eigen::Index axes, double value) { return AxisVector::Constant(ax
 // What the bridge asked for, as the cerebellum's queue keeps it, followed tick by tick; every tick is judged.
 class Follower {
  public:
-  Follower(AxisVector position, AxisLimits limits) : limits_(std::move(limits)), state_(at_rest(position)) {}
+  Follower(const AxisVector& position, AxisLimits limits) : limits_(std::move(limits)), state_(at_rest(position)) {}
 
   void queue(const Trajectory& trajectory) {
     ASSERT_FALSE(trajectory.empty());
