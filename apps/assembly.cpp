@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/policies.hpp"
+#include "pons/runner/thinker.hpp"
+
 namespace pons::apps {
 namespace {
 
@@ -115,7 +118,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
                                               realtime ? kRealTimeLead : skills::kSpliceLead);
   self->rest = std::make_unique<skills::Rest>(*self->cell);
   self->take_up = std::make_unique<skills::TakeUp>(*self->cell);
-  skills::add_skills(self->registry, *self->cell);
+  skills::add_skills(self->registry, *self->cell, policy_names());
   if (auto good = check_resources(self->registry, world); !good) return std::unexpected(good.error());
 
   // Before the journal: a run that is refused leaves none behind.
@@ -131,12 +134,21 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
 
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
                                                       meeting.pixels, meeting.pace);
-  std::function<void(Time)> visitors;
-  if (socket) visitors = [half = self.get()](Time now) { half->desk->attend(now); };
+  if (realtime) {
+    self->inference = std::make_unique<runner::Thinker>();
+  } else {
+    self->inference = std::make_unique<brain::PromptInference>();
+  }
+  self->policies = std::make_unique<brain::PolicyRunner>(policies_of(world, self->cell->model), *self->inference);
+  const auto visitors = [half = self.get()](Time now) {
+    half->policies->attend(half->cell->stream, now);
+    if (half->desk) half->desk->attend(now);
+  };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
                                                            world.zones, options.recovery, visitors);
   if (socket) {
-    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming());
+    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
+                                        [half = self.get()] { return half->cell->stream; });
   }
   return self;
 }

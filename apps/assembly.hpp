@@ -11,6 +11,7 @@
 
 #include "apps/desk.hpp"
 #include "pons/brain/dispatcher.hpp"
+#include "pons/brain/policy_runner.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/cerebellum/cerebellum.hpp"
 #include "pons/core/error.hpp"
@@ -95,6 +96,8 @@ class BridgeHalf {
   task::SkillRegistry registry;
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
+  std::unique_ptr<brain::Inference> inference;
+  std::unique_ptr<brain::PolicyRunner> policies;
   std::unique_ptr<runner::Observer> observer;
   std::unique_ptr<runner::BridgeSide> bridge_side;
   std::unique_ptr<Desk> desk;

@@ -1,16 +1,71 @@
 #include "apps/desk.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "apps/journal_json.hpp"
+#include "pons/skills/follow_policy.hpp"
 
 namespace pons::apps {
 
 using bridge::Json;
 
+namespace {
+
+Json list_of(const AxisVector& values) { return Json(std::vector<double>(values.begin(), values.end())); }
+Json list_of(const Vector3& values) { return {values.x(), values.y(), values.z()}; }
+
+// Its frame sits in the middle of the top face.
+Json to_json(const ObjectBelief& object) {
+  const auto x_axis = object.world_from_top.linear().col(0);
+  return {{"track", object.track},
+          {"code", object.code},
+          {"position_m", list_of(Vector3(object.world_from_top.translation()))},
+          {"yaw_rad", std::atan2(x_axis.y(), x_axis.x())},
+          {"velocity_m_s", list_of(object.velocity_m_s)},
+          {"size_m", list_of(object.size_m)}};
+}
+
+const Error kNoStream{"no stream goes on", "chunk_stream",
+                      "submit a task with the skill follow_policy and the policy outside, and wait until it runs"};
+
+}  // namespace
+
 Desk::Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
-           runner::Arming& arming)
-    : socket_(std::move(socket)), bridge_(bridge), journal_(journal), arming_(arming) {}
+           runner::Arming& arming, Stream stream)
+    : socket_(std::move(socket)), bridge_(bridge), journal_(journal), arming_(arming), stream_(std::move(stream)) {}
+
+Json Desk::observe(Time now) const {
+  const task::ChunkStream* const stream = stream_();
+  if (stream == nullptr) return gate::refusal(kNoStream);
+  const task::Observation seen = stream->observe(now);
+  Json objects = Json::array();
+  for (const ObjectBelief& object : seen.objects) objects.push_back(to_json(object));
+  return {{"ok", true},
+          {"stream", stream->number()},
+          {"time_s", seen.stamp.s()},
+          {"executed", seen.executed},
+          {"enough_s", to_s(seen.enough)},
+          {"position", list_of(seen.position)},
+          {"speed", list_of(seen.speed)},
+          {"objects", std::move(objects)}};
+}
+
+Json Desk::take(const gate::Asked& asked, Time now) {
+  task::ChunkStream* const stream = stream_();
+  if (stream == nullptr) return gate::refusal(kNoStream);
+  if (stream->number() != asked.stream)
+    return gate::refusal({fmt::format("stream {} has ended; {} goes on", asked.stream, stream->number()),
+                          "chunk_stream", "observe anew"});
+  if (const auto policy = stream->arguments().at("policy").get<std::string>(); policy != skills::kOutside)
+    return gate::refusal({fmt::format("the stream follows the policy {}", policy), "chunk_stream",
+                          "only one with the policy outside takes chunks from here"});
+  if (auto taken = stream->take(asked.chunk, now); !taken) return gate::refusal(taken.error());
+  return {{"ok", true}, {"executed", stream->observe(now).executed}};
+}
 
 void Desk::attend(Time now) {
   for (const gate::Request& request : socket_->poll()) request.reply(answer(request.text, now));
@@ -26,6 +81,10 @@ Json Desk::answer(const std::string& text, Time now) {
       return list();
     case gate::Operation::kShow:
       return show(asked->task);
+    case gate::Operation::kObserve:
+      return observe(now);
+    case gate::Operation::kChunk:
+      return take(*asked, now);
     case gate::Operation::kRobot:
     case gate::Operation::kStop:
     case gate::Operation::kEmergencyStop:

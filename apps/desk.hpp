@@ -1,6 +1,7 @@
 // Where visitors are answered: requests from the local socket meet bridge, journal and arm.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -9,14 +10,17 @@
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/task/policy.hpp"
 
 namespace pons::apps {
 
 class Desk {
  public:
+  // The stream of chunks that goes on, or null.
+  using Stream = std::function<task::ChunkStream*()>;
   // All but the socket must outlive it.
   Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
-       runner::Arming& arming);
+       runner::Arming& arming, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Never waits.
   void attend(Time now);
 
@@ -26,11 +30,14 @@ class Desk {
   [[nodiscard]] bridge::Json list() const;
   [[nodiscard]] bridge::Json show(const std::string& id) const;
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
+  [[nodiscard]] bridge::Json observe(Time now) const;
+  [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
 
   std::unique_ptr<gate::LocalSocket> socket_;
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
   runner::Arming& arming_;
+  Stream stream_;
 };
 
 }  // namespace pons::apps

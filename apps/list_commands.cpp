@@ -4,6 +4,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/paths.hpp"
+#include "apps/policies.hpp"
 #include "pons/link/link.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/skills.hpp"
@@ -45,9 +46,9 @@ int skills(const std::string& name, const std::string& world_name) {
   link::BridgeEnd end(*link);
   skills::Cell cell(end, *world, std::move(*model));
   task::SkillRegistry registry;
-  skills::add_skills(registry, cell);
+  skills::add_skills(registry, cell, policy_names());
   if (name.empty()) {
-    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<10} {}\n", skill_name, type.summary);
+    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<13} {}\n", skill_name, type.summary);
     return kExitGood;
   }
   const task::SkillType* type = registry.find(name);

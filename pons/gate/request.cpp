@@ -1,8 +1,12 @@
 #include "pons/gate/request.hpp"
 
+#include <fmt/format.h>
+
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "pons/task/json_text.hpp"
 #include "pons/task/schema.hpp"
@@ -16,9 +20,14 @@ using task::Schema;
 constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
-    "op": {"enum": ["submit", "list", "show", "robot", "stop", "emergency_stop", "reset", "arm"]},
+    "op": {"enum": ["submit", "list", "show", "observe", "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
-    "id": {"type": "string", "minLength": 1, "maxLength": 64}
+    "id": {"type": "string", "minLength": 1, "maxLength": 64},
+    "stream": {"type": "integer", "minimum": 0, "maximum": 1000000000},
+    "observed": {"type": "integer", "minimum": 0, "maximum": 1000000000},
+    "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
+    "actions": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
+    "last": {"type": "boolean"}
   }
 })";
 
@@ -34,6 +43,42 @@ const Schema& schema() {
   return compiled;
 }
 
+// Which operation each member belongs to; all but "last" are needed there.
+constexpr std::array<std::pair<const char*, std::string_view>, 7> kMembers{{{"task", "submit"},
+                                                                            {"id", "show"},
+                                                                            {"stream", "chunk"},
+                                                                            {"observed", "chunk"},
+                                                                            {"period_ms", "chunk"},
+                                                                            {"actions", "chunk"},
+                                                                            {"last", "chunk"}}};
+constexpr std::string_view kOptional = "last";
+
+Expected<void> check_members(const Json& json, std::string_view operation) {
+  for (const auto& [member, belongs_to] : kMembers) {
+    const bool belongs = operation == belongs_to, needed = belongs && member != kOptional;
+    if (json.contains(member) ? belongs : !needed) continue;
+    return fail(fmt::format("'{}' {}", member, needed ? "is missing" : "does not belong there"),
+                fmt::format("/{}", member), fmt::format("give it with {}, only", belongs_to));
+  }
+  return {};
+}
+
+Expected<Asked> chunk_from(const Json& json) {
+  Asked asked{.operation = Operation::kChunk, .stream = json.at("stream").get<std::uint64_t>()};
+  asked.chunk.observed = json.at("observed").get<std::int64_t>();
+  asked.chunk.period = from_s(1e-3 * json.at("period_ms").get<double>());
+  asked.chunk.last = json.value("last", false);
+  for (const Json& values : json.at("actions")) {
+    if (values.size() > kMaxAxes)
+      return fail(fmt::format("action {} has {} axes", asked.chunk.actions.size(), values.size()), "chunk_size",
+                  "give one value an axis of the robot");
+    AxisVector& action = asked.chunk.actions.emplace_back(static_cast<Eigen::Index>(values.size()));
+    for (std::size_t axis = 0; axis < values.size(); ++axis)
+      action[static_cast<Eigen::Index>(axis)] = values[axis].get<double>();
+  }
+  return asked;
+}
+
 }  // namespace
 
 Expected<Asked> asked_from(std::string_view text) {
@@ -41,16 +86,11 @@ Expected<Asked> asked_from(std::string_view text) {
   if (!json) return std::unexpected(json.error());
   if (auto fits = schema().check(*json); !fits) return std::unexpected(fits.error());
   const auto operation = json->at("op").get<std::string>();
-  const bool submit = operation == "submit", show = operation == "show";
-  if (json->contains("task") != submit) {
-    return fail(submit ? "'task' is missing" : "'task' does not belong there", "/task", "give it with submit, only");
-  }
-  if (json->contains("id") != show) {
-    return fail(show ? "'id' is missing" : "'id' does not belong there", "/id", "give it with show, only");
-  }
-  if (submit) return Asked{Operation::kSubmit, json->at("task").dump()};
-  if (show) return Asked{Operation::kShow, json->at("id").get<std::string>()};
-  return Asked{kBare.at(operation), {}};
+  if (auto good = check_members(*json, operation); !good) return std::unexpected(good.error());
+  if (operation == "submit") return Asked{.operation = Operation::kSubmit, .task = json->at("task").dump()};
+  if (operation == "show") return Asked{.operation = Operation::kShow, .task = json->at("id").get<std::string>()};
+  if (operation == "chunk") return chunk_from(*json);
+  return Asked{.operation = kBare.at(operation)};
 }
 
 Json refusal(const Error& error) { return {{"ok", false}, {"error", error.line()}}; }

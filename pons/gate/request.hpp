@@ -2,28 +2,48 @@
 //   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already"}
 //   {"op":"list"}                → {"ok":true,"tasks":[…]}
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
+//   {"op":"observe"}             → {"ok":true,"stream":1,"time_s":…,"executed":…,"enough_s":…,"position":[…],
+//                                   "speed":[…],"objects":[…]}
+//   {"op":"chunk","stream":1,"observed":…,"period_ms":…,"actions":[[…],…],"last":false}
+//                                → {"ok":true,"executed":…}
 //   {"op":"robot"}               → {"ok":true,"robot":{"state":…,"cause":…,"standstill":…,"epoch":…,"needs":…}}
-//   {"op":"stop"}, {"op":"emergency_stop"}, {"op":"reset"}, {"op":"arm"}: a person's words to the arm; answered like
-//   robot anything wrong               → {"ok":false,"error":"…"}
+//   {"op":"stop"} and emergency_stop, reset, arm, a person's words to the arm, are answered like robot
+//   anything wrong               → {"ok":false,"error":"…"}
+// observe and chunk are of a stream that a task with the skill follow_policy has opened.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
 
+#include "pons/core/chunk.hpp"
 #include "pons/core/error.hpp"
 #include "pons/task/task.hpp"
 
 namespace pons::gate {
 
-enum class Operation : std::uint8_t { kSubmit, kList, kShow, kRobot, kStop, kEmergencyStop, kReset, kArm };
+enum class Operation : std::uint8_t {
+  kSubmit,
+  kList,
+  kShow,
+  kObserve,
+  kChunk,
+  kRobot,
+  kStop,
+  kEmergencyStop,
+  kReset,
+  kArm
+};
 
 struct Asked {
   Operation operation = Operation::kList;
-  std::string task;  // kSubmit: the task's JSON text; kShow: the id
+  std::string task;          // kSubmit: the task's JSON text; kShow: the id
+  std::uint64_t stream = 0;  // kChunk
+  Chunk chunk;               // kChunk; finite, and otherwise as it came
 };
 
-// Hostile text to a question: bounded, no unknown operation, no unknown member.
+// Hostile text to a question: bounded, no unknown operation, no unknown member. Error chunk_size (by `where`): an
+// action of more axes than any robot has.
 [[nodiscard]] Expected<Asked> asked_from(std::string_view text);
 
 [[nodiscard]] task::Json refusal(const Error& error);

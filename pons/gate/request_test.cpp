@@ -5,7 +5,7 @@
 namespace pons::gate {
 namespace {
 
-TEST(AskedFrom, ReadsWhatMayBeAsked) {
+TEST(AskedFrom, ReadsEachQuestion) {
   const auto submit = asked_from(R"({"op":"submit","task":{"id":"a","steps":[]}})");
   ASSERT_TRUE(submit) << submit.error().line();
   EXPECT_EQ(submit->operation, Operation::kSubmit);
@@ -19,13 +19,48 @@ TEST(AskedFrom, ReadsWhatMayBeAsked) {
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);
   EXPECT_EQ(asked_from(R"({"op":"reset"})")->operation, Operation::kReset);
   EXPECT_EQ(asked_from(R"({"op":"arm"})")->operation, Operation::kArm);
+  EXPECT_EQ(asked_from(R"({"op":"observe"})")->operation, Operation::kObserve);
+}
+
+TEST(AskedFrom, ReadsAChunk) {
+  const auto asked =
+      asked_from(R"({"op":"chunk","stream":3,"observed":17,"period_ms":50,"actions":[[0,0.5],[1,-2]],"last":true})");
+  ASSERT_TRUE(asked) << asked.error().line();
+  EXPECT_EQ(asked->operation, Operation::kChunk);
+  EXPECT_EQ(asked->stream, 3u);
+  EXPECT_EQ(asked->chunk.observed, 17);
+  EXPECT_EQ(asked->chunk.period, std::chrono::milliseconds(50));
+  ASSERT_EQ(asked->chunk.actions.size(), 2u);
+  EXPECT_EQ(asked->chunk.actions[1], Eigen::Vector2d(1, -2));
+  EXPECT_TRUE(asked->chunk.last);
+  const auto large =
+      asked_from(R"({"op":"chunk","stream":3,"observed":0,"period_ms":50,"actions":[[0,0,0,0,0,0,0,0,0]]})");
+  ASSERT_FALSE(large);
+  EXPECT_EQ(large.error().where, "chunk_size");
 }
 
 TEST(AskedFrom, RefusesEverythingElse) {
-  for (const char* text :
-       {"", "{}", "[]", "null", R"({"op":"halt"})", R"({"op":"submit"})", R"({"op":"submit","task":1})",
-        R"({"op":"list","id":"a"})", R"({"op":"stop","id":"a"})", R"({"op":"show"})", R"({"op":"show","id":""})",
-        R"({"op":"show","id":"a","task":{}})", R"({"op":"list","op":"show"})", R"({"op":"list"} x)"}) {
+  for (const char* text : {"",
+                           "{}",
+                           "[]",
+                           "null",
+                           R"({"op":"halt"})",
+                           R"({"op":"submit"})",
+                           R"({"op":"submit","task":1})",
+                           R"({"op":"list","id":"a"})",
+                           R"({"op":"stop","id":"a"})",
+                           R"({"op":"show"})",
+                           R"({"op":"show","id":""})",
+                           R"({"op":"show","id":"a","task":{}})",
+                           R"({"op":"chunk"})",
+                           R"({"op":"observe","stream":1})",
+                           R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[[null]]})",
+                           R"({"op":"chunk","stream":1,"observed":0.5,"period_ms":50,"actions":[[0]]})",
+                           R"({"op":"chunk","stream":1,"observed":-1,"period_ms":50,"actions":[[0]]})",
+                           R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[[1e999]]})",
+                           R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[0]})",
+                           R"({"op":"list","op":"show"})",
+                           R"({"op":"list"} x)"}) {
     const auto asked = asked_from(text);
     ASSERT_FALSE(asked) << text;
     EXPECT_EQ(refusal(asked.error()).at("ok"), false);

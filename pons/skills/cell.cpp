@@ -143,11 +143,17 @@ void Cell::keep_clear(Time now) {
   }
 }
 
-AxisLimits Cell::limits_empty() const {
+AxisLimits Cell::limits_planned() const {
   AxisLimits limits = world.robot.limits;
-  limits.speed_rad_s *= kPlanShare * arm.speed_share();
+  limits.speed_rad_s *= kPlanShare;
   limits.acceleration_rad_s2 *= kPlanShare;
   limits.jerk_rad_s3 *= kPlanShare;
+  return limits;
+}
+
+AxisLimits Cell::limits_empty() const {
+  AxisLimits limits = limits_planned();
+  limits.speed_rad_s = world.robot.limits.speed_rad_s * (kPlanShare * arm.speed_share());
   return limits;
 }
 

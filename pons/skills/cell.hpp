@@ -13,6 +13,7 @@
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
 #include "pons/skills/route.hpp"
+#include "pons/task/policy.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::skills {
@@ -64,8 +65,9 @@ class Cell {
   // How far the axis that turns most must turn, rad; far more when an axis would end so near its position limit that
   // the next small motion needs a whole turn back.
   [[nodiscard]] double effort(const AxisVector& from, const AxisVector& to) const;
-  // Limits the arm keeps with the cups empty: planned a little inside those that the cerebellum enforces, and as slow
-  // as zones want it.
+  // A little inside those that the cerebellum enforces.
+  [[nodiscard]] AxisLimits limits_planned() const;
+  // Likewise, and as slow as zones want it: what the arm keeps with the cups empty.
   [[nodiscard]] AxisLimits limits_empty() const;
   // Where a carry shall end, joints, given those it starts from.
   using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;
@@ -84,6 +86,8 @@ class Cell {
   Router router;
   std::optional<Held> held;
   std::optional<Miss> missed;
+  task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does
+  std::uint64_t streams = 0;            // there were so far
 
  private:
   [[nodiscard]] AxisLimits limits_loaded(double share) const;

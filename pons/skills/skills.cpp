@@ -1,6 +1,7 @@
 #include "pons/skills/skills.hpp"
 
 #include "pons/skills/detect.hpp"
+#include "pons/skills/follow_policy.hpp"
 #include "pons/skills/move_to.hpp"
 #include "pons/skills/pick.hpp"
 #include "pons/skills/place.hpp"
@@ -9,8 +10,9 @@
 
 namespace pons::skills {
 
-void add_skills(task::SkillRegistry& registry, Cell& cell) {
+void add_skills(task::SkillRegistry& registry, Cell& cell, const std::vector<std::string>& policies) {
   registry.add(detect(cell));
+  registry.add(follow_policy(cell, policies));
   registry.add(move_to(cell));
   registry.add(pick(cell));
   registry.add(place(cell));

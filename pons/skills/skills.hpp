@@ -1,12 +1,16 @@
 // The skills that Pons brings along.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "pons/skills/cell.hpp"
 #include "pons/task/skill.hpp"
 
 namespace pons::skills {
 
-// Adds detect, move_to, pick, place, press and yield. `cell` must outlive the registry.
-void add_skills(task::SkillRegistry& registry, Cell& cell);
+// Adds detect, follow_policy, move_to, pick, place, press and yield. `cell` must outlive the registry;
+// `policies` are the names of those that can be followed.
+void add_skills(task::SkillRegistry& registry, Cell& cell, const std::vector<std::string>& policies);
 
 }  // namespace pons::skills

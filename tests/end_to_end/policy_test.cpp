@@ -1,0 +1,296 @@
+// A policy moves the arm of the small cell, seven axes and every real part: it is late, its chunks overlap, and what it
+// looks at moves.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "apps/assembly.hpp"
+#include "pons/sim/truth.hpp"
+
+namespace pons::tests {
+namespace {
+
+using task::Json;
+
+class PolicyRun {
+ public:
+  explicit PolicyRun(const std::string& name = "small_cell", std::vector<sim::Visit> visits = {})
+      : world(world::load("worlds", name).value()),
+        cell(apps::Assembly::build(world, world::draw_manifest(world, 1, 1).value(),
+                                   {.journal = ":memory:", .body = {.visits = std::move(visits)}})
+                 .value()) {}
+
+  // What happens between control steps, each bridge period.
+  using Meanwhile = std::function<void(Time)>;
+
+  // Runs in lockstep until the task has its outcome.
+  void follow(const Json& arguments, const Meanwhile& meanwhile = {}) {
+    const Json task{
+        {"id", "follow"}, {"priority", 100}, {"steps", {{{"skill", "follow_policy"}, {"arguments", arguments}}}}};
+    const auto admitted = cell->above->bridge->submit(task.dump(), Time{});
+    ASSERT_TRUE(admitted) << admitted.error().line();
+    runner::Parts parts = cell->parts();
+    body::Sensors sensors;
+    body::SetPoints set_points;
+    for (now = Time(runner::kControlPeriod); now < Time(from_s(60)); now += runner::kControlPeriod) {
+      parts.body.plant.advance(now);
+      parts.body.plant.body->read(sensors);
+      parts.body.photographer->open_shutters(now, sensors);
+      cell->body->cerebellum->step(now, sensors, *parts.body.link, set_points);
+      parts.body.plant.body->write(set_points);
+      if (now.ns() % runner::kBridgePeriod.count() != 0) continue;
+      const auto ticked = parts.bridge_side->tick(now, *parts.observer);
+      ASSERT_TRUE(ticked) << ticked.error().line();
+      look();
+      if (meanwhile) meanwhile(now);
+      const auto history = cell->above->journal->task("follow");
+      ASSERT_TRUE(history && *history);
+      if (!(*history)->record.outcome) continue;
+      outcome = (*history)->record.outcome->outcome;
+      reason = (*history)->record.outcome->reason;
+      const Json& steps = (*history)->record.outcome->detail.at("steps");
+      if (!steps.empty()) detail = steps.at(0).at("detail");
+      return;
+    }
+    FAIL() << "it does not end";
+  }
+
+  [[nodiscard]] std::int64_t told(const char* name) const { return detail.at(name).get<std::int64_t>(); }
+  void expect_no_limit_broken() const {
+    EXPECT_EQ(cell->body->cerebellum->statistics().violations, 0u);
+    EXPECT_EQ(cell->body->cerebellum->statistics().refused, 0u);
+  }
+
+  world::World world;
+  std::unique_ptr<apps::Assembly> cell;
+  Time now;
+  Json detail;
+  task::Outcome outcome = task::Outcome::kCancelled;
+  std::string reason;
+  int over_it = 0;            // bridge periods with the parcel in the middle of the pick zone
+  double worst_off_m = 0;     // of the tool from the parcel's middle then, along the belt and across
+  double worst_height_m = 0;  // of its height over the parcel, from the one asked for
+
+ private:
+  // By the simulator's own truth.
+  void look() {
+    const auto top = sim::Truth(*cell->body->simulation).top(0);
+    if (!top || top->translation().x() < 0 || top->translation().x() > world.belt.pick_x_max_m - 0.05) return;
+    const Vector3 tip = cell->above->cell->model.world_from_tip(cell->body->cerebellum->state().position).translation();
+    ++over_it;
+    worst_off_m = std::max(worst_off_m, (tip - top->translation()).head<2>().norm());
+    worst_height_m = std::max(worst_height_m, std::abs(tip.z() - top->translation().z() - 0.20));
+  }
+};
+
+class PolicyAtDelay : public testing::TestWithParam<int> {};
+
+TEST_P(PolicyAtDelay, KeepsTheToolOverAParcelThatRidesBy) {
+  PolicyRun run;
+  run.follow({{"policy", "hover"},
+              {"seconds", 16},
+              {"height_m", 0.20},
+              {"rate_hz", 5},
+              {"latency_s", 1e-3 * GetParam()},
+              {"first_latency_s", 1.5}});
+  ASSERT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason << run.detail.dump();
+  std::printf("delay %d ms: %s; over the parcel for %.2f s, at most %.1f mm beside it and %.1f mm off its height\n",
+              GetParam(), run.detail.dump().c_str(), 0.01 * run.over_it, 1e3 * run.worst_off_m,
+              1e3 * run.worst_height_m);
+  EXPECT_EQ(run.told("starved_ticks"), 0);
+  EXPECT_EQ(run.told("refused"), 0);
+  EXPECT_GE(run.told("chunks"), 75);
+  EXPECT_GE(run.told("executed"), 310);
+  EXPECT_GE(run.over_it, 150);
+  EXPECT_LT(run.worst_off_m, 0.02);
+  EXPECT_LT(run.worst_height_m, 0.01);
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+  run.expect_no_limit_broken();
+}
+INSTANTIATE_TEST_SUITE_P(Delays, PolicyAtDelay, testing::Values(0, 100, 200, 300));
+
+// With chunks of 1 s. Asked but once in five seconds, it is asked all the same when its motion would run out.
+TEST(Policy, StarvesWhereItIsTooLateAndGoesOnWhenMoreComes) {
+  struct Case {
+    double latency_s, rate_hz;
+    int least, most;  // starved ticks
+  };
+  for (const auto& [latency_s, rate_hz, least, most] :
+       {Case{0.3, 0.2, 0, 1000}, {0.6, 5, 100, 4000}, {0.9, 5, 4000, 13000}, {1.5, 5, 4000, 13000}}) {
+    PolicyRun run;
+    run.follow({{"policy", "hover"},
+                {"seconds", 14},
+                {"rate_hz", rate_hz},
+                {"latency_s", latency_s},
+                {"first_latency_s", 1.5}});
+    ASSERT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+    std::printf("delay %.1f s, %.1f a second: %s\n", latency_s, rate_hz, run.detail.dump().c_str());
+    EXPECT_GE(run.told("starved_ticks"), least);
+    EXPECT_LE(run.told("starved_ticks"), most);
+    EXPECT_GE(run.told("executed"), 100);
+    EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+    run.expect_no_limit_broken();
+  }
+}
+
+// ---- chunks from outside ----
+
+// All axes to what home is and `by` more, in `count` actions.
+Chunk chunk_of(const PolicyRun& run, std::int64_t observed, std::size_t count, double by) {
+  Chunk chunk{.observed = observed, .period = std::chrono::milliseconds(50)};
+  for (std::size_t j = 1; j <= count; ++j)
+    chunk.actions.push_back(run.world.robot.home.array() + by * static_cast<double>(j) / static_cast<double>(count));
+  return chunk;
+}
+
+TEST(Policy, ThatIsOutsideSendsItsChunksAndItsLast) {
+  PolicyRun run;
+  bool sent = false;
+  run.follow({{"policy", "outside"}, {"seconds", 30}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || sent || now < Time(from_s(1))) return;
+    Chunk chunk = chunk_of(run, stream->observe(now).executed, 20, 0.1);
+    chunk.last = true;
+    const auto taken = stream->take(chunk, now);
+    ASSERT_TRUE(taken) << taken.error().line();
+    sent = true;
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+  EXPECT_EQ(run.told("executed"), 20);
+  EXPECT_EQ(run.told("starved_ticks"), 0);
+  EXPECT_LT(run.now, Time(from_s(5)));
+  const AxisVector end = run.world.robot.home.array() + 0.1;
+  EXPECT_TRUE(run.cell->body->cerebellum->state().commanded.position.isApprox(end, 1e-9));
+  run.expect_no_limit_broken();
+}
+
+// To and fro fifty times a second, for four seconds: the limits allow a seventh of that pace.
+TEST(Policy, WhoseLastChunkIsTooRoughToBeQueuedWholeIsNotSaidToHaveSucceeded) {
+  PolicyRun run;
+  bool sent = false;
+  run.follow({{"policy", "outside"}, {"seconds", 30}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || sent || now < Time(from_s(1))) return;
+    Chunk chunk = chunk_of(run, 0, 200, 0);
+    chunk.period = std::chrono::milliseconds(20);
+    for (std::size_t j = 0; j < chunk.actions.size(); ++j) chunk.actions[j].array() += j % 2 == 0 ? 0.05 : -0.05;
+    chunk.last = true;
+    const auto taken = stream->take(chunk, now);
+    ASSERT_TRUE(taken) << taken.error().line();
+    sent = true;
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kFailed);
+  EXPECT_EQ(run.reason, "the limits make the last chunk too slow to be queued whole");
+  EXPECT_GE(run.told("executed"), 3);
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+  run.expect_no_limit_broken();
+}
+
+TEST(Policy, WhoseChunksAreRefusedDoesNotMoveTheArm) {
+  PolicyRun run;
+  std::vector<std::string> named;
+  run.follow({{"policy", "outside"}, {"seconds", 30}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || now < Time(from_s(1)) || !named.empty()) return;
+    const auto name_of = [&](const Chunk& chunk) {
+      const auto taken = stream->take(chunk, now);
+      named.push_back(taken ? "taken" : taken.error().where);
+    };
+    name_of(chunk_of(run, 1, 20, 0.1));
+    Chunk chunk = chunk_of(run, 0, 20, 0.1);
+    chunk.actions[7].conservativeResize(6);
+    name_of(chunk);
+    chunk = chunk_of(run, 0, 20, 9);
+    name_of(chunk);
+    // Down into the belt.
+    chunk = chunk_of(run, 0, 20, 0);
+    for (AxisVector& action : chunk.actions) action[1] += 0.6;
+    name_of(chunk);
+  });
+  EXPECT_EQ(named, (std::vector<std::string>{"chunk_future", "chunk_size", "chunk_position", "chunk_not_clear"}));
+  EXPECT_EQ(run.outcome, task::Outcome::kFailed);
+  EXPECT_EQ(run.reason, "no chunk came for 10 s");
+  EXPECT_EQ(run.told("refused"), 4);
+  EXPECT_LT(run.cell->body->cerebellum->statistics().commanded.speed, 1e-12);
+  run.expect_no_limit_broken();
+}
+
+// While somebody is near, the arm is slow; so it executes fewer actions than the clock would have it, and each in its
+// place.
+TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
+  PolicyRun run("parcel_cell", {{.zone = 0, .from = Time(from_s(4)), .stays = from_s(4)}});
+  const auto sway = [](std::int64_t executed) {
+    return 0.3 * (1 - std::cos(4 * 0.05 * static_cast<double>(executed)));
+  };
+  double off = 0;
+  run.follow({{"policy", "outside"}, {"seconds", 10}}, [&](Time now) {
+    task::ChunkStream* const stream = run.cell->above->cell->stream;
+    if (stream == nullptr || now < Time(from_s(1))) return;
+    const std::int64_t executed = stream->observe(now).executed;
+    const double at = run.cell->body->cerebellum->state().commanded.position[0] - run.world.robot.home[0];
+    const auto [least, most] =
+        std::minmax({sway(executed - 1), sway(executed), sway(executed + 1), sway(executed + 2)});
+    off = std::max({off, least - at, at - most});
+    if (now.ns() % std::chrono::nanoseconds(std::chrono::milliseconds(200)).count() != 0) return;
+    Chunk chunk{.observed = executed, .period = std::chrono::milliseconds(50)};
+    for (std::int64_t j = 1; j <= 20; ++j) {
+      chunk.actions.push_back(run.world.robot.home);
+      chunk.actions.back()[0] += sway(executed + j);
+    }
+    const auto taken = stream->take(chunk, now);
+    ASSERT_TRUE(taken || taken.error().where == "chunk_stopped") << taken.error().line();
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+  std::printf("slowed for 4 of 10 s: %s, at most %.4f rad out of place\n", run.detail.dump().c_str(), off);
+  EXPECT_LT(run.told("executed"), 190);
+  EXPECT_GT(run.told("executed"), 120);
+  EXPECT_EQ(run.told("starved_ticks"), 0);
+  EXPECT_LT(off, 0.01);
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+  run.expect_no_limit_broken();
+}
+
+// ---- stops ----
+
+TEST(Policy, GoesOnAfterAStopButNotWithWhatItSawBefore) {
+  PolicyRun run;
+  std::string stale;
+  run.follow({{"policy", "hover"}, {"seconds", 14}, {"latency_s", 0.3}}, [&](Time now) {
+    skills::Cell& cell = *run.cell->above->cell;
+    if (now == Time(from_s(10))) cell.arm.halt();
+    if (now == Time(from_s(12))) {
+      ASSERT_TRUE(cell.arm.operational());
+      const auto taken = cell.stream->take(chunk_of(run, 1, 200 / 4, 0.1), now);
+      stale = taken ? "taken" : taken.error().where;
+    }
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+  EXPECT_EQ(stale, "chunk_stale");
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 1u);
+  EXPECT_GE(run.told("executed"), 200);
+  EXPECT_GE(run.over_it, 20);
+  EXPECT_LT(run.worst_height_m, 0.2);
+  run.expect_no_limit_broken();
+}
+
+TEST(Policy, CancelledComesToRestAlongItsWay) {
+  PolicyRun run;
+  run.follow({{"policy", "hover"}, {"seconds", 30}}, [&](Time now) {
+    if (now == Time(from_s(11))) run.cell->above->bridge_side->stop(now, "test");
+  });
+  EXPECT_EQ(run.outcome, task::Outcome::kCancelled) << run.reason;
+  EXPECT_LT(run.now, Time(from_s(12.5)));
+  EXPECT_TRUE(run.cell->body->cerebellum->state().commanded.speed.isZero(1e-9));
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 0u);
+  run.expect_no_limit_broken();
+}
+
+}  // namespace
+}  // namespace pons::tests
