@@ -87,6 +87,24 @@ TEST_F(DispatcherTest, TheDeadlineIsLaterThanAnyBeltSpeedMayBring) {
   EXPECT_LT(deadline_s(3, 0.2, 0.35, "P3"), first_s);
 }
 
+TEST_F(DispatcherTest, TheBeltWaitsForWhatIsAskedForAndForNothingElse) {
+  const auto waits = [this](double x_m, double speed, const std::string& code) {
+    ObjectBelief belief = parcel(1, x_m, code);
+    belief.velocity_m_s.x() = speed;
+    return dispatcher_.observe({belief}, at(10)).belt_waits;
+  };
+  const double stops_m = 0.5 * 0.5 / (2 * world_.belt.ramp_m_s2);  // from full speed
+  EXPECT_FALSE(waits(1.2, 0.5, "P1"));
+  EXPECT_FALSE(waits(world_.belt.waits_at_m() - stops_m - 0.02, 0.5, "P1"));
+  EXPECT_TRUE(waits(world_.belt.waits_at_m() - stops_m + 0.01, 0.5, "P1"));
+  EXPECT_TRUE(waits(world_.belt.waits_at_m() + 0.001, 0, "P1")) << "and goes on waiting when it stands";
+  EXPECT_FALSE(waits(2.01, 0.5, "P1")) << "too late";
+  EXPECT_FALSE(waits(1.95, 0.5, "")) << "no label";
+  EXPECT_FALSE(waits(1.95, 0.5, "P9")) << "nobody's";
+  EXPECT_TRUE(dispatcher_.heard("P1", task::Outcome::kException));
+  EXPECT_FALSE(waits(1.95, 0.5, "P1")) << "given up";
+}
+
 TEST_F(DispatcherTest, ExpressGoesFirst) {
   const Decisions decisions = dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, 0, "P2")}, at(0));
   ASSERT_EQ(decisions.tasks.size(), 2u);

@@ -68,12 +68,18 @@ void Feeder::step(const Composed& cell, mjModel* model, mjData* data, Ledger& le
   const double length_m = arrivals_[next_].group_length_m;
   const double needed = front_m(length_m) - last_rear_m_ + last_gap_m_;
   if (belt.travel_m() - last_travel_m_ < needed) return;
-  if (waiting(cell, data, ledger) >= world_.arrivals.waiting) return;
+  if (!wanted(waiting(cell, data, ledger))) return;
   if (!room(cell, data, ledger, length_m)) return;
   last_gap_m_ = arrivals_[next_].gap_m;
   put_down(cell, model, data, ledger, labels, belt.speed_m_s(), now);
   last_travel_m_ = belt.travel_m();
   last_rear_m_ = front_m(length_m) - length_m;
+}
+
+// A group comes whole. One that would bring more than one too many waits until there are fewer.
+bool Feeder::wanted(int waiting) const {
+  const int most = world_.arrivals.waiting;
+  return waiting == 0 || (waiting < most && waiting + static_cast<int>(group_size()) <= most + 1);
 }
 
 std::size_t Feeder::group_size() const {

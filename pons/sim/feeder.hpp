@@ -54,6 +54,7 @@ class Feeder {
   [[nodiscard]] bool room(const Composed& cell, const mjData* data, const Ledger& ledger, double length_m) const;
   [[nodiscard]] int waiting(const Composed& cell, const mjData* data, const Ledger& ledger) const;
   [[nodiscard]] std::size_t group_size() const;
+  [[nodiscard]] bool wanted(int waiting) const;
   void put_down(const Composed& cell, mjModel* model, mjData* data, Ledger& ledger, LabelStore& labels,
                 double speed_m_s, Time now);
 

@@ -48,10 +48,11 @@ constexpr double kUnweighable = 2.0;  // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
-constexpr double kStops_m = 0.02;     // before where the belt waits, and so far before that it begins to stop
-constexpr double kAside_m = 0.30;     // over the belt
-constexpr double kWaitOver_m = 0.06;  // the others, which pass below
-constexpr double kWait_m = 0.15;      // over the parcels, where the arm waits for one to come
+constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
+constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
+constexpr double kAside_m = 0.30;      // over the belt
+constexpr double kWaitOver_m = 0.06;   // the others, which pass below
+constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
 
 class Pick final : public task::Skill {
  public:
@@ -151,7 +152,9 @@ class Pick final : public task::Skill {
     const AxisState state = cell_.arm.planned(from);
     const auto soonest = meet_straight(cell_, state, from, *object, std::nullopt);
     if (soonest && soonest->hover.x() + kWayRound_s * cell_.belt_speed_m_s() < belt.pick_x_min_m) return {};
-    if (soonest && comes_too_late(soonest->hover.x())) return {};
+    // Far beyond the zone there is no reaching it at all.
+    const double met_x = soonest ? soonest->hover.x() : cell_.predict(*object, from + from_s(kWayRound_s)).x();
+    if (comes_too_late(met_x)) return {};
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
     if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
@@ -170,7 +173,7 @@ class Pick final : public task::Skill {
 
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
   [[nodiscard]] bool comes_too_late(double x_m) const {
-    return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > 0;
+    return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > kStands_m_s;
   }
 
   // What would come along with it.

@@ -81,6 +81,11 @@ double highest_m(const ObjectBelief& object) {
          0.5 * std::abs(axes(2, 1)) * object.size_m.y();
 }
 
+// Tried in turn, the fastest clear one is taken: how far along the direct way the via points lie.
+const std::vector<std::vector<double>> kVias = {{0.5},      {0.0},      {1.0},        {0.0, 1.0}, {0.0, 0.5},
+                                                {0.15},     {0.3},      {0.7},        {0.85},     {0.15, 0.85},
+                                                {0.15, 0.5}, {0.3, 0.85}};
+
 }  // namespace
 
 AxisLimits covering(const AxisLimits& limits, const AxisState& start) {
@@ -238,7 +243,6 @@ Expected<motion::Trajectory> Router::over(const AxisState& start, Time at, const
   const double clearance = clearance_of(*direct);
   if (clearance >= 0 && detour_.keeps_off(*direct, load)) return direct;
 
-  const AxisVector middle = 0.5 * (start.position + end.position);
   double depth = 0;  // of the load's lowest point below the tip
   for (const Vector3& point : probes(load)) depth = std::max(depth, point.z());
   const double start_z = model_.world_from_tip(start.position).translation().z();
@@ -251,15 +255,16 @@ Expected<motion::Trajectory> Router::over(const AxisState& start, Time at, const
   for (const double extra : {0.02, 0.07, 0.14, 0.25}) {
     const double height =
         std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z)) + extra;
-    const auto over_start = raised(start.position, height);
-    const auto over_end = raised(end.position, height);
-    const auto over_middle = raised(middle, height);
     std::vector<std::vector<AxisVector>> ways;
-    if (over_middle) ways.push_back({*over_middle});
-    if (over_start) ways.push_back({*over_start});
-    if (over_end) ways.push_back({*over_end});
-    if (over_start && over_end) ways.push_back({*over_start, *over_end});
-    if (over_start && over_middle) ways.push_back({*over_start, *over_middle});
+    for (const auto& shares : kVias) {
+      std::vector<AxisVector> vias;
+      for (const double share : shares) {
+        const auto via = raised(start.position + share * (end.position - start.position), height);
+        if (!via) break;
+        vias.push_back(*via);
+      }
+      if (vias.size() == shares.size()) ways.push_back(std::move(vias));
+    }
     Expected<motion::Trajectory> best = std::unexpected(reason);
     for (const auto& vias : ways) {
       auto candidate = motion::move_through(start, at, vias, end, limits);

@@ -25,6 +25,25 @@ TEST(Sorting, ThirtyParcelsAreSortedOrExceptedAndAccountedFor) {
   for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
 }
 
+// Parcels come faster than any arm could take them; none rides by for that.
+TEST(Sorting, TheBeltWaitsForAnArmThatCannotKeepUp) {
+  const Folder folder;
+  const auto worlds = folder / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  std::string text = read_text(worlds / "parcel_cell" / "world.yaml");
+  const auto at = text.find("  waiting: ");
+  ASSERT_NE(at, std::string::npos);
+  write_text(worlds / "parcel_cell" / "world.yaml", text.replace(at, 12, "  waiting: 9"));
+  const Finished run = run_pons({"run", "parcel_cell", "--parcels", "40", "--seed", "1", "--quiet", "--explain",
+                                 "--report", folder / "report.json"},
+                                {"PONS_WORLDS=" + worlds.string()});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  expect_accounted_for(report);
+  EXPECT_EQ(run.out.find("rode past"), std::string::npos) << run.out;
+  EXPECT_LE(report["parcels"]["exceptions"]["undeserved"], 2) << run.out;
+}
+
 // Of every kind, with sides drawn evenly up to 0.40 m: also what hardly passes a mouth, and what does not.
 TEST(Sorting, ParcelsOfAnySizeAreSortedOrLetRide) {
   const Folder folder;
