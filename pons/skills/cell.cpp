@@ -19,7 +19,7 @@ constexpr double kPlanShare = 0.97;
 constexpr double kLoadedSpeedShare = 0.92;
 // Of what the cups hold, how much a planned motion may use up: a load on bellows swings to about twice, at a reversal
 // thrice, what it would take were it rigid.
-constexpr double kGripShare = 0.35;
+constexpr double kGripShare = 0.40;
 constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
 constexpr double kSlowestShare = 0.10;
 constexpr double kBoldest = 0.5, kTimid = 0.9;  // of one correction

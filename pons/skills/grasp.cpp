@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "pons/skills/grip.hpp"
+
 namespace pons::skills {
 namespace {
 
@@ -28,7 +30,10 @@ constexpr double kOneSided = 0.3;      // of the sum of unit vectors
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
 constexpr double kThinnest_m = 0.005;  // of what is carried
 constexpr double kSlower = 1.25;
-constexpr double kRideLifted_s = 0.8;  // with the belt, to be weighed
+constexpr double kEmptyTorqueShare = 0.96, kBoldest = 0.7;  // of the drives' torques; of one correction
+constexpr double kGentle = 0.3;           // of the acceleration limits, for what is lifted in another way
+constexpr double kGainsMost_m_s2 = 0.15;  // of a belt whose speed wanders
+constexpr double kRideLifted_s = 0.8;     // with the belt, to be weighed
 
 void append(motion::Trajectory& to, const motion::Trajectory& from) { to.insert(to.end(), from.begin(), from.end()); }
 
@@ -75,6 +80,17 @@ std::function<Vector3(double)> least_jerk(const std::array<Vector3, 3>& start, c
   const Vector3 c4 = (-15 * way + 8 * d * v + 1.5 * d * d * a) / (d * d * d * d);
   const Vector3 c5 = (6 * way - 3 * d * v - 0.5 * d * d * a) / (d * d * d * d * d);
   return [=](double t) -> Vector3 { return p + t * (v + t * (0.5 * a + t * (c3 + t * (c4 + t * c5)))); };
+}
+
+// Where an axis is so near its limit that the arm cannot go with the belt: up as seen from the floor.
+Expected<Lift> straight_up(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
+                           const Vector3& offset) {
+  AxisLimits limits = cell.limits_empty();
+  limits.acceleration_rad_s2 *= kGentle;
+  auto up = nudge(cell, start, at, orientation, offset, Vector3::Zero(), limits);
+  if (!up) return std::unexpected(up.error());
+  const Time end = up->back().end();
+  return Lift{std::move(*up), end, end};
 }
 
 }  // namespace
@@ -159,7 +175,9 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
                     const Vector3& offset, double peak_m_s2) {
   // Seen from the belt, as it runs and changes speed now, the way is straight: what touches the load is neither pushed
   // nor left to push.
-  const Vector3 belt = belt_velocity(cell), gains = Vector3(cell.belt_acceleration_m_s2(), 0, 0);
+  // A belt that starts or stops gains more than the arm could take up or leave at a stroke: that much goes uncopied.
+  const double gains_m_s2 = std::clamp(cell.belt_acceleration_m_s2(), -kGainsMost_m_s2, kGainsMost_m_s2);
+  const Vector3 belt = belt_velocity(cell), gains(gains_m_s2, 0, 0);
   std::array<Vector3, 3> from = tip_motion(cell, start);
   from[1] -= belt;
   from[2] -= gains;
@@ -179,7 +197,7 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
     };
     way = motion::follow(start, at, path, takes_s + rides_s, kKnot_s, cell.limits_empty());
   }
-  if (!way) return std::unexpected(way.error());
+  if (!way) return straight_up(cell, start, at, orientation, offset);
   // Whoever takes over does so before that.
   AxisState riding = start;
   const Time end = way->back().end();
@@ -216,7 +234,7 @@ Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, con
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                            const std::optional<Eigen::Matrix3d>& orientation) {
-  const AxisLimits limits = cell.limits_empty();
+  AxisLimits limits = cell.limits_empty();
   // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. They begin with the
   // straight way: where the parcel will not be by then, another may.
   const auto straight = meet_straight(cell, start, at, object, orientation);
@@ -239,7 +257,10 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
       continue;
     }
     const double needed_s = to_s(way->back().end() - at);
-    const bool converged = std::abs(needed_s - ahead_s) < kConverged_s;
+    // An arm without a load, too, may be asked for more than its drives have: folded out, all axes at once.
+    const double use = torque_use(cell.model, cell.world.robot, Load{}, 0, *way) / kEmptyTorqueShare;
+    if (use > 1) limits.acceleration_rad_s2 *= std::max(kBoldest, 1 / use);
+    const bool converged = use <= 1 && std::abs(needed_s - ahead_s) < kConverged_s;
     ahead_s = needed_s;
     if (converged) break;
   }
