@@ -33,9 +33,13 @@ constexpr std::string_view kSchema = R"({
 
 // Those with nothing beside their name.
 const std::map<std::string, Operation, std::less<>> kBare = {
-    {"list", Operation::kList},   {"robot", Operation::kRobot},
-    {"stop", Operation::kStop},   {"emergency_stop", Operation::kEmergencyStop},
-    {"reset", Operation::kReset}, {"arm", Operation::kArm},
+    {"list", Operation::kList},
+    {"observe", Operation::kObserve},
+    {"robot", Operation::kRobot},
+    {"stop", Operation::kStop},
+    {"emergency_stop", Operation::kEmergencyStop},
+    {"reset", Operation::kReset},
+    {"arm", Operation::kArm},
 };
 
 const Schema& schema() {

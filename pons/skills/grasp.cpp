@@ -1,5 +1,7 @@
 #include "pons/skills/grasp.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -82,6 +84,10 @@ std::function<Vector3(double)> least_jerk(const std::array<Vector3, 3>& start, c
   return [=](double t) -> Vector3 { return p + t * (v + t * (0.5 * a + t * (c3 + t * (c4 + t * c5)))); };
 }
 
+std::string name_of(const ObjectBelief& object) {
+  return object.code.empty() ? fmt::format("track {}", object.track) : object.code;
+}
+
 // Where an axis is so near its limit that the arm cannot go with the belt: up as seen from the floor.
 Expected<Lift> straight_up(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                            const Vector3& offset) {
@@ -143,6 +149,15 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   const auto q = cell.model.inverse(posed(from + offset, orientation), start.position);
   if (!q) return std::unexpected(q.error());
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
+}
+
+std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {
+  for (const ObjectBelief& other : cell.objects()) {
+    if (other.track == 0) continue;  // only an obstacle
+    if (lies_on(other, object)) return "covered by " + name_of(other);
+    if (is_part(other, object)) return "may be two: " + name_of(other);
+  }
+  return std::nullopt;
 }
 
 Vector3 lift_offset(const Cell& cell, const ObjectBelief& target) {

@@ -46,6 +46,9 @@ struct Meeting {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          const std::optional<Eigen::Matrix3d>& orientation);
 
+// What would come along with that object, and why; nothing if it lies by itself.
+[[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);
+
 // As seen from the belt: high enough that its underside clears whatever stands close to it, and a little away from
 // that. What touches a load would be dragged up by its flank.
 [[nodiscard]] Vector3 lift_offset(const Cell& cell, const ObjectBelief& target);

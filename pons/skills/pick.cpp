@@ -145,7 +145,7 @@ class Pick final : public task::Skill {
       step_aside(now);
       return {};
     }
-    if (const auto other = tied_to(*object)) return {Status::kFailed, *other, {}};
+    if (const auto other = tied_to(cell_, *object)) return {Status::kFailed, *other, {}};
     if (tried_ && now - *tried_ < kTryEvery) return {};
     tried_ = now;
     const Time from = cell_.arm.splice_time(now);
@@ -174,16 +174,6 @@ class Pick final : public task::Skill {
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
   [[nodiscard]] bool comes_too_late(double x_m) const {
     return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > kStands_m_s;
-  }
-
-  // What would come along with it.
-  [[nodiscard]] std::optional<std::string> tied_to(const ObjectBelief& object) const {
-    for (const ObjectBelief& other : cell_.objects()) {
-      if (other.track == 0) continue;  // only an obstacle
-      if (lies_on(other, object)) return "covered by " + name_of(other);
-      if (is_part(other, object)) return "may be two: " + name_of(other);
-    }
-    return std::nullopt;
   }
 
   // After a miss the parcel may have been pushed, and the arm hides it: until a camera has seen it again, its place is
@@ -284,7 +274,7 @@ class Pick final : public task::Skill {
     if (const ObjectBelief* object = cell_.find(code_)) {
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
       const double moved_m = off.head<2>().norm();
-      if (const auto other = tied_to(*object)) return give_up(now, *other);
+      if (const auto other = tied_to(cell_, *object)) return give_up(now, *other);
       if (now + kNoReplanBefore >= grasp_.hover) {
         // The cups would take hold of its neighbour, too.
         if (moved_m > kElsewhere_m) return give_up(now, "it lies elsewhere than it seemed to");
@@ -457,9 +447,6 @@ class Pick final : public task::Skill {
              {"seconds", to_s(now - started_)}}};
   }
 
-  static std::string name_of(const ObjectBelief& object) {
-    return object.code.empty() ? fmt::format("track {}", object.track) : object.code;
-  }
   static Eigen::Matrix3d quarter_turns(const ObjectBelief& object, int count) {
     const Vector3 up = object.world_from_top.linear().col(2);
     return Eigen::AngleAxisd(count * std::numbers::pi / 2, up).toRotationMatrix();
