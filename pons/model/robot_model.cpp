@@ -86,7 +86,7 @@ struct RobotModel::Impl {
     model.inertias[last_joint] = last_inertia;
     for (const auto& capsule : robot.capsules)
       capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
-    q = v = a = Eigen::VectorXd::Zero(model.nv);
+    q = v = a = placed_at = Eigen::VectorXd::Zero(model.nv);
     forget();
     inverse.emplace(chain());
   }
@@ -104,6 +104,7 @@ struct RobotModel::Impl {
         q(other.q),
         v(other.v),
         a(other.a),
+        placed_at(other.placed_at),
         inverse(other.inverse) {
     forget();
   }
@@ -135,7 +136,7 @@ struct RobotModel::Impl {
     pinocchio::computeJointJacobians(model, data, placed_at);
   }
   void forget() PONS_NONBLOCKING {
-    placed_at.setConstant(model.nv, std::numeric_limits<double>::quiet_NaN());
+    placed_at.setConstant(std::numeric_limits<double>::quiet_NaN());
     axes_placed = false;
   }
 
