@@ -134,6 +134,38 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
   expect_nothing_left();
 }
 
+// Who stopped the arm is waited for, whichever bridge was told.
+TEST_F(Processes, APersonsStopOutlivesTheBridgeThatWasTold) {
+  constexpr int kParcels = 3;
+  nlohmann::json robot;
+  const auto ask = [&](const char* word) {
+    const auto answer = gate::ask(folder_ / "s", {{"op", word}});
+    const bool heard = answer && answer->value("ok", false);
+    if (heard) robot = answer->at("robot");
+    return heard;
+  };
+  const auto is = [&](const char* state) { return ask("robot") && robot.at("state") == state; };
+  Running body_process(folder_.path(), "body", body(kParcels));
+  {
+    Running first(folder_.path(), "first", bridge(kParcels));
+    ASSERT_TRUE(eventually([&] { return is("operational"); })) << first.err();
+    EXPECT_TRUE(ask("stop"));
+    ASSERT_TRUE(eventually([&] { return is("protective stop"); })) << robot.dump();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait().code, -SIGKILL);
+  }
+  Running second(folder_.path(), "second", bridge(kParcels));
+  ASSERT_TRUE(eventually([&] { return ask("robot"); })) << second.err();
+  EXPECT_EQ(robot.at("needs"), "a person who resets it: pons robot reset");
+  EXPECT_TRUE(ask("reset"));
+  ASSERT_TRUE(eventually([&] { return is("disarmed"); })) << robot.dump();
+  EXPECT_EQ(robot.at("needs"), "a person who arms it: pons robot arm");
+  EXPECT_TRUE(ask("arm"));
+  EXPECT_EQ(second.wait().code, 0) << second.err();
+  EXPECT_EQ(body_process.wait().code, 0);
+  EXPECT_EQ(read_json(folder_ / "body.json")["parcels"]["lost"], 0);
+}
+
 TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   Running first_body(folder_.path(), "body", body(6));
   Running bridge_process(folder_.path(), "bridge", bridge(6));
