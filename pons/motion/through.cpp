@@ -1,7 +1,8 @@
 // Motion through via points. The positions are given; speed and acceleration there are chosen by descent on the total
 // time: each axis' piece has a fastest duration, a piece takes as long as its slowest axis, and a power sum instead of
 // the maximum tells the search what would become slowest next. Then axes that got too fast to wait for the slowest are
-// slowed down. A fixed number of steps: the same input, the same motion.
+// slowed down. The descent does not see that waiting, so what it began with is sometimes the shorter motion: both are
+// made. A fixed number of steps: the same input, the same motion.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,8 +44,16 @@ class Search {
     return result;
   }
 
-  void run() {
+  // Speeds as good as a look at the neighbours gives them. First.
+  void guess() {
     guess_speeds();
+    guessed_ = points_;
+    relax_all();
+  }
+  // Better ones, from the guess on.
+  void descend() {
+    points_ = guessed_;
+    refresh();
     double step = kFirstStep;
     for (int sweep = 0; sweep < kSweeps; ++sweep, step *= 0.5) {
       for (std::size_t k = 1; k + 1 < points_.size(); ++k) {
@@ -54,7 +63,13 @@ class Search {
         }
       }
     }
-    for (int round = 0; round < kRelaxations; ++round) relax();
+    relax_all();
+  }
+  // None: there is always a motion with a halt at every via point.
+  void halt() {
+    for (std::size_t k = 1; k + 1 < points_.size(); ++k) {
+      for (std::size_t i = 0; i < axes_; ++i) points_[k][i] = {points_[k][i].position, 0, 0};
+    }
   }
 
  private:
@@ -153,6 +168,9 @@ class Search {
     }
     return real;
   }
+  void relax_all() {
+    for (int round = 0; round < kRelaxations; ++round) relax();
+  }
   void relax() {
     for (std::size_t k = 0; k < pieces(); ++k) {
       const Times& times = times_[k];
@@ -184,8 +202,8 @@ class Search {
 
   std::size_t axes_;
   std::array<AxisBounds, kMaxAxes> bounds_{};
-  std::vector<Points> points_;  // start, vias, end
-  std::vector<Times> times_;    // each piece's and axis' fastest duration
+  std::vector<Points> points_, guessed_;  // start, vias, end
+  std::vector<Times> times_;              // each piece's and axis' fastest duration
 };
 
 // Among the durations in which a piece with acceleration at both ends seems possible there are a few in which it is
@@ -233,7 +251,7 @@ Expected<Trajectory> assemble(const Search& search, Time at, const AxisLimits& l
 }  // namespace
 
 Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<const AxisVector> vias,
-                                  const Waypoint& end, const AxisLimits& limits) {
+                                  const Waypoint& end, const AxisLimits& limits, Effort effort) {
   if (vias.empty()) return move(start, at, end, limits);
   if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
   if (auto ok = check_waypoint(end, "end", limits); !ok) return std::unexpected(ok.error());
@@ -243,11 +261,16 @@ Expected<Trajectory> move_through(const AxisState& start, Time at, std::span<con
     }
   }
   Search search(start, vias, end, limits);
-  Expected<Trajectory> halting = assemble(search, at, limits);
-  search.run();
-  Expected<Trajectory> flying = assemble(search, at, limits);
-  if (!flying || (halting && halting->back().end() < flying->back().end())) return halting;
-  return flying;
+  search.guess();
+  Expected<Trajectory> best = assemble(search, at, limits);
+  if (effort == Effort::kFine) {
+    search.descend();
+    Expected<Trajectory> fine = assemble(search, at, limits);
+    if (fine && (!best || fine->back().end() < best->back().end())) best = std::move(fine);
+  }
+  if (best) return best;
+  search.halt();
+  return assemble(search, at, limits);
 }
 
 }  // namespace pons::motion

@@ -50,6 +50,7 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   arm.refresh(now);
+  router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
     held.reset();
@@ -136,7 +137,9 @@ void Cell::keep_clear(Time now) {
     if (!q) return;
     if (step + 1 < kRises && !clear(*q)) continue;
     const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
-    const auto way = held ? carry(now, [&](const AxisVector&) -> Expected<AxisVector> { return *q; })
+    Search search;
+    const auto way = held ? carry(
+                                now, [&](const AxisVector&) -> Expected<AxisVector> { return *q; }, search)
                           : motion::move(arm.planned(from), from, end, limits_empty());
     if (way) (void)arm.stream(*way);
     return;
@@ -164,21 +167,21 @@ AxisLimits Cell::limits_loaded(double share) const {
   return limits;
 }
 
-Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal) {
-  double share = 1;
+Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal, Search& search) {
   for (;;) {
-    const AxisLimits limits = limits_loaded(share);
+    const AxisLimits limits = limits_loaded(search.share);
     const Time from = arm.splice_time(now, limits);
     const AxisState state = arm.planned(from);
     const auto q = goal(state.position);
     if (!q) return std::unexpected(q.error());
-    auto way = router.route(state, from, {*q, AxisVector::Zero(q->size())}, &held->load, objects_, limits);
+    const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
+    auto way = router.route(state, from, end, &held->load, objects_, limits, &search.known);
     if (!way) return way;
     const double mass_kg = held->mass_kg + kUnsure_kg;
     const double grip = grip_use(model, world.robot.tool, held->load, mass_kg, *way) / kGripShare;
     const double use = std::max(grip, torque_use(model, world.robot, held->load, mass_kg, *way) / kTorqueShare);
-    if (use <= 1 || share <= kSlowestShare) return way;
-    share = std::max(kSlowestShare, share * std::clamp(1 / use, kBoldest, kTimid));
+    if (use <= 1 || search.share <= kSlowestShare) return way;
+    search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, kTimid));
   }
 }
 

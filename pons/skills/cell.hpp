@@ -69,12 +69,17 @@ class Cell {
   [[nodiscard]] AxisLimits limits_planned() const;
   // Likewise, and as slow as zones want it: what the arm keeps with the cups empty.
   [[nodiscard]] AxisLimits limits_empty() const;
+  // How a carry is being found: a tick may be too short to find it.
+  struct Search {
+    double share = 1;  // of the acceleration limits
+    std::optional<Passage> known;
+  };
   // Where a carry shall end, joints, given those it starts from.
   using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;
   // The fastest way for what is held, from the present motion to standstill at `goal`, that leaves the cups and the
-  // motors a reserve; where no speed does, the slowest. Something must be held. Errors: those of
-  // the goal and of the router.
-  [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal);
+  // motors a reserve; where no speed does, the slowest. Something must be held. Errors: those of the goal and of the
+  // router; while that is spent, whoever asks with the same `search` in the next tick goes on from there.
+  [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal, Search& search);
 
   // For an arm that waits: up, with what it holds, before anything that rides along the belt meets it. Does nothing
   // while it moves or where it is clear.

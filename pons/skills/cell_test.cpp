@@ -31,7 +31,8 @@ class CarryTest : public ::testing::Test {
   Expected<AxisVector> goal(const AxisVector& from) { return cell_.model.inverse(Cell::tip_down(goal_, 0), from); }
   motion::Trajectory carry(const Vector3& size_m, double mass_kg) {
     cell_.held = Held{"P000001", {.size_m = size_m}, mass_kg};
-    auto way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); });
+    Cell::Search search;
+    auto way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); }, search);
     EXPECT_TRUE(way) << way.error().line();
     return way.value_or(motion::Trajectory{});
   }
@@ -139,8 +140,11 @@ TEST_F(CarryTest, EndsAtRestAtTheGoalWithinTheLimits) {
 
 TEST_F(CarryTest, AGoalOutOfReachIsNamed) {
   cell_.held = Held{"P000001", {.size_m = {0.2, 0.2, 0.1}}, 1};
-  const auto way = cell_.carry(
-      now_, [this](const AxisVector& from) { return cell_.model.inverse(Cell::tip_down({3, 0, 1.2}, 0), from); });
+  Cell::Search search;
+  const auto beyond = [this](const AxisVector& from) {
+    return cell_.model.inverse(Cell::tip_down({3, 0, 1.2}, 0), from);
+  };
+  const auto way = cell_.carry(now_, beyond, search);
   ASSERT_FALSE(way);
   EXPECT_FALSE(way.error().what.empty());
 }

@@ -20,8 +20,7 @@ constexpr double kPress_m = 0.006;      // bellows pressed together at the conta
 constexpr double kRide_s = 0.40;        // along with the belt, while vacuum builds
 constexpr double kKnot_s = 0.05;
 constexpr double kConverged_s = 0.002;
-constexpr double kLater_s = 0.20;
-constexpr int kMostBlocked = 1;  // a look for a way takes time, and the motion that it ends with must come in time
+constexpr double kLater_s = 0.20, kLatest_s = 0.20;  // a step, and the most, when the way is blocked
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.80;  // cosines of 3 and 37 degrees
 constexpr double kLeastLift_m = 0.10, kHighestLift_m = 0.25;
@@ -248,15 +247,14 @@ Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, con
 }
 
 Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                           const std::optional<Eigen::Matrix3d>& orientation) {
+                           const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search) {
   AxisLimits limits = cell.limits_empty();
   // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. They begin with the
   // straight way: where the parcel will not be by then, another may.
   const auto straight = meet_straight(cell, start, at, object, orientation);
   if (!straight) return std::unexpected(straight.error());
   Grasp grasp{.orientation = straight->orientation};
-  double ahead_s = straight->ahead_s;
-  int blocked = 0;
+  double ahead_s = straight->ahead_s + search.later_s;
   Expected<motion::Trajectory> way = fail("out of reach", "grasp");
   AxisVector seed = straight->q;
   for (int round = kStraightRounds; round < kRounds; ++round) {
@@ -264,10 +262,11 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     const auto q = cell.model.inverse(posed(hover, grasp.orientation), seed);
     if (!q) return std::unexpected(q.error());
     seed = *q;
-    way = cell.router.route(start, at, coming_down(cell, *q), nullptr, cell.objects(), limits);
-    if (!way && ++blocked > kMostBlocked) return std::unexpected(way.error());
+    way = cell.router.route(start, at, coming_down(cell, *q), nullptr, cell.objects(), limits, &search.known);
     if (!way) {
+      if (cell.router.spent() || search.later_s >= kLatest_s) return std::unexpected(way.error());
       // A way round takes longer, and by then what rides behind the parcel is where the parcel was to be met.
+      search = {.later_s = search.later_s + kLater_s};
       ahead_s += kLater_s;
       continue;
     }

@@ -41,10 +41,16 @@ struct Meeting {
 [[nodiscard]] Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                               const std::optional<Eigen::Matrix3d>& orientation);
 
+// How a grasp is being found: a tick may be too short to find it.
+struct GraspSearch {
+  double later_s = 0;  // than on the straight way: what is sooner was found blocked
+  std::optional<Passage> known;
+};
+
 // The earliest grasp from `start` at `at`. With `orientation` given that grip is kept. Errors: out of reach, no clear
-// way.
+// way; while the router is spent, whoever asks with the same `search` in the next tick goes on from there.
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                                         const std::optional<Eigen::Matrix3d>& orientation);
+                                         const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search);
 
 // What would come along with that object, and why; nothing if it lies by itself.
 [[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);

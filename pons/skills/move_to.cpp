@@ -9,12 +9,13 @@ using task::Progress;
 using task::Status;
 
 constexpr double kAbove_m = 0.15;
+constexpr Duration kSearchFor = std::chrono::milliseconds(200);  // where one tick is too short to find a way
 constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 
 class MoveTo final : public task::Skill {
  public:
-  MoveTo(Cell& cell, std::string place, std::string path)
-      : cell_(cell), place_(std::move(place)), path_(std::move(path)), delay_(cell.arm) {}
+  MoveTo(Cell& cell, std::string place, std::string path, Time now)
+      : cell_(cell), place_(std::move(place)), path_(std::move(path)), started_(now), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
     arrives_ += delay_.take();
@@ -29,6 +30,7 @@ class MoveTo final : public task::Skill {
     }
     if (path_ == kLine && now < cell_.arm.motion_end()) return {};  // a line begins at rest
     const auto way = plan(now);
+    if (!way && cell_.router.spent() && now < started_ + kSearchFor) return {};
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
@@ -46,7 +48,7 @@ class MoveTo final : public task::Skill {
  private:
   Expected<motion::Trajectory> plan(Time now) {
     if (path_ == kLine) return line(now);
-    if (cell_.held) return cell_.carry(now, [&](const AxisVector& from) { return target(from); });
+    if (cell_.held) return cell_.carry(now, [&](const AxisVector& from) { return target(from); }, search_);
     return empty(now);
   }
 
@@ -86,7 +88,9 @@ class MoveTo final : public task::Skill {
 
   Cell& cell_;
   std::string place_, path_;
+  Time started_;
   Delay delay_;
+  Cell::Search search_;
   Time arrives_;
   double way_s_ = 0;
   bool moving_ = false, cancelled_ = false;
@@ -106,9 +110,9 @@ task::SkillType move_to(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
-          .start = [&cell](const task::Json& arguments, Time) {
+          .start = [&cell](const task::Json& arguments, Time now) {
             return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
-                                            arguments.value("path", std::string(kJoints)));
+                                            arguments.value("path", std::string(kJoints)), now);
           }};
 }
 

@@ -158,9 +158,14 @@ class Pick final : public task::Skill {
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
     if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
-    auto grasp = plan_grasp(cell_, state, from, *object, turned);
+    auto grasp = plan_grasp(cell_, state, from, *object, turned, search_);
     if (!grasp) {
-      ++quarters_;
+      if (cell_.router.spent()) {
+        tried_.reset();
+      } else {
+        ++quarters_;
+        search_ = {};
+      }
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       if (!blocked_since_) blocked_since_ = now;
@@ -297,8 +302,9 @@ class Pick final : public task::Skill {
       return;
     const Time from = cell_.arm.splice_time(now);
     const double turn = yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
+    GraspSearch search;
     const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
-                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation);
+                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation, search);
     planned_ = now;
     if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
   }
@@ -468,6 +474,7 @@ class Pick final : public task::Skill {
   Duration behind_{0};  // of the belt, since the cups set out for the contact
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_;
+  GraspSearch search_;
   int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
 };

@@ -33,6 +33,7 @@ constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of
 constexpr Duration kSwing = std::chrono::milliseconds(1500);       // at most,
 constexpr Duration kSwingTight = std::chrono::milliseconds(4000);  // and for what would jam in the mouth
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
+constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr Duration kBlockedFor = std::chrono::milliseconds(400);
 constexpr Duration kLookEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
@@ -88,9 +89,11 @@ class Place final : public task::Skill {
     }
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
+    if (tried_ && now - *tried_ < kTryEvery) return {};
     if (const auto set_out = carry_to(*target, now); !set_out) {
       // Others may be in the way, and ride on.
       if (!blocked_since_) blocked_since_ = now;
+      if (!cell_.router.spent()) tried_ = now, search_ = {};
       cell_.keep_clear(now);
       return now < *blocked_since_ + kBlockedFor ? Progress{}
                                                  : Progress{Status::kFailed, name_ + ": " + set_out.error().line(), {}};
@@ -104,7 +107,7 @@ class Place final : public task::Skill {
   // Where that fails, whatever was under way stays so.
   Expected<void> carry_to(const world::Place& target, Time now) {
     world::Entry entry;
-    auto way = cell_.carry(now, [&](const AxisVector& from) { return over(target, from, entry); });
+    auto way = cell_.carry(now, [&](const AxisVector& from) { return over(target, from, entry); }, search_);
     if (!way) return std::unexpected(way.error());
     if (auto sent = cell_.arm.stream(*way); !sent) return sent;
     way_ = std::move(*way);
@@ -253,7 +256,8 @@ class Place final : public task::Skill {
   Phase phase_ = Phase::kPlan;
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
-  std::optional<Time> blocked_since_;
+  std::optional<Time> tried_, blocked_since_;
+  Cell::Search search_;
   world::Entry entry_;
   bool cancelled_ = false;
 };

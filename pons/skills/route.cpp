@@ -20,6 +20,7 @@ constexpr double kComesDown_m = 0.045;  // further, after a way that ends in mot
 constexpr double kOwnMargin_m = 0.03;   // between a load, which swings, and the arm itself
 constexpr double kStill_rad_s = 1e-3;
 constexpr double kSink_m = 0.005;  // what comes from between others may leave as low as it is
+constexpr double kNone = -std::numeric_limits<double>::infinity();  // of clearance
 constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
 constexpr double kUsualHeight_m = 0.20;  // of what stands on the belt: a way over it is tried first
@@ -55,8 +56,15 @@ double top_z(const ObjectBelief& object, double x, double y, Time time, double g
   return middle.z() - (up.x() * (x - middle.x()) + up.y() * (y - middle.y())) / up.z();
 }
 
+double highest_m(const ObjectBelief& object) {
+  const Eigen::Matrix3d& axes = object.world_from_top.linear();
+  return object.world_from_top.translation().z() + 0.5 * std::abs(axes(2, 0)) * object.size_m.x() +
+         0.5 * std::abs(axes(2, 1)) * object.size_m.y();
+}
+
 struct Neighbour {
   const ObjectBelief* object;
+  double highest_m;
   // The points of tool or load that begin over it or close, and lower than they may: such a one may leave as low as it
   // is. No other swings in below its top.
   std::vector<bool> too_low;
@@ -66,7 +74,7 @@ std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const P
                                      double close_m, std::span<const ObjectBelief> objects) {
   std::vector<Neighbour> neighbours;
   for (const ObjectBelief& object : objects) {
-    Neighbour& neighbour = neighbours.emplace_back(&object);
+    Neighbour& neighbour = neighbours.emplace_back(&object, highest_m(object));
     for (const Vector3& point : points) {
       const Vector3 low = world_from_tip * point;
       neighbour.too_low.push_back(low.z() < top_z(object, low.x(), low.y(), time, close_m) + kObjectMargin_m);
@@ -75,16 +83,14 @@ std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const P
   return neighbours;
 }
 
-double highest_m(const ObjectBelief& object) {
-  const Eigen::Matrix3d& axes = object.world_from_top.linear();
-  return object.world_from_top.translation().z() + 0.5 * std::abs(axes(2, 0)) * object.size_m.x() +
-         0.5 * std::abs(axes(2, 1)) * object.size_m.y();
-}
+// What a tick may search, and what a trajectory costs to plan, counted in postures judged: some microseconds each.
+constexpr int kWorkPerTick = 5000, kRoughWork = 30, kFineWork = 120;
+constexpr double kNearly_m = 0.03;   // what a rough way may lack and a fine one have
+constexpr double kFineShare = 0.90;  // of a rough way's duration that its fine one may take
 
 // Tried in turn, the fastest clear one is taken: how far along the direct way the via points lie.
-const std::vector<std::vector<double>> kVias = {{0.5},      {0.0},      {1.0},        {0.0, 1.0}, {0.0, 0.5},
-                                                {0.15},     {0.3},      {0.7},        {0.85},     {0.15, 0.85},
-                                                {0.15, 0.5}, {0.3, 0.85}};
+const std::vector<std::vector<double>> kVias = {{0.5}, {0.0}, {1.0},  {0.0, 1.0},   {0.0, 0.5},  {0.15},
+                                                {0.3}, {0.7}, {0.85}, {0.15, 0.85}, {0.15, 0.5}, {0.3, 0.85}};
 
 }  // namespace
 
@@ -117,38 +123,62 @@ double Router::floor_z(double x, double y, Time time, Time begin, double belt_ma
   return belt.surface_z_m + belt_margin_m + (unseen ? world_.rules.max_size_m : 0);
 }
 
+// What stays the same along one way.
+struct Router::Sweep {
+  const Positions& at;
+  Time begin;
+  Pose first, last;
+  double further_m;  // down, where the tool arrives
+  const Load* load;
+  std::vector<Vector3> points;
+  std::vector<Neighbour> neighbours;
+};
+
 // The smallest height over what stands below, all the time; positive is clear. At the end the tool goes `further_m`
-// down. What begins within `close_m` of a neighbour may leave beside it.
+// down. What begins within `close_m` of a neighbour may leave beside it. Once it is less than `enough_m`, no more is
+// looked at.
 double Router::worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
-                               const Load* load, std::span<const ObjectBelief> obstacles) {
-  const Pose first = model_.world_from_tip(at(begin)), last = model_.world_from_tip(at(end));
-  const auto close = [](const Pose& a, const Pose& b) {
-    return (a.translation() - b.translation()).head<2>().norm() < kEndRadius_m;
-  };
-  const std::vector<Vector3> points = probes(load);
-  const std::vector<Neighbour> neighbours = neighbours_of(points, first, begin, close_m, obstacles);
+                               const Load* load, std::span<const ObjectBelief> obstacles, double enough_m) {
+  Sweep sweep{at,           begin, model_.world_from_tip(at(begin)), model_.world_from_tip(at(end)), further_m, load,
+              probes(load), {}};
+  sweep.neighbours = neighbours_of(sweep.points, sweep.first, begin, close_m, obstacles);
+  // Ways between the same ends mostly fail at the same moment: who only asks whether, often knows after that one.
   double worst = std::numeric_limits<double>::infinity();
-  for (Time time = begin; time < end; time += kCheckEvery) {
-    const AxisVector q = at(time);
-    const Pose world_from_tip = model_.world_from_tip(q);
-    const bool leaving = close(world_from_tip, first), arriving = close(world_from_tip, last);
-    const double grow_m = leaving || arriving ? kEndGrow_m : kObjectGrow_m;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Vector3 low = world_from_tip * points[i];
-      const double as_it_was = leaving ? (first * points[i]).z() - kSink_m : std::numeric_limits<double>::infinity();
-      double floor = std::min(as_it_was, floor_z(low.x(), low.y(), time, begin, arriving ? 0 : kBeltMargin_m));
-      for (const Neighbour& other : neighbours) {
-        const double top = top_z(*other.object, low.x(), low.y(), time, grow_m) + kObjectMargin_m;
-        floor = std::max(floor, other.too_low[i] ? std::min(as_it_was, top) : top);
-      }
-      worst = std::min(worst, low.z() - floor);
+  if (begin + witness_ < end) worst = clearance_at(begin + witness_, sweep);
+  for (Time time = begin; time < end && worst >= enough_m; time += kCheckEvery) {
+    const double here = clearance_at(time, sweep);
+    if (here < worst) worst = here, witness_ = time - begin;
+  }
+  return worst;
+}
+
+double Router::clearance_at(Time time, const Sweep& sweep) {
+  ++work_;
+  const AxisVector q = sweep.at(time);
+  const Pose world_from_tip = model_.world_from_tip(q);
+  const auto close = [&](const Pose& end) {
+    return (world_from_tip.translation() - end.translation()).head<2>().norm() < kEndRadius_m;
+  };
+  const bool leaving = close(sweep.first), arriving = close(sweep.last);
+  const double grow_m = leaving || arriving ? kEndGrow_m : kObjectGrow_m;
+  double worst = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < sweep.points.size(); ++i) {
+    const Vector3 low = world_from_tip * sweep.points[i];
+    const double as_it_was =
+        leaving ? (sweep.first * sweep.points[i]).z() - kSink_m : std::numeric_limits<double>::infinity();
+    double floor = std::min(as_it_was, floor_z(low.x(), low.y(), time, sweep.begin, arriving ? 0 : kBeltMargin_m));
+    for (const Neighbour& other : sweep.neighbours) {
+      if (low.z() - other.highest_m >= kObjectMargin_m) continue;
+      const double top = top_z(*other.object, low.x(), low.y(), time, grow_m) + kObjectMargin_m;
+      floor = std::max(floor, other.too_low[i] ? std::min(as_it_was, top) : top);
     }
-    if (load != nullptr) worst = std::min(worst, own_clearance(q, world_from_tip, *load) - kOwnMargin_m);
-    const double margin_m = kObjectMargin_m + (arriving ? further_m : 0);
-    for (const Neighbour& other : neighbours) {
-      if (world_from_tip.translation().z() + tool_m_ > highest_m(*other.object) + margin_m) continue;
-      worst = std::min(worst, wrist_clearance(q, *other.object, time, grow_m) - margin_m);
-    }
+    worst = std::min(worst, low.z() - floor);
+  }
+  if (sweep.load != nullptr) worst = std::min(worst, own_clearance(q, world_from_tip, *sweep.load) - kOwnMargin_m);
+  const double margin_m = kObjectMargin_m + (arriving ? sweep.further_m : 0);
+  for (const Neighbour& other : sweep.neighbours) {
+    if (world_from_tip.translation().z() + tool_m_ > other.highest_m + margin_m) continue;
+    worst = std::min(worst, wrist_clearance(q, *other.object, time, grow_m) - margin_m);
   }
   return worst;
 }
@@ -191,21 +221,21 @@ double Router::own_clearance(const AxisVector& q, const Pose& world_from_tip, co
 }
 
 double Router::worst_clearance(const motion::Trajectory& way, Time from, Time until, double close_m, const Load* load,
-                               std::span<const ObjectBelief> obstacles) {
+                               std::span<const ObjectBelief> obstacles, double enough_m) {
   const AxisState end = motion::sample(way, until, model_.axes());
   const auto at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
   const double further_m = end.speed.isZero(kStill_rad_s) ? 0 : kComesDown_m;
-  return worst_clearance(at, from, until, further_m, close_m, load, obstacles);
+  return worst_clearance(at, from, until, further_m, close_m, load, obstacles, enough_m);
 }
 
 bool Router::clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
                    std::span<const ObjectBelief> obstacles) {
-  return worst_clearance(way, from, until, kObjectGrow_m, load, obstacles) >= 0 && detour_.keeps_off(way, load);
+  return worst_clearance(way, from, until, kObjectGrow_m, load, obstacles, 0) >= 0 && detour_.keeps_off(way, load);
 }
 
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
                       std::span<const ObjectBelief> obstacles) {
-  return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, kEndGrow_m, load, obstacles) >= 0;
+  return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, kEndGrow_m, load, obstacles, 0) >= 0;
 }
 
 Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
@@ -216,11 +246,10 @@ Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {
 
 Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, const motion::Waypoint& end,
                                            const Load* load, std::span<const ObjectBelief> obstacles,
-                                           const AxisLimits& limits) {
+                                           const AxisLimits& limits, std::optional<Passage>* known) {
   const AxisLimits wider = covering(limits, start);
-  auto way = over(start, at, end, load, obstacles, wider, kEndGrow_m);
-  // Packed in as it is, it leaves as it can: to stay would be worse.
-  if (!way) way = over(start, at, end, load, obstacles, wider, kObjectGrow_m);
+  std::optional<Passage> none;
+  auto way = over({start, at, end, load, obstacles, wider}, known == nullptr ? none : *known);
   // The search takes longer than a tick may: only worlds that name an obstacle pay for it.
   if (way || !detour_.has_obstacles()) return way;
   auto round = detour_.plan(start, at, end, load, obstacles, wider);
@@ -232,53 +261,106 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   return way;
 }
 
-Expected<motion::Trajectory> Router::over(const AxisState& start, Time at, const motion::Waypoint& end,
-                                          const Load* load, std::span<const ObjectBelief> obstacles,
-                                          const AxisLimits& limits, double close_m) {
-  auto direct = motion::move(start, at, end, limits);
+Expected<motion::Trajectory> Router::over(const Task& task, std::optional<Passage>& known) {
+  auto direct = motion::move(task.start, task.at, task.end, task.limits);
   if (!direct) return direct;
-  const auto clearance_of = [&](const motion::Trajectory& way) {
-    return worst_clearance(way, way.front().start, way.back().end(), close_m, load, obstacles);
-  };
-  const double clearance = clearance_of(*direct);
-  if (clearance >= 0 && detour_.keeps_off(*direct, load)) return direct;
+  const double clearance =
+      worst_clearance(*direct, task.at, direct->back().end(), kEndGrow_m, task.load, task.obstacles, kNone);
+  if (clearance >= 0 && detour_.keeps_off(*direct, task.load)) return direct;
 
   double depth = 0;  // of the load's lowest point below the tip
-  for (const Vector3& point : probes(load)) depth = std::max(depth, point.z());
-  const double start_z = model_.world_from_tip(start.position).translation().z();
-  const double end_z = model_.world_from_tip(end.position).translation().z();
+  for (const Vector3& point : probes(task.load)) depth = std::max(depth, point.z());
+  const double start_z = model_.world_from_tip(task.start.position).translation().z();
+  const double end_z = model_.world_from_tip(task.end.position).translation().z();
   double lowest = world_.belt.surface_z_m + kBeltMargin_m + kUsualHeight_m + depth;
-  for (const ObjectBelief& object : obstacles) {
+  for (const ObjectBelief& object : task.obstacles) {
     lowest = std::max(lowest, highest_m(object) + kObjectMargin_m + depth);
   }
-  Error reason{"no clear way", "route", "the cell is too crowded or the end is out of reach"};
-  for (const double extra : {0.02, 0.07, 0.14, 0.25}) {
-    const double height =
-        std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z)) + extra;
-    std::vector<std::vector<AxisVector>> ways;
-    for (const auto& shares : kVias) {
-      std::vector<AxisVector> vias;
-      for (const double share : shares) {
-        const auto via = raised(start.position + share * (end.position - start.position), height);
-        if (!via) break;
-        vias.push_back(*via);
-      }
-      if (vias.size() == shares.size()) ways.push_back(std::move(vias));
-    }
-    Expected<motion::Trajectory> best = std::unexpected(reason);
-    for (const auto& vias : ways) {
-      auto candidate = motion::move_through(start, at, vias, end, limits);
-      if (!candidate) {
-        reason = candidate.error();
-        continue;
-      }
-      if (best && candidate->back().end() >= best->back().end()) continue;
-      if (clearance_of(*candidate) < 0 || !detour_.keeps_off(*candidate, load)) continue;
-      best = std::move(candidate);
-    }
-    if (best) return best;
+  const double least_z = std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z));
+  if (known) {
+    auto way = through(*known, least_z, motion::Effort::kFine, task);
+    if (way && passes(*way, known->close_m, task)) return way;
   }
-  return std::unexpected(reason);
+  std::optional<Candidate> found, squeezed;
+  if (passes(*direct, kObjectGrow_m, task)) squeezed = Candidate{{.close_m = kObjectGrow_m}, *direct};
+  for (const double higher_m : {0.02, 0.07, 0.14, 0.25}) {
+    if (known && higher_m < known->higher_m) continue;  // nothing was clear there
+    found = fastest(candidates(least_z, higher_m, task), least_z, squeezed, task);
+    if (found) break;
+    if (spent()) {
+      known = Passage{.higher_m = higher_m, .close_m = kEndGrow_m};
+      break;
+    }
+  }
+  if (!found) found = std::move(squeezed);
+  if (!found) {
+    return fail(spent() ? "no clear way found in time" : "no clear way", "route",
+                "the cell is too crowded or the end is out of reach");
+  }
+  known = std::move(found->passage);
+  return std::move(found->way);
 }
+
+Expected<motion::Trajectory> Router::through(const Passage& passage, double least_z, motion::Effort effort,
+                                             const Task& task) {
+  if (spent()) return fail("no time left to search", "route");
+  work_ += effort == motion::Effort::kRough ? kRoughWork : kFineWork;
+  std::vector<AxisVector> vias;
+  for (const double share : passage.shares) {
+    const AxisVector between = task.start.position + share * (task.end.position - task.start.position);
+    const auto via = raised(between, least_z + passage.higher_m);
+    if (!via) return std::unexpected(via.error());
+    vias.push_back(*via);
+  }
+  return motion::move_through(task.start, task.at, vias, task.end, task.limits, effort);
+}
+
+// Roughly, the fastest first.
+std::vector<Router::Candidate> Router::candidates(double least_z, double higher_m, const Task& task) {
+  std::vector<Candidate> found;
+  for (const auto& shares : kVias) {
+    Passage passage{higher_m, shares, kEndGrow_m};
+    auto way = through(passage, least_z, motion::Effort::kRough, task);
+    if (way) found.push_back({std::move(passage), std::move(*way)});
+  }
+  std::ranges::stable_sort(found, {}, [](const Candidate& c) { return c.way.back().end(); });
+  return found;
+}
+
+std::optional<Router::Candidate> Router::fastest(std::vector<Candidate> candidates, double least_z,
+                                                 std::optional<Candidate>& squeezed, const Task& task) {
+  std::optional<Candidate> best;
+  const auto takes = [&](const motion::Trajectory& way) { return way.back().end() - task.at; };
+  for (Candidate& candidate : candidates) {
+    if (best && kFineShare * takes(candidate.way) >= takes(best->way)) break;
+    const double clearance = clearance_of(candidate.way, kEndGrow_m, -kNearly_m, task);
+    const bool clear = clearance >= 0;
+    if (!clear && !squeezed && passes(candidate.way, kObjectGrow_m, task)) {
+      squeezed = candidate;
+      squeezed->passage.close_m = kObjectGrow_m;
+    }
+    if (clearance < -kNearly_m) continue;
+    auto fine = through(candidate.passage, least_z, motion::Effort::kFine, task);
+    const bool finer = fine && (!clear || takes(*fine) < takes(candidate.way)) && passes(*fine, kEndGrow_m, task);
+    if (!clear && !finer) continue;
+    if (finer) candidate.way = std::move(*fine);
+    if (!best || takes(candidate.way) < takes(best->way)) best = std::move(candidate);
+  }
+  return best;
+}
+
+// Less than `enough_m`: by how much less was not looked at.
+double Router::clearance_of(const motion::Trajectory& way, double close_m, double enough_m, const Task& task) {
+  if (spent()) return kNone;
+  const double least_m =
+      worst_clearance(way, way.front().start, way.back().end(), close_m, task.load, task.obstacles, enough_m);
+  return least_m < enough_m || detour_.keeps_off(way, task.load) ? least_m : kNone;
+}
+
+bool Router::passes(const motion::Trajectory& way, double close_m, const Task& task) {
+  return clearance_of(way, close_m, 0, task) >= 0;
+}
+
+bool Router::spent() const { return work_ >= kWorkPerTick; }
 
 }  // namespace pons::skills

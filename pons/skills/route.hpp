@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,14 @@ namespace pons::skills {
 // Limits that a motion from `start` can keep: tightened in the middle of a motion, they may lie below what it does now.
 [[nodiscard]] AxisLimits covering(const AxisLimits& limits, const AxisState& start);
 
+// How a way led over what was in the way: by how much higher than it had to, how far along the direct way its via
+// points lay, and how close it began to what stood beside it.
+struct Passage {
+  double higher_m = 0;
+  std::vector<double> shares;
+  double close_m = 0;
+};
+
 class Router {
  public:
   // `world` must outlive it.
@@ -26,11 +35,20 @@ class Router {
 
   // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims: with a margin,
   // close to both ends without. Straight, else over what is in the way by one or two via points, else round it on a
-  // path that is found by sampling (detour.hpp). Only
-  // in a world that names an obstacle. Errors: no clear way found, or an end that cannot be reached.
+  // path that is found by sampling (detour.hpp). Only in a world that names an obstacle. A passage that is `known` is
+  // tried before any is searched for, and none lower than it is. What is found is left there, for who asks again for
+  // nearly the same; and how high a search came that its tick cut short, for who asks again in the next. Errors: no
+  // clear way found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
-                                                   const AxisLimits& limits);
+                                                   const AxisLimits& limits, std::optional<Passage>* known = nullptr);
+
+  // Once a bridge tick, before any other: a tick searches only so far, or the arm would wait for its bridge.
+  void refresh() { work_ = 0; }
+  // What was spent in this tick, in postures judged: some microseconds each.
+  [[nodiscard]] int work() const { return work_; }
+  // Whether this tick finds no more ways; the next one does.
+  [[nodiscard]] bool spent() const;
 
   // Whether an arm that rests at q is clear of what comes along.
   [[nodiscard]] bool clear_at(const AxisVector& q, Time from, Time until, const Load* load,
@@ -43,13 +61,33 @@ class Router {
  private:
   [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const;
   using Positions = std::function<AxisVector(Time)>;
-  [[nodiscard]] Expected<motion::Trajectory> over(const AxisState& start, Time at, const motion::Waypoint& end,
-                                                  const Load* load, std::span<const ObjectBelief> obstacles,
-                                                  const AxisLimits& limits, double close_m);
+  struct Task {
+    const AxisState& start;
+    Time at;
+    const motion::Waypoint& end;
+    const Load* load;
+    std::span<const ObjectBelief> obstacles;
+    const AxisLimits& limits;
+  };
+  struct Candidate {
+    Passage passage;
+    motion::Trajectory way;
+  };
+  [[nodiscard]] Expected<motion::Trajectory> over(const Task& task, std::optional<Passage>& known);
+  [[nodiscard]] Expected<motion::Trajectory> through(const Passage& passage, double least_z, motion::Effort effort,
+                                                     const Task& task);
+  [[nodiscard]] std::vector<Candidate> candidates(double least_z, double higher_m, const Task& task);
+  // Of those that are clear. `squeezed`, where there is none yet: one that only leaves its neighbours as it can.
+  [[nodiscard]] std::optional<Candidate> fastest(std::vector<Candidate> candidates, double least_z,
+                                                 std::optional<Candidate>& squeezed, const Task& task);
+  [[nodiscard]] double clearance_of(const motion::Trajectory& way, double close_m, double enough_m, const Task& task);
+  [[nodiscard]] bool passes(const motion::Trajectory& way, double close_m, const Task& task);
+  struct Sweep;
+  [[nodiscard]] double clearance_at(Time time, const Sweep& sweep);
   [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
-                                       const Load* load, std::span<const ObjectBelief> obstacles);
+                                       const Load* load, std::span<const ObjectBelief> obstacles, double enough_m);
   [[nodiscard]] double worst_clearance(const motion::Trajectory& way, Time from, Time until, double close_m,
-                                       const Load* load, std::span<const ObjectBelief> obstacles);
+                                       const Load* load, std::span<const ObjectBelief> obstacles, double enough_m);
   [[nodiscard]] double wrist_clearance(const AxisVector& q, const ObjectBelief& object, Time time, double grow_m);
   [[nodiscard]] double own_clearance(const AxisVector& q, const Pose& world_from_tip, const Load& load);
   [[nodiscard]] Expected<AxisVector> raised(const AxisVector& q, double tip_z);
@@ -60,6 +98,8 @@ class Router {
   double tool_m_;        // from flange to tip
   model::RobotModel model_;
   Detour detour_;
+  int work_ = 0;                                // in this tick
+  Duration witness_{};                          // from the begin of the way judged last to where it came lowest
   std::vector<model::PlacedCapsule> capsules_;  // scratch
 };
 

@@ -32,6 +32,12 @@ class RouteTest : public ::testing::Test {
     EXPECT_TRUE(q) << q.error().line();
     return q.value_or(world_.robot.home);
   }
+  // With a tick of its own.
+  Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end, const Load* load,
+                                     std::span<const ObjectBelief> obstacles, const AxisLimits& limits) {
+    router_.refresh();
+    return router_.route(start, at, end, load, obstacles, limits);
+  }
   static AxisState rest(const AxisVector& q) { return {q, AxisVector::Zero(q.size()), AxisVector::Zero(q.size())}; }
   static motion::Waypoint halt(const AxisVector& q) { return {q, AxisVector::Zero(q.size())}; }
 
@@ -102,7 +108,7 @@ class RouteTest : public ::testing::Test {
 
 TEST_F(RouteTest, ABareBeltIsCrossedDirectly) {
   const AxisVector from = over(-0.3, 0, 1.1), to = over(0.35, 0, 1.1);
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
   expect_leads(way, from, to);
   const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
   ASSERT_TRUE(direct);
@@ -116,7 +122,7 @@ TEST_F(RouteTest, AWayOverAnObstacleStaysClearOfIt) {
   ASSERT_TRUE(direct);
   ASSERT_LT(clearance(*direct, obstacles[0], kToolSide_m, 0).value(), 0) << "the direct way must be blocked";
 
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
   expect_leads(way, from, to);
   EXPECT_GT(clearance(*way, obstacles[0], kToolSide_m, 0).value(), 0.01);
   EXPECT_LT(to_s(way->back().end() - kBegin), 2.5) << "over it, not far around";
@@ -130,13 +136,13 @@ TEST_F(RouteTest, AMovingObstacleIsWhereItWillBe) {
   ObjectBelief arrives = parcel(-0.25, {0.16, 0.16, 0.25}, 0.22);
   arrives.stamp = kBegin - from_s(1);
   ASSERT_LT(clearance(*direct, arrives, kToolSide_m, 0).value(), 0);
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{arrives}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, std::array{arrives}, limits_);
   expect_leads(way, from, to);
   EXPECT_GT(clearance(*way, arrives, kToolSide_m, 0).value(), 0.01);
   // Seen in the middle of the way five seconds ago: gone.
   ObjectBelief gone = parcel(0.02, {0.16, 0.16, 0.25}, 0.22);
   gone.stamp = kBegin - from_s(5);
-  const auto free = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{gone}, limits_);
+  const auto free = route(rest(from), kBegin, halt(to), nullptr, std::array{gone}, limits_);
   expect_leads(free, from, to);
   EXPECT_EQ(free->back().end(), direct->back().end());
 }
@@ -145,10 +151,10 @@ TEST_F(RouteTest, WhatHangsOnTheCupsPassesHigher) {
   const AxisVector from = over(-0.3, 0, 1.2), to = over(0.35, 0, 1.2);
   const std::array obstacles{parcel(0.02, {0.16, 0.16, 0.18})};
   const Load load{.size_m = {0.16, 0.16, 0.2}};
-  const auto empty = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  const auto empty = route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
   ASSERT_TRUE(empty) << empty.error().line();
   ASSERT_LT(clearance(*empty, obstacles[0], 0.16, load.size_m.z()).value(), 0) << "the load would hit it on that way";
-  const auto way = router_.route(rest(from), kBegin, halt(to), &load, obstacles, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), &load, obstacles, limits_);
   expect_leads(way, from, to);
   EXPECT_GT(clearance(*way, obstacles[0], 0.16, load.size_m.z()).value(), 0.01);
 }
@@ -159,14 +165,14 @@ TEST_F(RouteTest, WhatLeansIsAsHighAsItsUpperEdge) {
   const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
   ASSERT_TRUE(direct);
   const ObjectBelief level = parcel(0.02, {0.3, 0.2, 0.15});
-  const auto over_level = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{level}, limits_);
+  const auto over_level = route(rest(from), kBegin, halt(to), nullptr, std::array{level}, limits_);
   expect_leads(over_level, from, to);
   ASSERT_EQ(over_level->back().end(), direct->back().end()) << "level it is no obstacle";
   for (const double lean_rad : {-0.35, 0.35}) {
     ObjectBelief leaning = level;
     leaning.world_from_top.rotate(Eigen::AngleAxisd(lean_rad, Vector3::UnitY()));
     ASSERT_LT(rise_over(*direct, leaning), 0) << "the direct way must be blocked";
-    const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{leaning}, limits_);
+    const auto way = route(rest(from), kBegin, halt(to), nullptr, std::array{leaning}, limits_);
     expect_leads(way, from, to);
     ASSERT_TRUE(way);
     EXPECT_GT(rise_over(*way, leaning), 0.01);
@@ -177,10 +183,51 @@ TEST_F(RouteTest, AWayIsFoundOverTheHighEdgeOfWhatLeansSteeply) {
   const AxisVector from = over(-0.35, 0, 1.1), to = over(0.4, 0, 1.1);
   ObjectBelief steep = parcel(0.02, {0.4, 0.2, 0.16});
   steep.world_from_top.rotate(Eigen::AngleAxisd(0.7, Vector3::UnitY()));
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, std::array{steep}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, std::array{steep}, limits_);
   expect_leads(way, from, to);
   ASSERT_TRUE(way);
   EXPECT_GT(rise_over(*way, steep), 0.01);
+}
+
+TEST_F(RouteTest, WhoAsksAgainForNearlyTheSameSparesTheSearch) {
+  const AxisVector from = over(-0.3, 0, 1.05), to = over(0.35, 0, 1.05);
+  const std::array obstacles{parcel(0.02, {0.2, 0.2, 0.2})};
+  std::optional<Passage> known;
+  const auto first = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_, &known);
+  expect_leads(first, from, to);
+  ASSERT_TRUE(known);
+  const int searched = router_.work();
+  router_.refresh();
+  const auto again = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_, &known);
+  expect_leads(again, from, to);
+  EXPECT_LT(3 * router_.work(), 2 * searched);
+  EXPECT_LE(again->back().end(), first->back().end() + from_s(0.01));
+  // Where that passage is no longer clear, another one is found.
+  known = Passage{.higher_m = 0, .shares = {0.5}};
+  const std::array taller{parcel(0.02, {0.2, 0.2, 0.3})};
+  const auto other = route(rest(from), kBegin, halt(to), nullptr, taller, limits_);
+  const auto told_wrongly = router_.route(rest(from), kBegin, halt(to), nullptr, taller, limits_, &known);
+  expect_leads(told_wrongly, from, to);
+  EXPECT_EQ(told_wrongly->back().end(), other->back().end());
+}
+
+// The bridge must show the loop that it lives, and motions must come in time.
+TEST_F(RouteTest, ASearchEndsWithItsTick) {
+  const AxisVector from = over(-0.3, 0, 1.05), to = over(0.35, 0, 1.05);
+  const Load load{.size_m = {0.3, 0.3, 0.3}};
+  std::vector<ObjectBelief> wall;
+  for (int i = 0; i < 12; ++i) wall.push_back(parcel(-0.25 + 0.05 * i, {0.04, 0.5, 0.9}));
+  for (int asked = 0; asked < 5; ++asked) {
+    router_.refresh();
+    const auto way = router_.route(rest(from), kBegin, halt(to), &load, wall, limits_);
+    ASSERT_FALSE(way);
+    EXPECT_THAT(way.error().line(), HasSubstr("no clear way"));
+    for (int more = 0; more < 20; ++more)
+      EXPECT_FALSE(router_.route(rest(from), kBegin, halt(to), &load, wall, limits_));
+    EXPECT_TRUE(router_.spent());
+    EXPECT_LT(router_.work(), 9000) << "postures judged";
+  }
+  expect_leads(route(rest(from), kBegin, halt(to), nullptr, {}, limits_), from, to);
 }
 
 // Lifted out from beside something tall, a load goes up before its corners swing.
@@ -192,7 +239,7 @@ TEST_F(RouteTest, ALoadDoesNotTurnIntoWhatStandsBesideIt) {
     AxisVector to = over(0, 0.13, 1.3);
     to[5] += turn_rad;
     const auto direct = motion::move(rest(from), kBegin, halt(to), limits_);
-    const auto way = router_.route(rest(from), kBegin, halt(to), &load, std::array{tall}, limits_);
+    const auto way = route(rest(from), kBegin, halt(to), &load, std::array{tall}, limits_);
     EXPECT_TRUE(direct && way);
     return direct && way ? to_s(way->back().end() - direct->back().end()) : 0;
   };
@@ -240,7 +287,7 @@ TEST_F(RouteTest, TheWristKeepsOffATallNeighbour) {
   for (const Vector3& side : {Vector3(1, 0, 0), Vector3(-1, 0, 0), Vector3(0, 1, 0), Vector3(0, -1, 0)}) {
     ObjectBelief tall = parcel(0.1 + 0.28 * side.x(), {0.24, 0.24, 0.36});
     tall.world_from_top.translation().y() = 0.28 * side.y();
-    const auto way = router_.route(rest(from), kBegin, {to, down}, nullptr, std::array{tall}, limits_);
+    const auto way = route(rest(from), kBegin, {to, down}, nullptr, std::array{tall}, limits_);
     if (wrist_over(to, tall) < 0.02) {
       ++blocked;
       EXPECT_FALSE(way) << side.transpose();
@@ -257,7 +304,7 @@ TEST_F(RouteTest, TheWristKeepsOffATallNeighbour) {
 
 TEST_F(RouteTest, WhatIsBelievedLaterMayStandInTheWay) {
   const AxisVector from = over(-0.4, 0, 1.0), to = over(0.4, 0, 1.0);
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
   ASSERT_TRUE(way);
   const Time end = way->back().end(), half = kBegin + (end - kBegin) / 2;
   const ObjectBelief ahead = parcel(0.2, {0.1, 0.1, 0.2}), behind = parcel(-0.2, {0.1, 0.1, 0.2});
@@ -281,7 +328,7 @@ TEST_F(RouteTest, TheArmDoesNotFoldOntoItsLoad) {
 TEST_F(RouteTest, ALargeLoadReachesTheBelt) {
   const Load load{.size_m = {0.40, 0.34, 0.18}};
   const AxisVector from = over(0.35, 0.05, 1.28), to = over(0.2, 0, world_.belt.surface_z_m + 0.18 + 0.03);
-  expect_leads(router_.route(rest(from), kBegin, halt(to), &load, {}, limits_), from, to);
+  expect_leads(route(rest(from), kBegin, halt(to), &load, {}, limits_), from, to);
 }
 
 // Lifted no higher than it has to be, it lingers while the next one comes along; what stood close to it may stay so.
@@ -305,7 +352,7 @@ TEST_F(RouteTest, OverRimsAndBeltOnTheWayToAChute) {
   ASSERT_NE(chute, nullptr);
   const AxisVector from = over(0.1, 0.05, 0.95);
   const AxisVector to = over(chute->center_m.x(), chute->center_m.y(), 1.0);
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
   expect_leads(way, from, to);
   for (Time time = kBegin; time <= way->back().end(); time += std::chrono::milliseconds(4)) {
     const Vector3 tip = model_.world_from_tip(motion::sample(*way, time, model_.axes()).position).translation();
@@ -317,7 +364,7 @@ TEST_F(RouteTest, AnEndBeyondALimitIsNamed) {
   const AxisVector from = over(-0.3, 0, 1.1);
   AxisVector to = from;
   to[2] = world_.robot.limits.position_max[2] + 0.1;
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, {}, limits_);
   ASSERT_FALSE(way);
   EXPECT_THAT(way.error().line(), HasSubstr("limit"));
 }
@@ -325,7 +372,7 @@ TEST_F(RouteTest, AnEndBeyondALimitIsNamed) {
 TEST_F(RouteTest, NoWayThroughAWallIsNamed) {
   const AxisVector from = over(-0.3, 0, 1.0), to = over(0.35, 0, 1.0);
   const std::array obstacles{parcel(0.02, {0.3, 0.3, 1.2})};
-  const auto way = router_.route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
+  const auto way = route(rest(from), kBegin, halt(to), nullptr, obstacles, limits_);
   ASSERT_FALSE(way);
   EXPECT_FALSE(way.error().what.empty());
   EXPECT_FALSE(way.error().where.empty());

@@ -28,6 +28,7 @@ Expected<void> SetDown::begin(Time now) {
     way = way_to_belt(now, over_belt_m);
     if (way) break;
   }
+  if (way || !cell_.router.spent()) search_ = {};
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(*way); !sent) return sent;
   begin_at(way->back().end());
@@ -39,7 +40,7 @@ Expected<motion::Trajectory> SetDown::way_to_belt(Time now, double over_belt_m) 
   Time arrives = now + kTakes;
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (int round = 0; round < kRounds; ++round) {
-    way = cell_.carry(now, [&](const AxisVector& from) -> Expected<AxisVector> {
+    const auto goal = [&](const AxisVector& from) -> Expected<AxisVector> {
       const Vector3 spot = free_spot(arrives, over_belt_m);
       const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
       if (!down) return fail("no room on the belt", cell_.held->code);
@@ -47,7 +48,8 @@ Expected<motion::Trajectory> SetDown::way_to_belt(Time now, double over_belt_m) 
       pose.translation() = spot;
       pose.linear() = *down;
       return cell_.model.inverse(pose, from);
-    });
+    };
+    way = cell_.carry(now, goal, search_);
     if (!way) return way;
     arrives = way->back().end();
   }

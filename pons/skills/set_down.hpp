@@ -27,6 +27,7 @@ class SetDown {
 
   Cell& cell_;
   Delay delay_;
+  Cell::Search search_;
   Time released_at_;
 };
 
