@@ -68,9 +68,10 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   half->reset();  // the journal is closed: the body may read it
   if (!result) return code;
   const bool asked = border.now_at() == link::Stage::kEnding;
-  say(stdout, fmt::format("{}: {} of {} parcels settled, {} sorted; journal: {}\n",
+  say(stdout, fmt::format("{}: {} of {} parcels settled, {} sorted; a tick takes {:.2f} ms, {:.1f} ms at worst; "
+                          "journal: {}\n",
                           result->complete ? "complete" : "broken off", std::min(tally.settled, total), total,
-                          tally.sorted, options.journal.string()));
+                          tally.sorted, result->bridge->p50_ms, result->bridge->max_ms, options.journal.string()));
   // A bridge that a person ends leaves its body to the next one.
   if (interrupted() && !asked) return kExitInterrupted;
   border.closing.store(result->complete ? link::Closing::kComplete : link::Closing::kBrokenOff);

@@ -189,6 +189,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
     report.loop.late_p99_us = late->p99_us;
     report.loop.late_max_us = late->max_us;
   }
+  if (const auto& bridge = result.bridge) report.bridge = {bridge->p50_ms, bridge->p99_ms, bridge->max_ms};
   report.sim_seconds = result.end.s();
   report.wall_seconds = figures.wall_s;
   report.state_hash = state_hash(body, *verdict);

@@ -51,6 +51,9 @@ nlohmann::ordered_json to_json(const Report& report) {
                   {"late_p99_us", number(loop.late_p99_us)},
                   {"late_max_us", number(loop.late_max_us)},
                   {"degraded", loop.degraded}};
+  json["bridge"] = {{"p50_ms", number(report.bridge.p50_ms)},
+                    {"p99_ms", number(report.bridge.p99_ms)},
+                    {"max_ms", number(report.bridge.max_ms)}};
   json["sim_seconds"] = number(report.sim_seconds);
   json["wall_seconds"] = number(report.wall_seconds);
   json["state_hash"] = hex(report.state_hash);
@@ -88,6 +91,9 @@ std::string summary(const Report& report) {
   if (std::isfinite(report.loop.late_p50_us))
     line("begins late", fmt::format("{:.0f} µs median, {:.0f} µs p99, {:.0f} µs at worst", report.loop.late_p50_us,
                                     report.loop.late_p99_us, report.loop.late_max_us));
+  if (std::isfinite(report.bridge.p50_ms))
+    line("bridge ticks", fmt::format("{:.2f} ms median, {:.1f} ms p99, {:.1f} ms at worst", report.bridge.p50_ms,
+                                     report.bridge.p99_ms, report.bridge.max_ms));
   if (!report.loop.degraded.empty()) line("degraded", report.loop.degraded);
   line("time", fmt::format("{:.1f} s simulated in {:.1f} s", report.sim_seconds, report.wall_seconds));
   line("state hash", hex(report.state_hash));

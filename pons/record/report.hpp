@@ -47,6 +47,13 @@ struct Report {
     std::string degraded{};  // which real-time conditions the operating system refused, and what would help
   };
 
+  // Time of a tick of the bridge; NaN in lockstep, where it waits for the cameras' frames, and where it is not known.
+  struct Bridge {
+    double p50_ms = std::numeric_limits<double>::quiet_NaN();
+    double p99_ms = p50_ms;
+    double max_ms = p50_ms;
+  };
+
   std::uint64_t seed = 0;
   std::string world{};
   Parcels parcels{};
@@ -54,6 +61,7 @@ struct Report {
   std::int64_t retries = 0;
   Limits limits{};
   Loop loop{};
+  Bridge bridge{};
   double sim_seconds = 0;
   double wall_seconds = 0;
   std::uint64_t state_hash = 0;  // sixteen hexadecimal digits in the file; equal for equal runs of one seed

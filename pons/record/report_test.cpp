@@ -39,6 +39,7 @@ using Json = nlohmann::ordered_json;
                    .late_p99_us = 60,
                    .late_max_us = 880,
                    .degraded = "SCHED_FIFO refused"},
+          .bridge = {.p50_ms = 0.25, .p99_ms = 9, .max_ms = 22.5},
           .sim_seconds = 600,
           .wall_seconds = 41.25,
           .state_hash = 0x00f0e0d0c0b0a090};
@@ -70,6 +71,7 @@ TEST(Report, KeepsEveryFigure) {
     "limits": {"violations": 0, "worst_ratio": 0.985},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,
              "late_p50_us": 14.0, "late_p99_us": 60.0, "late_max_us": 880.0, "degraded": "SCHED_FIFO refused"},
+    "bridge": {"p50_ms": 0.25, "p99_ms": 9.0, "max_ms": 22.5},
     "sim_seconds": 600.0, "wall_seconds": 41.25, "state_hash": "00f0e0d0c0b0a090"})"));
 }
 
@@ -92,15 +94,17 @@ TEST(Report, WritesWhatItSays) {
 
 TEST(Report, SummaryIsAligned) {
   const std::string text = summary(example());
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 15);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 16);
   EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
   EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));
   EXPECT_THAT(text, HasSubstr("  begins late   14 µs median, 60 µs p99, 880 µs at worst\n"));
+  EXPECT_THAT(text, HasSubstr("  bridge ticks  0.25 ms median, 9.0 ms p99, 22.5 ms at worst\n"));
   EXPECT_THAT(text, HasSubstr("  degraded      SCHED_FIFO refused\n"));
   EXPECT_THAT(text, HasSubstr("  state hash    00f0e0d0c0b0a090\n"));
   const std::string lockstep = summary(Report{.throughput = throughput(3, 0)});
   EXPECT_THAT(lockstep, HasSubstr("nothing sorted"));
   EXPECT_THAT(lockstep, ::testing::Not(HasSubstr("begins late")));
+  EXPECT_THAT(lockstep, ::testing::Not(HasSubstr("bridge ticks")));
 }
 
 }  // namespace

@@ -54,10 +54,16 @@ struct LoopFigures {
   std::string degraded;           // real time only: what the operating system refused; empty when nothing
 };
 
+// Time of one bridge tick.
+struct BridgeFigures {
+  double p50_ms = 0, p99_ms = 0, max_ms = 0;
+};
+
 struct RunResult {
   Time end;
   bool complete = false;  // false: broken off
   LoopFigures loop;
+  std::optional<BridgeFigures> bridge;  // real time only: in lockstep a tick waits for the cameras' frames
 };
 
 // Tells the watch what the control loop has said since the last time.

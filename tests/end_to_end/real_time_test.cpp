@@ -57,7 +57,9 @@ TEST_F(RealTime, AgreesWithLockstepOnEachOfThirtyParcels) {
   }
   EXPECT_GT(realtime.report["loop"]["ticks"], 60'000);
   EXPECT_GT(realtime.report["loop"]["late_p50_us"], 0);
+  EXPECT_GT(realtime.report["bridge"]["max_ms"], 0);
   EXPECT_TRUE(lockstep.report["loop"]["late_p50_us"].is_null());
+  EXPECT_TRUE(lockstep.report["bridge"]["max_ms"].is_null());
 }
 
 }  // namespace
