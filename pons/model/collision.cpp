@@ -133,6 +133,7 @@ struct CollisionModel::Impl {
   }
 
   void choose_pairs() {
+    if (!margins.self_m) return;
     std::vector<std::pair<std::size_t, std::size_t>> touching;
     for (std::size_t a = 0; a < capsules.size(); ++a) {
       for (std::size_t b = 0; b < capsules.size(); ++b) {
@@ -174,14 +175,14 @@ struct CollisionModel::Impl {
     place_at(q);
     PerBody least;
     least.fill(kFar_m);
-    for (const auto& [a, b] : pairs) lower(least[bodies[b]], capsules[a], capsules[b], margins.self_m);
+    for (const auto& [a, b] : pairs) lower(least[bodies[b]], capsules[a], capsules[b], *margins.self_m);
     for (std::size_t i = 0; i < capsules.size(); ++i) {
       if (bodies[i] == 0) continue;  // what stands still does so among them
       for (const Shape& box : boxes) lower(least[bodies[i]], capsules[i], box, margins.scene_m);
     }
     if (!load) return least;
-    for (std::size_t i = 0; i < capsules.size(); ++i) {
-      if (bodies[i] < axes) lower(least[axes], capsules[i], *load, margins.load_m);
+    for (std::size_t i = 0; margins.load_m && i < capsules.size(); ++i) {
+      if (bodies[i] < axes) lower(least[axes], capsules[i], *load, *margins.load_m);
     }
     for (const Shape& box : boxes) lower(least[axes], *load, box, margins.scene_m);
     return least;
@@ -273,7 +274,7 @@ std::string CollisionModel::touching(const AxisVector& q) {
   const auto link = [&](std::size_t i) { return impl_->model.robot().capsules[i].link; };
   const auto& shapes = impl_->capsules;
   for (const auto& [a, b] : impl_->pairs) {
-    if (impl_->ruler.distance(shapes[a], shapes[b]) <= impl_->margins.self_m) return link(a) + " and " + link(b);
+    if (impl_->ruler.distance(shapes[a], shapes[b]) <= *impl_->margins.self_m) return link(a) + " and " + link(b);
   }
   for (std::size_t k = 0; k < impl_->boxes.size(); ++k) {
     for (std::size_t i = 0; i < shapes.size(); ++i) {
@@ -284,8 +285,8 @@ std::string CollisionModel::touching(const AxisVector& q) {
       return fmt::format("the load and box {}", k + 1);
     }
   }
-  for (std::size_t i = 0; impl_->load && i < shapes.size(); ++i) {
-    if (impl_->bodies[i] >= impl_->axes || impl_->ruler.distance(shapes[i], *impl_->load) > impl_->margins.load_m)
+  for (std::size_t i = 0; impl_->load && impl_->margins.load_m && i < shapes.size(); ++i) {
+    if (impl_->bodies[i] >= impl_->axes || impl_->ruler.distance(shapes[i], *impl_->load) > *impl_->margins.load_m)
       continue;
     return link(i) + " and the load";
   }

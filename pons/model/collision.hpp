@@ -25,9 +25,9 @@ struct CarriedBox {
 
 // How far everything keeps apart at least.
 struct CollisionMargins {
-  double scene_m = 0;  // robot and load from the boxes
-  double self_m = 0;   // links from one another
-  double load_m = 0;   // the load from the links
+  double scene_m = 0;              // robot and load from the boxes
+  std::optional<double> self_m{};  // links from one another; without it that is not judged,
+  std::optional<double> load_m{};  // and the load from the links likewise
 };
 
 // Bodies are what joints part: body 0 stands still, body k moves with axes 1 to k. A body's shape is its capsules of

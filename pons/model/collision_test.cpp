@@ -71,7 +71,7 @@ TEST_P(Collision, ABoxAtTheToolTouchesAndOneBesideItDoesNot) {
 }
 
 TEST_P(Collision, ALoadReachesFartherThanTheTool) {
-  CollisionModel model(model_.copy(), {});
+  CollisionModel model(model_.copy(), {.load_m = 0});
   const Pose home = model_.world_from_tip(robot_.home);
   model.surround(std::array{box(home * Vector3(0, 0, 0.15), {0.02, 0.02, 0.02})});
   ASSERT_TRUE(model.clear(robot_.home));
@@ -87,6 +87,25 @@ TEST_P(Collision, ALoadReachesFartherThanTheTool) {
   load.size_m = {1.2, 1.2, 1.2};
   model.carry(load);
   EXPECT_THAT(model.touching(robot_.home), HasSubstr("and the load"));
+}
+
+// Who judges only what stands around asks for no more.
+TEST_P(Collision, WithoutMarginsLinksAndLoadAreNotHeldApart) {
+  CollisionModel strict(model_.copy(), {.self_m = 0.0, .load_m = 0.0}), scene(model_.copy(), {});
+  CarriedBox load{.size_m = {1.2, 1.2, 1.2}};
+  Random random(1);
+  int folded = 0;
+  for (int i = 0; i < 200; ++i) {
+    const AxisVector q = draw(random, 3.1);
+    folded += strict.clear(q) ? 0 : 1;
+    EXPECT_TRUE(scene.clear(q));
+  }
+  EXPECT_GT(folded, 5);
+  strict.carry(load);
+  scene.carry(load);
+  EXPECT_FALSE(strict.clear(robot_.home));
+  EXPECT_TRUE(scene.clear(robot_.home));
+  EXPECT_EQ(scene.touching(robot_.home), "");
 }
 
 // Both ends clear, something thin between them: the line is refused, and what is accepted is clear at every posture.

@@ -92,25 +92,6 @@ std::pair<AxisVector, std::size_t> walk(const std::vector<AxisVector>& points, d
   return {points.back(), points.size() - 2};
 }
 
-void shorten(std::vector<AxisVector>& points, const FreeSpace& space, int tries, Random& random) {
-  for (int i = 0; i < tries && points.size() > 2; ++i) {
-    const double length = length_rad(points), a = length * random.uniform(), b = length * random.uniform();
-    const auto [first, first_line] = walk(points, std::min(a, b));
-    const auto [last, last_line] = walk(points, std::max(a, b));
-    if (first_line == last_line || !space.connects(first, last)) continue;
-    const auto begin = points.begin() + static_cast<std::ptrdiff_t>(first_line) + 1;
-    const auto at = points.erase(begin, points.begin() + static_cast<std::ptrdiff_t>(last_line) + 1);
-    points.insert(at, {first, last});
-  }
-  for (std::size_t i = 1; i + 1 < points.size();) {
-    if (space.connects(points[i - 1], points[i + 1])) {
-      points.erase(points.begin() + static_cast<std::ptrdiff_t>(i));
-    } else {
-      ++i;
-    }
-  }
-}
-
 Expected<void> check_end(const AxisVector& q, std::string_view name, const AxisLimits& limits, const FreeSpace& space) {
   if (q.size() != limits.position_min.size() || !q.allFinite()) {
     return fail("not one finite value an axis", std::string(name), "give one value an axis");
@@ -131,35 +112,107 @@ double length_rad(std::span<const AxisVector> points) {
   return length;
 }
 
+struct PathFinder::Impl {
+  AxisVector start, goal;
+  AxisLimits limits;
+  PathSearch search;
+  Random random;
+  Range range;
+  Tree from_start, from_goal;
+  bool begun = false, forward = true;  // the tree from the start grows
+  int iterations = 0, shortcuts = 0;
+  Path path;  // its points, once there is one
+
+  Impl(const AxisVector& a, const AxisVector& b, const AxisLimits& bounds, const PathSearch& how)
+      : start(a), goal(b), limits(bounds), search(how), random(how.seed), from_start(a), from_goal(b) {}
+
+  // The path itself where it is straight.
+  std::optional<Expected<Path>> begin(const FreeSpace& space) {
+    begun = true;
+    auto ok = check_end(start, "start", limits, space);
+    if (ok) ok = check_end(goal, "goal", limits, space);
+    if (!ok) return std::unexpected(ok.error());
+    if (space.connects(start, goal)) return Path{{start, goal}, 0, (goal - start).norm()};
+    range = sampled(start, goal, limits);
+    return {};
+  }
+
+  void sample(const FreeSpace& space) {
+    ++iterations;
+    Tree& growing = forward ? from_start : from_goal;
+    Tree& other = forward ? from_goal : from_start;
+    const bool grows_from_start = std::exchange(forward, !forward);
+    const auto grown = growing.extend(draw(random, range), space);
+    if (!grown) return;
+    const auto met = other.connect(growing.at(*grown), space);
+    if (!met) return;
+    std::vector<AxisVector> points = from_start.way_back(grows_from_start ? *grown : *met);
+    std::ranges::reverse(points);
+    const std::vector<AxisVector> rest = from_goal.way_back(grows_from_start ? *met : *grown);
+    points.insert(points.end(), rest.begin() + 1, rest.end());  // both hold where they met
+    path = {std::move(points), iterations, 0};
+    path.found_rad = length_rad(path.points);
+  }
+
+  void shorten(const FreeSpace& space) {
+    ++shortcuts;
+    std::vector<AxisVector>& points = path.points;
+    const double length = length_rad(points), a = length * random.uniform(), b = length * random.uniform();
+    const auto [first, first_line] = walk(points, std::min(a, b));
+    const auto [last, last_line] = walk(points, std::max(a, b));
+    if (first_line == last_line || !space.connects(first, last)) return;
+    const auto begin_at = points.begin() + static_cast<std::ptrdiff_t>(first_line) + 1;
+    const auto at = points.erase(begin_at, points.begin() + static_cast<std::ptrdiff_t>(last_line) + 1);
+    points.insert(at, {first, last});
+  }
+
+  void leave_out_corners(const FreeSpace& space) {
+    std::vector<AxisVector>& points = path.points;
+    for (std::size_t i = 1; i + 1 < points.size();) {
+      if (space.connects(points[i - 1], points[i + 1])) {
+        points.erase(points.begin() + static_cast<std::ptrdiff_t>(i));
+      } else {
+        ++i;
+      }
+    }
+  }
+};
+
+PathFinder::PathFinder(const AxisVector& start, const AxisVector& goal, const AxisLimits& limits,
+                       const PathSearch& search)
+    : impl_(std::make_unique<Impl>(start, goal, limits, search)) {}
+PathFinder::PathFinder(PathFinder&&) noexcept = default;
+PathFinder& PathFinder::operator=(PathFinder&&) noexcept = default;
+PathFinder::~PathFinder() = default;
+
+std::optional<Expected<Path>> PathFinder::advance(int steps, const FreeSpace& space) {
+  Impl& state = *impl_;
+  if (!state.begun) {
+    if (auto ended = state.begin(space)) return ended;
+  }
+  for (; steps > 0; --steps) {
+    if (state.path.points.empty()) {
+      if (state.iterations >= state.search.iterations) {
+        return fail(fmt::format("no path found with {} samples", state.search.iterations), "path",
+                    "clear the space, choose another goal, or allow more samples");
+      }
+      state.sample(space);
+    } else if (state.shortcuts < state.search.shortcuts && state.path.points.size() > 2) {
+      state.shorten(space);
+    } else {
+      state.leave_out_corners(space);
+      return std::move(state.path);
+    }
+  }
+  return {};
+}
+
 Expected<Path> find_path(const AxisVector& start, const AxisVector& goal, const AxisLimits& limits,
                          const FreeSpace& space, const PathSearch& search) {
-  auto ok = check_end(start, "start", limits, space);
-  if (ok) ok = check_end(goal, "goal", limits, space);
-  if (!ok) return std::unexpected(ok.error());
-  if (space.connects(start, goal)) return Path{{start, goal}, 0, (goal - start).norm()};
-
-  Random random(search.seed);
-  const Range range = sampled(start, goal, limits);
-  Tree from_start(start), from_goal(goal);
-  Tree *growing = &from_start, *other = &from_goal;
-  for (int i = 1; i <= search.iterations; ++i, std::swap(growing, other)) {
-    const auto grown = growing->extend(draw(random, range), space);
-    if (!grown) continue;
-    const AxisVector& meeting = growing->at(*grown);
-    const auto met = other->connect(meeting, space);
-    if (!met) continue;
-    const bool forward = growing == &from_start;
-    std::vector<AxisVector> points = from_start.way_back(forward ? *grown : *met);
-    std::ranges::reverse(points);
-    const std::vector<AxisVector> rest = from_goal.way_back(forward ? *met : *grown);
-    points.insert(points.end(), rest.begin() + 1, rest.end());  // both hold where they met
-    Path path{{}, i, length_rad(points)};
-    shorten(points, space, search.shortcuts, random);
-    path.points = std::move(points);
-    return path;
+  PathFinder finder(start, goal, limits, search);
+  for (;;) {
+    if (auto ended = finder.advance(search.iterations + search.shortcuts + 1, space)) return std::move(*ended);
   }
-  return fail(fmt::format("no path found with {} samples", search.iterations), "path",
-              "clear the space, choose another goal, or allow more samples");
 }
 
 }  // namespace pons::motion

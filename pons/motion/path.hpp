@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -42,5 +44,21 @@ struct Path {
 // Errors: start or goal outside the position limits, or not free; no path in so many iterations.
 [[nodiscard]] Expected<Path> find_path(const AxisVector& start, const AxisVector& goal, const AxisLimits& limits,
                                        const FreeSpace& space, const PathSearch& search);
+
+// The same search, and the same path, for who has only a little time now and then.
+class PathFinder {
+ public:
+  PathFinder(const AxisVector& start, const AxisVector& goal, const AxisLimits& limits, const PathSearch& search);
+  PathFinder(PathFinder&&) noexcept;
+  PathFinder& operator=(PathFinder&&) noexcept;
+  ~PathFinder();
+
+  // Goes on for so many samples, or as many tries to shorten. The path or the error once it has ended; then it is done.
+  [[nodiscard]] std::optional<Expected<Path>> advance(int steps, const FreeSpace& space);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace pons::motion

@@ -85,6 +85,20 @@ TEST(FindPath, OneSeedOnePath) {
   EXPECT_NE(one->points, other->points);
 }
 
+TEST(FindPath, InSmallStepsItIsTheSamePath) {
+  const Wall wall{.middle = 1.5, .gap = 0.3};
+  const auto whole = find_path(kLeft, kRight, square(2), wall.space(), {.seed = 7});
+  ASSERT_TRUE(whole);
+  PathFinder finder(kLeft, kRight, square(2), {.seed = 7});
+  int ticks = 1;
+  auto ended = finder.advance(2, wall.space());
+  for (; !ended; ++ticks) ended = finder.advance(2, wall.space());
+  ASSERT_TRUE(*ended);
+  EXPECT_EQ((*ended)->points, whole->points);
+  EXPECT_EQ((*ended)->iterations, whole->iterations);
+  EXPECT_GT(ticks, whole->iterations / 2);
+}
+
 TEST(FindPath, StaysWithinThePositionLimits) {
   const Wall wall{.middle = 1.9, .gap = 0.4};
   AxisLimits limits = square(2);

@@ -10,14 +10,15 @@ namespace pons::skills {
 namespace {
 
 // Together more than what the route's own check in time asks for, between two looks, too.
-constexpr model::CollisionMargins kMargins{.scene_m = 0.025, .self_m = 0.01, .load_m = 0.035};
+constexpr model::CollisionMargins kMargins{.scene_m = 0.025, .self_m = 0.0, .load_m = 0.035};
 constexpr double kGrow_m = 0.03;  // around what rides on the belt
 constexpr Duration kHorizon = std::chrono::seconds(3);
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
-// Enough for a post or a wall in a cell. Some milliseconds a hundred; the bridge waits for it.
-constexpr int kSamples = 300, kShortcuts = 40;
+// Enough for a post or a wall in a cell; and so many in a tick, which must not become long.
+constexpr int kSamples = 400, kShortcuts = 40, kStepsPerTick = 10;
+constexpr double kNearly_rad = 0.3;  // from what was asked for before: its path leads round the same things
 
 std::uint64_t seed_of(const AxisVector& from, const AxisVector& to) {
   Digest digest;
@@ -29,14 +30,17 @@ std::uint64_t seed_of(const AxisVector& from, const AxisVector& to) {
 }  // namespace
 
 Detour::Detour(const world::World& world, const model::RobotModel& model)
-    : world_(world), model_(model.copy()), collision_(model.copy(), kMargins) {}
+    : world_(world),
+      model_(model.copy()),
+      collision_(model.copy(), kMargins),
+      scene_(model.copy(), {.scene_m = kMargins.scene_m}) {}
 
 // On the chords of every 20 ms: at its acceleration limit an axis bends off them by a thousandth of a radian.
-bool Detour::clear(const motion::Trajectory& way) {
+bool Detour::clear(const motion::Trajectory& way, model::CollisionModel& judge) {
   const auto at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
   const Time end = way.back().end();
   for (Time time = way.front().start; time < end; time += kCheckEvery) {
-    if (!collision_.clear(at(time), at(std::min(time + kCheckEvery, end)))) return false;
+    if (!judge.clear(at(time), at(std::min(time + kCheckEvery, end)))) return false;
   }
   return true;
 }
@@ -44,9 +48,9 @@ bool Detour::clear(const motion::Trajectory& way) {
 bool Detour::keeps_off(const motion::Trajectory& way, const Load* load) {
   const std::vector<model::Box> boxes = standing(world_);
   if (boxes.empty()) return true;
-  collision_.surround(boxes);
-  collision_.carry(carried(load));
-  return clear(way);
+  scene_.surround(boxes);
+  scene_.carry(carried(load));
+  return clear(way, scene_);
 }
 
 // Straight up until it is clear.
@@ -62,18 +66,43 @@ Expected<AxisVector> Detour::lifted(const AxisVector& q) {
   return fail("no clear posture above it: " + collision_.touching(q), "route", "clear the space there");
 }
 
-// From rest to rest, past the corners without a halt where that stays clear, else along the path itself.
-Expected<motion::Trajectory> Detour::round(const AxisVector& from, Time at, const AxisVector& to,
-                                           const AxisLimits& limits) {
+Expected<std::vector<AxisVector>> Detour::corners(const AxisVector& from, const AxisVector& to, bool loaded,
+                                                  const AxisLimits& limits) {
+  const auto near = [](const AxisVector& a, const AxisVector& b) {
+    return (a - b).cwiseAbs().maxCoeff() < kNearly_rad;
+  };
+  const bool same = sought_ && sought_->loaded == loaded && near(sought_->from, from) && near(sought_->to, to);
+  if (!same) {
+    const motion::PathSearch search{.seed = seed_of(from, to), .iterations = kSamples, .shortcuts = kShortcuts};
+    sought_ = Sought{from, to, loaded, motion::PathFinder(from, to, limits, search), {}};
+  }
+  if (sought_->corners) return *sought_->corners;
+  const Error unfinished{"no way round found yet", "route", "ask again in the next tick"};
+  if (std::exchange(advanced_, true)) return std::unexpected(unfinished);
   const motion::FreeSpace space{[&](const AxisVector& q) { return collision_.clear(q); },
                                 [&](const AxisVector& a, const AxisVector& b) { return collision_.clear(a, b); }};
-  const auto path = motion::find_path(from, to, limits, space,
-                                      {.seed = seed_of(from, to), .iterations = kSamples, .shortcuts = kShortcuts});
-  if (!path) return std::unexpected(path.error());
-  const std::vector<AxisVector> corners(path->points.begin() + 1, path->points.end() - 1);
+  const auto ended = sought_->finder.advance(kStepsPerTick, space);
+  if (!ended) return std::unexpected(unfinished);
+  if (!*ended) {
+    sought_.reset();
+    return std::unexpected(ended->error());
+  }
+  const std::vector<AxisVector>& points = (*ended)->points;
+  sought_->corners.emplace(points.begin() + 1, points.end() - 1);
+  return *sought_->corners;
+}
+
+// From rest to rest, past the corners without a halt where that stays clear, else along the path itself.
+Expected<motion::Trajectory> Detour::round(const AxisVector& from, Time at, const AxisVector& to,
+                                           const std::vector<AxisVector>& corners, const AxisLimits& limits) {
   auto flying = motion::move_through(at_rest(from), at, corners, {to, AxisVector::Zero(to.size())}, limits);
-  if (flying && clear(*flying)) return flying;
-  return motion::move_straight(from, at, std::span(path->points).subspan(1), limits);
+  if (flying && clear(*flying, collision_)) return flying;
+  std::vector<AxisVector> points = corners;
+  points.push_back(to);
+  auto straight = motion::move_straight(from, at, points, limits);
+  if (!straight || clear(*straight, collision_)) return straight;
+  sought_.reset();
+  return fail("the way round is no longer clear", "route", "ask again");
 }
 
 Expected<motion::Trajectory> Detour::plan(const AxisState& start, Time at, const motion::Waypoint& end,
@@ -87,6 +116,8 @@ Expected<motion::Trajectory> Detour::plan(const AxisState& start, Time at, const
   const auto begin = lifted(from), over = lifted(end.position);
   if (!begin) return std::unexpected(begin.error());
   if (!over) return std::unexpected(over.error());
+  const auto turns = corners(*begin, *over, load != nullptr, limits);
+  if (!turns) return std::unexpected(turns.error());
   const auto join = [&](Expected<motion::Trajectory> next) -> Expected<void> {
     if (!next) return std::unexpected(next.error());
     way->insert(way->end(), next->begin(), next->end());
@@ -95,7 +126,7 @@ Expected<motion::Trajectory> Detour::plan(const AxisState& start, Time at, const
   const auto rest_at = [](const AxisVector& q) { return motion::Waypoint{q, AxisVector::Zero(q.size())}; };
   Expected<void> joined;
   if (*begin != from) joined = join(motion::move(at_rest(from), way->back().end(), rest_at(*begin), limits));
-  if (joined) joined = join(round(*begin, way->back().end(), *over, limits));
+  if (joined) joined = join(round(*begin, way->back().end(), *over, *turns, limits));
   if (joined && (*over != end.position || !end.speed.isZero())) {
     joined = join(motion::move(at_rest(*over), way->back().end(), end, limits));
   }

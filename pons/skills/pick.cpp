@@ -162,10 +162,10 @@ class Pick final : public task::Skill {
     if (!grasp) {
       if (cell_.router.spent()) {
         tried_.reset();
-      } else {
-        ++quarters_;
-        search_ = {};
+        return {};
       }
+      ++quarters_;
+      search_ = {};
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       if (!blocked_since_) blocked_since_ = now;

@@ -91,9 +91,11 @@ class Place final : public task::Skill {
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
     if (tried_ && now - *tried_ < kTryEvery) return {};
     if (const auto set_out = carry_to(*target, now); !set_out) {
+      if (cell_.router.spent()) return {};
+      tried_ = now;
+      search_ = {};
       // Others may be in the way, and ride on.
       if (!blocked_since_) blocked_since_ = now;
-      if (!cell_.router.spent()) tried_ = now, search_ = {};
       cell_.keep_clear(now);
       return now < *blocked_since_ + kBlockedFor ? Progress{}
                                                  : Progress{Status::kFailed, name_ + ": " + set_out.error().line(), {}};

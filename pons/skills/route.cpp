@@ -84,7 +84,7 @@ std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const P
 }
 
 // What a tick may search, and what a trajectory costs to plan, counted in postures judged: some microseconds each.
-constexpr int kWorkPerTick = 5000, kRoughWork = 30, kFineWork = 120;
+constexpr int kWorkPerTick = 5000, kRoughWork = 30, kFineWork = 120, kKeepOffWork = 100;
 constexpr double kNearly_m = 0.03;   // what a rough way may lack and a fine one have
 constexpr double kFineShare = 0.90;  // of a rough way's duration that its fine one may take
 
@@ -250,8 +250,7 @@ Expected<motion::Trajectory> Router::route(const AxisState& start, Time at, cons
   const AxisLimits wider = covering(limits, start);
   std::optional<Passage> none;
   auto way = over({start, at, end, load, obstacles, wider}, known == nullptr ? none : *known);
-  // The search takes longer than a tick may: only worlds that name an obstacle pay for it.
-  if (way || !detour_.has_obstacles()) return way;
+  if (way || exhausted() || !detour_.has_obstacles()) return way;
   auto round = detour_.plan(start, at, end, load, obstacles, wider);
   if (!round) {
     way.error().what += ", and none round it: " + round.error().line();
@@ -277,24 +276,24 @@ Expected<motion::Trajectory> Router::over(const Task& task, std::optional<Passag
     lowest = std::max(lowest, highest_m(object) + kObjectMargin_m + depth);
   }
   const double least_z = std::max(std::min(lowest, std::max(start_z, end_z) - clearance), std::min(start_z, end_z));
-  if (known) {
+  if (known && known->leads) {
     auto way = through(*known, least_z, motion::Effort::kFine, task);
     if (way && passes(*way, known->close_m, task)) return way;
   }
+  double searched_m = known && !known->leads ? known->higher_m : 0;
   std::optional<Candidate> found, squeezed;
   if (passes(*direct, kObjectGrow_m, task)) squeezed = Candidate{{.close_m = kObjectGrow_m}, *direct};
   for (const double higher_m : {0.02, 0.07, 0.14, 0.25}) {
-    if (known && higher_m < known->higher_m) continue;  // nothing was clear there
+    if (known && (known->leads ? higher_m < known->higher_m : higher_m <= known->higher_m)) continue;
     found = fastest(candidates(least_z, higher_m, task), least_z, squeezed, task);
     if (found) break;
-    if (spent()) {
-      known = Passage{.higher_m = higher_m, .close_m = kEndGrow_m};
-      break;
-    }
+    if (exhausted()) break;
+    searched_m = higher_m;
   }
   if (!found) found = std::move(squeezed);
   if (!found) {
-    return fail(spent() ? "no clear way found in time" : "no clear way", "route",
+    known = Passage{.higher_m = searched_m, .leads = false};
+    return fail(exhausted() ? "no clear way found in time" : "no clear way", "route",
                 "the cell is too crowded or the end is out of reach");
   }
   known = std::move(found->passage);
@@ -303,7 +302,7 @@ Expected<motion::Trajectory> Router::over(const Task& task, std::optional<Passag
 
 Expected<motion::Trajectory> Router::through(const Passage& passage, double least_z, motion::Effort effort,
                                              const Task& task) {
-  if (spent()) return fail("no time left to search", "route");
+  if (exhausted()) return fail("no time left to search", "route");
   work_ += effort == motion::Effort::kRough ? kRoughWork : kFineWork;
   std::vector<AxisVector> vias;
   for (const double share : passage.shares) {
@@ -351,7 +350,8 @@ std::optional<Router::Candidate> Router::fastest(std::vector<Candidate> candidat
 
 // Less than `enough_m`: by how much less was not looked at.
 double Router::clearance_of(const motion::Trajectory& way, double close_m, double enough_m, const Task& task) {
-  if (spent()) return kNone;
+  if (exhausted()) return kNone;
+  if (detour_.has_obstacles()) work_ += kKeepOffWork;
   const double least_m =
       worst_clearance(way, way.front().start, way.back().end(), close_m, task.load, task.obstacles, enough_m);
   return least_m < enough_m || detour_.keeps_off(way, task.load) ? least_m : kNone;
@@ -361,6 +361,6 @@ bool Router::passes(const motion::Trajectory& way, double close_m, const Task& t
   return clearance_of(way, close_m, 0, task) >= 0;
 }
 
-bool Router::spent() const { return work_ >= kWorkPerTick; }
+bool Router::exhausted() const { return work_ >= kWorkPerTick; }
 
 }  // namespace pons::skills

@@ -24,8 +24,9 @@ namespace pons::skills {
 // points lay, and how close it began to what stood beside it.
 struct Passage {
   double higher_m = 0;
-  std::vector<double> shares;
+  std::vector<double> shares{};
   double close_m = 0;
+  bool leads = true;  // false: there was none so far, and none is that high or lower
 };
 
 class Router {
@@ -44,11 +45,14 @@ class Router {
                                                    const AxisLimits& limits, std::optional<Passage>* known = nullptr);
 
   // Once a bridge tick, before any other: a tick searches only so far, or the arm would wait for its bridge.
-  void refresh() { work_ = 0; }
+  void refresh() {
+    work_ = 0;
+    detour_.refresh();
+  }
   // What was spent in this tick, in postures judged: some microseconds each.
   [[nodiscard]] int work() const { return work_; }
   // Whether this tick finds no more ways; the next one does.
-  [[nodiscard]] bool spent() const;
+  [[nodiscard]] bool spent() const { return exhausted() || detour_.searching(); }
 
   // Whether an arm that rests at q is clear of what comes along.
   [[nodiscard]] bool clear_at(const AxisVector& q, Time from, Time until, const Load* load,
@@ -81,6 +85,7 @@ class Router {
   [[nodiscard]] std::optional<Candidate> fastest(std::vector<Candidate> candidates, double least_z,
                                                  std::optional<Candidate>& squeezed, const Task& task);
   [[nodiscard]] double clearance_of(const motion::Trajectory& way, double close_m, double enough_m, const Task& task);
+  [[nodiscard]] bool exhausted() const;
   [[nodiscard]] bool passes(const motion::Trajectory& way, double close_m, const Task& task);
   struct Sweep;
   [[nodiscard]] double clearance_at(Time time, const Sweep& sweep);
