@@ -287,10 +287,11 @@ class Pick final : public task::Skill {
         replan(now, *object, moved_m);
       }
     }
+    // On its last way down it may meet the parcel sooner than it seemed: that is no collision.
+    if (now >= grasp_.hover) cell_.arm.expect_contact(kHandling_n);
     if (now + kVacuumLead >= grasp_.contact) {
       cell_.arm.vacuum(true);
       behind_ = Duration{0};
-      cell_.arm.expect_contact(kHandling_n);
       phase_ = Phase::kGrip;
     }
     return {};
