@@ -44,6 +44,46 @@ TEST(Sorting, TheBeltWaitsForAnArmThatCannotKeepUp) {
   EXPECT_LE(report["parcels"]["exceptions"]["undeserved"], 2) << run.out;
 }
 
+// A mast so tall that no way leads over it stands before chute 8: what goes there goes round it, and nothing touches
+// it.
+TEST(Sorting, AMastInTheWayIsGoneRound) {
+  const Folder folder;
+  const auto worlds = folder / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  const auto insert = [&](const std::string& file, const std::string& line, const std::string& before) {
+    std::string text = read_text(worlds / "parcel_cell" / file);
+    const auto at = text.find(before);
+    ASSERT_NE(at, std::string::npos) << file;
+    write_text(worlds / "parcel_cell" / file, text.insert(at, line));
+  };
+  insert("world.yaml", "  - {name: mast, kind: obstacle, center: [-0.50, -0.75, 0.75], size: [0.08, 0.08, 1.50]}\n",
+         "  - {name: tray, kind: tray");
+  insert("scene.xml", "    <geom pos=\"-0.50 -0.75 0.75\" size=\"0.04 0.04 0.75\" material=\"frame\"/>\n",
+         "    <geom name=\"exception_floor\"");
+  const Finished run =
+      run_pons({"run", "parcel_cell", "--parcels", "20", "--seed", "1", "--quiet", "--explain", "--report",
+                folder / "report.json", "--journal", folder / "j.db", "--log", folder / "log.txt"},
+               {"PONS_WORLDS=" + worlds.string()});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  expect_accounted_for(report);
+  EXPECT_GE(report["parcels"]["sorted"], 18) << run.out;
+  EXPECT_EQ(report["parcels"]["missorted"], 0) << run.out;
+  EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
+  EXPECT_EQ(read_text(folder / "log.txt").find("collision"), std::string::npos) << "it was touched";
+  EXPECT_EQ(run.out.find("ordered chute_8"), std::string::npos) << run.out;
+  const auto journal = bridge::Journal::open_to_read(folder / "j.db");
+  ASSERT_TRUE(journal) << journal.error().line();
+  int there = 0;
+  const auto tasks = (*journal)->tasks();
+  ASSERT_TRUE(tasks);
+  for (const bridge::TaskRecord& record : *tasks) {
+    const bool wanted = to_json(record.task).dump().find("chute_8") != std::string::npos;
+    there += wanted && record.outcome && record.outcome->outcome == task::Outcome::kSucceeded ? 1 : 0;
+  }
+  EXPECT_GE(there, 3);
+}
+
 // Of every kind, with sides drawn evenly up to 0.40 m: also what hardly passes a mouth, and what does not.
 TEST(Sorting, ParcelsOfAnySizeAreSortedOrLetRide) {
   const Folder folder;
