@@ -35,11 +35,11 @@ class Router {
   Router(const world::World& world, model::RobotModel model);
 
   // From `start` at `at` to `end`, clear of `obstacles` (as they will be at each moment) and rims: with a margin,
-  // close to both ends without. Straight, else over what is in the way by one or two via points, else round it on a
-  // path that is found by sampling (detour.hpp). Only in a world that names an obstacle. A passage that is `known` is
-  // tried before any is searched for, and none lower than it is. What is found is left there, for who asks again for
-  // nearly the same; and how high a search came that its tick cut short, for who asks again in the next. Errors: no
-  // clear way found, or an end that cannot be reached.
+  // close to both ends without. Straight, else over what is in the way by one or two via points, else, in a world that
+  // names an obstacle, round it on a path that is found by sampling (detour.hpp). A passage that is `known` is tried
+  // before any is searched for, and none lower than it is. What is found is left there, for who asks again for nearly
+  // the same; and how high a search came that its tick cut short, for who asks again in the next. Errors: no clear way
+  // found, or an end that cannot be reached.
   [[nodiscard]] Expected<motion::Trajectory> route(const AxisState& start, Time at, const motion::Waypoint& end,
                                                    const Load* load, std::span<const ObjectBelief> obstacles,
                                                    const AxisLimits& limits, std::optional<Passage>* known = nullptr);
