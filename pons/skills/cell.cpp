@@ -22,8 +22,8 @@ constexpr double kLoadedSpeedShare = 0.92;
 constexpr double kGripShare = 0.40;
 constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
 constexpr double kSlowestShare = 0.10;
-constexpr double kBoldest = 0.5, kTimid = 0.9;  // of one correction
-constexpr double kUnsure_kg = 0.1;              // the scale's
+constexpr double kBoldest = 0.5, kTimid = 0.97;  // of one correction
+constexpr double kUnsure_kg = 0.1;               // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kRise_m = 0.05;
