@@ -22,8 +22,10 @@ constexpr double kLoadedSpeedShare = 0.92;
 constexpr double kGripShare = 0.40;
 constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
 constexpr double kSlowestShare = 0.10;
-constexpr double kBoldest = 0.5, kTimid = 0.97;  // of one correction
-constexpr double kUnsure_kg = 0.1;               // the scale's
+// Of one correction: a few are fine, but what no speed helps must come to an end.
+constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
+constexpr int kFineCorrections = 5;
+constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kRise_m = 0.05;
@@ -168,6 +170,12 @@ AxisLimits Cell::limits_loaded(double share) const {
 }
 
 Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal, Search& search) {
+  auto way = carry_on(now, goal, search);
+  if (way || !router.spent()) search = {};
+  return way;
+}
+
+Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& search) {
   for (;;) {
     const AxisLimits limits = limits_loaded(search.share);
     const Time from = arm.splice_time(now, limits);
@@ -181,7 +189,8 @@ Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal, Search& sea
     const double grip = grip_use(model, world.robot.tool, held->load, mass_kg, *way) / kGripShare;
     const double use = std::max(grip, torque_use(model, world.robot, held->load, mass_kg, *way) / kTorqueShare);
     if (use <= 1 || search.share <= kSlowestShare) return way;
-    search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, kTimid));
+    const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;
+    search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, timid));
   }
 }
 

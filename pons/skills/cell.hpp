@@ -69,9 +69,10 @@ class Cell {
   [[nodiscard]] AxisLimits limits_planned() const;
   // Likewise, and as slow as zones want it: what the arm keeps with the cups empty.
   [[nodiscard]] AxisLimits limits_empty() const;
-  // How a carry is being found: a tick may be too short to find it.
+  // How a carry is being found, while a tick is too short to find it; empty again when it has ended.
   struct Search {
     double share = 1;  // of the acceleration limits
+    int corrections = 0;
     std::optional<Passage> known;
   };
   // Where a carry shall end, joints, given those it starts from.
@@ -95,6 +96,7 @@ class Cell {
   std::uint64_t streams = 0;            // there were so far
 
  private:
+  [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
 
   double view_end_m_;

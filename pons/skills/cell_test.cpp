@@ -138,6 +138,17 @@ TEST_F(CarryTest, EndsAtRestAtTheGoalWithinTheLimits) {
   EXPECT_LE(motion::limit_use(way, world_.robot.limits).worst(), 1.0);
 }
 
+// What was found out about one way is not carried over to the next.
+TEST_F(CarryTest, ASearchThatHasEndedIsForgotten) {
+  cell_.held = Held{"P000001", {.size_m = {0.3, 0.3, 0.2}}, 3.4};
+  Cell::Search search{.share = 0.3, .corrections = 2, .known = Passage{.higher_m = 0.25, .leads = false}};
+  const auto way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); }, search);
+  ASSERT_TRUE(way) << way.error().line();
+  EXPECT_EQ(search.share, 1);
+  EXPECT_EQ(search.corrections, 0);
+  EXPECT_FALSE(search.known);
+}
+
 TEST_F(CarryTest, AGoalOutOfReachIsNamed) {
   cell_.held = Held{"P000001", {.size_m = {0.2, 0.2, 0.1}}, 1};
   Cell::Search search;

@@ -66,18 +66,19 @@ Expected<AxisVector> Detour::lifted(const AxisVector& q) {
   return fail("no clear posture above it: " + collision_.touching(q), "route", "clear the space there");
 }
 
-Expected<std::vector<AxisVector>> Detour::corners(const AxisVector& from, const AxisVector& to, bool loaded,
+Expected<std::vector<AxisVector>> Detour::corners(const AxisVector& from, const AxisVector& to, const Vector3& load_m,
                                                   const AxisLimits& limits) {
   const auto near = [](const AxisVector& a, const AxisVector& b) {
     return (a - b).cwiseAbs().maxCoeff() < kNearly_rad;
   };
-  const bool same = sought_ && sought_->loaded == loaded && near(sought_->from, from) && near(sought_->to, to);
+  const bool same = sought_ && sought_->load_m == load_m && near(sought_->from, from) && near(sought_->to, to);
+  const Error unfinished{"no way round found yet", "route", "ask again in the next tick"};
+  if (!same && advanced_) return std::unexpected(unfinished);  // one search a tick
   if (!same) {
     const motion::PathSearch search{.seed = seed_of(from, to), .iterations = kSamples, .shortcuts = kShortcuts};
-    sought_ = Sought{from, to, loaded, motion::PathFinder(from, to, limits, search), {}};
+    sought_ = Sought{from, to, load_m, motion::PathFinder(from, to, limits, search), {}};
   }
   if (sought_->corners) return *sought_->corners;
-  const Error unfinished{"no way round found yet", "route", "ask again in the next tick"};
   if (std::exchange(advanced_, true)) return std::unexpected(unfinished);
   const motion::FreeSpace space{[&](const AxisVector& q) { return collision_.clear(q); },
                                 [&](const AxisVector& a, const AxisVector& b) { return collision_.clear(a, b); }};
@@ -100,8 +101,9 @@ Expected<motion::Trajectory> Detour::round(const AxisVector& from, Time at, cons
   std::vector<AxisVector> points = corners;
   points.push_back(to);
   auto straight = motion::move_straight(from, at, points, limits);
-  if (!straight || clear(*straight, collision_)) return straight;
+  if (straight && clear(*straight, collision_)) return straight;
   sought_.reset();
+  if (!straight) return straight;
   return fail("the way round is no longer clear", "route", "ask again");
 }
 
@@ -116,7 +118,7 @@ Expected<motion::Trajectory> Detour::plan(const AxisState& start, Time at, const
   const auto begin = lifted(from), over = lifted(end.position);
   if (!begin) return std::unexpected(begin.error());
   if (!over) return std::unexpected(over.error());
-  const auto turns = corners(*begin, *over, load != nullptr, limits);
+  const auto turns = corners(*begin, *over, load != nullptr ? load->size_m : Vector3::Zero(), limits);
   if (!turns) return std::unexpected(turns.error());
   const auto join = [&](Expected<motion::Trajectory> next) -> Expected<void> {
     if (!next) return std::unexpected(next.error());

@@ -20,9 +20,9 @@ class Detour {
 
   // From `start` at `at` to `end`: halts where it is in motion, rises where it is too close to something, goes round on
   // a path found by sampling (motion/path.hpp), and comes down the same way. The path keeps off what `objects` sweep
-  // over in the next kHorizon; rising and coming down are for the caller to check. The same task, the same way.
-  // Errors: start or end in touch with what is named, or no path. While searching(), whoever asks in the next tick for
-  // nearly the same, goes on.
+  // over in the next kHorizon; rising and coming down are for the caller to check.
+  // A path that was found is kept for who asks for nearly the same. Errors: start or end in touch with what is named,
+  // or no path. While searching(), whoever asks in the next tick for nearly the same, goes on.
   [[nodiscard]] Expected<motion::Trajectory> plan(const AxisState& start, Time at, const motion::Waypoint& end,
                                                   const Load* load, std::span<const ObjectBelief> objects,
                                                   const AxisLimits& limits);
@@ -39,8 +39,8 @@ class Detour {
   [[nodiscard]] bool clear(const motion::Trajectory& way, model::CollisionModel& judge);
   [[nodiscard]] Expected<AxisVector> lifted(const AxisVector& q);
   // Where the path from `from` to `to` turns.
-  [[nodiscard]] Expected<std::vector<AxisVector>> corners(const AxisVector& from, const AxisVector& to, bool loaded,
-                                                          const AxisLimits& limits);
+  [[nodiscard]] Expected<std::vector<AxisVector>> corners(const AxisVector& from, const AxisVector& to,
+                                                          const Vector3& load_m, const AxisLimits& limits);
   [[nodiscard]] Expected<motion::Trajectory> round(const AxisVector& from, Time at, const AxisVector& to,
                                                    const std::vector<AxisVector>& corners, const AxisLimits& limits);
 
@@ -49,7 +49,7 @@ class Detour {
   model::CollisionModel collision_, scene_;  // the latter of what stands there alone
   struct Sought {
     AxisVector from, to;
-    bool loaded;
+    Vector3 load_m;  // the size of what is carried, or nothing
     motion::PathFinder finder;
     std::optional<std::vector<AxisVector>> corners;  // once it is found
   };

@@ -246,15 +246,17 @@ Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, con
   return meeting;
 }
 
-Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
-                           const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search) {
+namespace {
+
+Expected<Grasp> earliest(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                         const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search) {
   AxisLimits limits = cell.limits_empty();
   // The way there takes time, in which the parcel rides on: a fixed point that a few rounds find. They begin with the
   // straight way: where the parcel will not be by then, another may.
   const auto straight = meet_straight(cell, start, at, object, orientation);
   if (!straight) return std::unexpected(straight.error());
   Grasp grasp{.orientation = straight->orientation};
-  double ahead_s = straight->ahead_s + search.later_s;
+  double ahead_s = search.meets ? to_s(*search.meets - at) : straight->ahead_s + search.later_s;
   Expected<motion::Trajectory> way = fail("out of reach", "grasp");
   AxisVector seed = straight->q;
   for (int round = kStraightRounds; round < kRounds; ++round) {
@@ -264,6 +266,7 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
     seed = *q;
     way = cell.router.route(start, at, coming_down(cell, *q), nullptr, cell.objects(), limits, &search.known);
     if (!way) {
+      if (cell.router.spent()) search.meets = at + from_s(ahead_s);
       if (cell.router.spent() || search.later_s >= kLatest_s) return std::unexpected(way.error());
       // A way round takes longer, and by then what rides behind the parcel is where the parcel was to be met.
       search = {.later_s = search.later_s + kLater_s};
@@ -304,6 +307,15 @@ Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const Ob
   const auto along = ride(cell, touching, grasp.contact, grasp.orientation, kRide_s);
   if (!along) return std::unexpected(along.error());
   append(grasp.trajectory, *along);
+  return grasp;
+}
+
+}  // namespace
+
+Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
+                           const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search) {
+  auto grasp = earliest(cell, start, at, object, orientation, search);
+  if (grasp || !cell.router.spent()) search = {};
   return grasp;
 }
 

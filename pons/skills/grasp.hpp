@@ -41,9 +41,10 @@ struct Meeting {
 [[nodiscard]] Expected<Meeting> meet_straight(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                               const std::optional<Eigen::Matrix3d>& orientation);
 
-// How a grasp is being found: a tick may be too short to find it.
+// How a grasp is being found, while a tick is too short to find it; empty again when it has ended.
 struct GraspSearch {
-  double later_s = 0;  // than on the straight way: what is sooner was found blocked
+  double later_s = 0;         // than on the straight way: what is sooner was found blocked
+  std::optional<Time> meets;  // over the parcel, by the last way that was found
   std::optional<Passage> known;
 };
 

@@ -9,18 +9,20 @@ using task::Progress;
 using task::Status;
 
 constexpr double kAbove_m = 0.15;
-constexpr Duration kSearchFor = std::chrono::milliseconds(200);  // where one tick is too short to find a way
+constexpr Duration kSearchFor = std::chrono::milliseconds(1000);  // where one tick is too short to find a way
 constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 
 class MoveTo final : public task::Skill {
  public:
-  MoveTo(Cell& cell, std::string place, std::string path, Time now)
-      : cell_(cell), place_(std::move(place)), path_(std::move(path)), started_(now), delay_(cell.arm) {}
+  MoveTo(Cell& cell, std::string place, std::string path)
+      : cell_(cell), place_(std::move(place)), path_(std::move(path)), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
     arrives_ += delay_.take();
     if (!cell_.arm.operational()) {
       moving_ = false;
+      search_ = {};
+      since_.reset();
       return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{};
     }
     if (moving_) {
@@ -30,7 +32,8 @@ class MoveTo final : public task::Skill {
     }
     if (path_ == kLine && now < cell_.arm.motion_end()) return {};  // a line begins at rest
     const auto way = plan(now);
-    if (!way && cell_.router.spent() && now < started_ + kSearchFor) return {};
+    if (!since_) since_ = now;
+    if (!way && cell_.router.spent() && now < *since_ + kSearchFor) return {};
     if (!way) return {Status::kFailed, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
@@ -66,7 +69,7 @@ class MoveTo final : public task::Skill {
     const auto q = target(state.position);
     if (!q) return std::unexpected(q.error());
     return cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                              cell_.limits_empty());
+                              cell_.limits_empty(), &search_.known);
   }
 
   Expected<motion::Trajectory> line(Time now) {
@@ -88,9 +91,9 @@ class MoveTo final : public task::Skill {
 
   Cell& cell_;
   std::string place_, path_;
-  Time started_;
   Delay delay_;
   Cell::Search search_;
+  std::optional<Time> since_;  // it is searched
   Time arrives_;
   double way_s_ = 0;
   bool moving_ = false, cancelled_ = false;
@@ -110,9 +113,9 @@ task::SkillType move_to(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
-          .start = [&cell](const task::Json& arguments, Time now) {
+          .start = [&cell](const task::Json& arguments, Time) {
             return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
-                                            arguments.value("path", std::string(kJoints)), now);
+                                            arguments.value("path", std::string(kJoints)));
           }};
 }
 

@@ -165,7 +165,6 @@ class Pick final : public task::Skill {
         return {};
       }
       ++quarters_;
-      search_ = {};
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       if (!blocked_since_) blocked_since_ = now;
@@ -303,9 +302,8 @@ class Pick final : public task::Skill {
       return;
     const Time from = cell_.arm.splice_time(now);
     const double turn = yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
-    GraspSearch search;
     const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
-                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation, search);
+                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation, search_);
     planned_ = now;
     if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
   }

@@ -52,6 +52,7 @@ class Place final : public task::Skill {
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       phase_ = Phase::kPlan;
+      search_ = {};
       return cancelled_ ? Progress{Status::kFailed, "cancelled; still held", {}} : Progress{};
     }
     switch (phase_) {
@@ -93,7 +94,6 @@ class Place final : public task::Skill {
     if (const auto set_out = carry_to(*target, now); !set_out) {
       if (cell_.router.spent()) return {};
       tried_ = now;
-      search_ = {};
       // Others may be in the way, and ride on.
       if (!blocked_since_) blocked_since_ = now;
       cell_.keep_clear(now);

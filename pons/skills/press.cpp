@@ -81,7 +81,9 @@ class Press final : public task::Skill {
     const auto q = cell_.model.inverse(Cell::tip_down(over, yaw), state.position);
     if (!q) return {Status::kFailed, q.error().line(), {}};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                                        cell_.limits_empty());
+                                        cell_.limits_empty(), &known_);
+    if (!way && cell_.router.spent()) return {};
+    known_.reset();
     if (!way) return {Status::kRetry, way.error().line(), {}};
     if (auto sent = cell_.arm.stream(*way); !sent) return {Status::kRetry, sent.error().line(), {}};
     arrives_ = way->back().end();
@@ -169,6 +171,7 @@ class Press final : public task::Skill {
   std::string place_;
   double force_n_;
   Duration hold_;
+  std::optional<Passage> known_;
   Phase phase_ = Phase::kStart;
   Time arrives_, began_;
   std::optional<Time> touched_, steady_since_;

@@ -25,6 +25,7 @@ constexpr double kCover = 1.0 + 1e-6;
 constexpr double kToolRadius_m = 0.038;
 constexpr double kUsualHeight_m = 0.20;  // of what stands on the belt: a way over it is tried first
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
+constexpr int kMostChecks = 80;
 
 // Points of tool or load that come lowest.
 std::vector<Vector3> probes(const Load* load) {
@@ -83,8 +84,9 @@ std::vector<Neighbour> neighbours_of(const std::vector<Vector3>& points, const P
   return neighbours;
 }
 
-// What a tick may search, and what a trajectory costs to plan, counted in postures judged: some microseconds each.
-constexpr int kWorkPerTick = 5000, kRoughWork = 30, kFineWork = 120, kKeepOffWork = 100;
+// What a tick may search, how much may be spent in one that counts as whole, and what a trajectory costs to plan:
+// counted in postures judged, some microseconds each.
+constexpr int kWorkPerTick = 5000, kWholeTick = 1000, kRoughWork = 30, kFineWork = 120, kKeepOffWork = 100;
 constexpr double kNearly_m = 0.03;   // what a rough way may lack and a fine one have
 constexpr double kFineShare = 0.90;  // of a rough way's duration that its fine one may take
 
@@ -143,9 +145,11 @@ double Router::worst_clearance(const Positions& at, Time begin, Time end, double
               probes(load), {}};
   sweep.neighbours = neighbours_of(sweep.points, sweep.first, begin, close_m, obstacles);
   // Ways between the same ends mostly fail at the same moment: who only asks whether, often knows after that one.
+  // A slower way is looked at less often: a height must be searched through within a tick.
+  const Duration every = std::max(kCheckEvery, (end - begin) / kMostChecks);
   double worst = std::numeric_limits<double>::infinity();
   if (begin + witness_ < end) worst = clearance_at(begin + witness_, sweep);
-  for (Time time = begin; time < end && worst >= enough_m; time += kCheckEvery) {
+  for (Time time = begin; time < end && worst >= enough_m; time += every) {
     const double here = clearance_at(time, sweep);
     if (here < worst) worst = here, witness_ = time - begin;
   }
@@ -285,14 +289,18 @@ Expected<motion::Trajectory> Router::over(const Task& task, std::optional<Passag
   if (passes(*direct, kObjectGrow_m, task)) squeezed = Candidate{{.close_m = kObjectGrow_m}, *direct};
   for (const double higher_m : {0.02, 0.07, 0.14, 0.25}) {
     if (known && (known->leads ? higher_m < known->higher_m : higher_m <= known->higher_m)) continue;
+    const bool whole = work_ < kWholeTick;
     found = fastest(candidates(least_z, higher_m, task), least_z, squeezed, task);
     if (found) break;
-    if (exhausted()) break;
+    // The next tick begins with the height that this one did not end with; but what fills a whole tick is done with it.
+    if (exhausted() && !whole) break;
     searched_m = higher_m;
+    if (exhausted()) break;
   }
   if (!found) found = std::move(squeezed);
   if (!found) {
-    known = Passage{.higher_m = searched_m, .leads = false};
+    if (!exhausted() || searched_m > 0 || !known || !known->leads)
+      known = Passage{.higher_m = searched_m, .leads = false};
     return fail(exhausted() ? "no clear way found in time" : "no clear way", "route",
                 "the cell is too crowded or the end is out of reach");
   }

@@ -396,7 +396,7 @@ TEST_F(RouteTest, ATallPostIsGoneRound) {
   world::World world = parcel_cell();
   world.places.push_back({"post", world::PlaceKind::kObstacle, {0.02, 0.08, 1.15}, {0.06, 0.06, 0.5}});
   Router router(world, model_.copy());
-  model::CollisionModel collision(model_.copy(), {});
+  model::CollisionModel collision(model_.copy(), {.self_m = 0.0, .load_m = 0.0});
   collision.surround(standing(world));
   const Load load{.size_m = {0.12, 0.1, 0.08}};
   const auto touches = [&](const motion::Trajectory& way, const Load* carries) {

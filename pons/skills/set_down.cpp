@@ -24,11 +24,11 @@ constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
 
 Expected<void> SetDown::begin(Time now) {
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
-  for (const double over_belt_m : kOverBelt_m) {
-    way = way_to_belt(now, over_belt_m);
-    if (way) break;
+  for (; height_ < kOverBelt_m.size() && !way; ++height_) {
+    way = way_to_belt(now, kOverBelt_m[height_]);
+    if (!way && cell_.router.spent()) return std::unexpected(way.error());  // the next tick goes on from there
   }
-  if (way || !cell_.router.spent()) search_ = {};
+  height_ = 0;
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(*way); !sent) return sent;
   begin_at(way->back().end());

@@ -28,6 +28,7 @@ class SetDown {
   Cell& cell_;
   Delay delay_;
   Cell::Search search_;
+  std::size_t height_ = 0;  // over the belt, that is being searched
   Time released_at_;
 };
 
