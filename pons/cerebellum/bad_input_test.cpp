@@ -89,6 +89,11 @@ const BadCommand kCommands[] = {
        c.kind = CommandKind::kPayload;
        c.payload_com_m = {0, 0, kInf};
      }},
+    {"BeltThatDoesNeither",
+     [](auto& c) {
+       c.kind = CommandKind::kBelt;
+       c.belt = static_cast<link::Belt>(2);
+     }},
     {"KindThatIsNone", [](auto& c) { c.kind = static_cast<CommandKind>(200); }, StopCause::kNone},
     {"ResetInMotion", [](auto& c) { c.kind = CommandKind::kReset; }, StopCause::kNone},
     {"ArmInMotion", [](auto& c) { c.kind = CommandKind::kArm; }, StopCause::kNone},
@@ -225,6 +230,17 @@ const BadSetting kSettings[] = {
     {"NoHeartbeat", [](auto&, auto& s) { s.heartbeat_timeout = Duration{0}; }, "settings.heartbeat_timeout"},
     {"StallBelowAPeriod", [](auto&, auto& s) { s.stall_timeout = s.period; }, "settings.stall_timeout - period"},
     {"GainNan", [](auto&, auto& s) { s.gains.speed_1_s = kNan; }, "settings.gains.speed_1_s"},
+    {"BrakeNan", [](auto&, auto& s) { s.gains.brake_1_s = kNan; }, "settings.gains.brake_1_s"},
+    {"YieldingInfinite", [](auto&, auto& s) { s.yielding_error_rad = kInf; }, "settings.yielding_error_rad"},
+    {"CollisionShareNan", [](auto&, auto& s) { s.collision.torque_share = kNan; }, "settings.collision.torque_share"},
+    {"CollisionForceNan", [](auto&, auto& s) { s.collision.force_n = kNan; }, "settings.collision.force_n"},
+    {"ObserverStands", [](auto&, auto& s) { s.collision.bandwidth_rad_s = 0; }, "settings.collision.bandwidth_rad_s"},
+    {"CollisionWithoutMeasurement", [](auto&, auto& s) { s.collision.measurements = 0; },
+     "settings.collision.measurements"},
+    {"FadeNegative", [](auto&, auto& s) { s.control.fade_s = -0.1; }, "settings.control.fade_s"},
+    {"BiasNan", [](auto&, auto& s) { s.control.bias_s = kNan; }, "settings.control.bias_s"},
+    {"StiffnessNan", [](auto&, auto& s) { s.control.compliance.stiffness_n_m = kNan; },
+     "settings.control.compliance.stiffness_n_m"},
     {"ErrorInfinite", [](auto&, auto& s) { s.following_error_rad = kInf; }, "settings.following_error_rad"},
     {"ShareAboveOne", [](auto&, auto& s) { s.zone_speed_share[3] = 1.5; }, "settings.zone_speed_share"},
     {"RecoveryAtNothing", [](auto&, auto& s) { s.recovery_share = 0; }, "settings.recovery_share"},

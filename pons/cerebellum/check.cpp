@@ -49,6 +49,52 @@ Expected<void> check_strength(const model::RobotModel& model) {
               robot.name + ": limits.torque_nm", "raise it, or correct the masses");
 }
 
+// With one that is not finite a comparison would never hold, and what it guards would be off.
+Expected<void> check_numbers(const Settings& settings) {
+  const Gains& gains = settings.gains;
+  const CollisionSettings& collision = settings.collision;
+  const ComplianceLimits& compliance = settings.control.compliance;
+  struct Number {
+    const char* name;
+    double value;
+    bool may_be_zero = true;
+  };
+  const std::array numbers{Number{"gains.position_1_s2", gains.position_1_s2},
+                           Number{"gains.speed_1_s", gains.speed_1_s},
+                           Number{"gains.integral_1_s3", gains.integral_1_s3},
+                           Number{"gains.brake_1_s", gains.brake_1_s},
+                           Number{"gains.integral_max_rad_s2", gains.integral_max_rad_s2},
+                           Number{"following_error_rad", settings.following_error_rad},
+                           Number{"yielding_error_rad", settings.yielding_error_rad},
+                           Number{"standstill_rad_s", settings.standstill_rad_s},
+                           Number{"max_payload_kg", settings.max_payload_kg},
+                           Number{"rate.slower_1_s", settings.rate.slower_1_s},
+                           Number{"rate.faster_1_s", settings.rate.faster_1_s},
+                           Number{"rate.change_1_s2", settings.rate.change_1_s2},
+                           Number{"collision.bandwidth_rad_s", collision.bandwidth_rad_s, false},
+                           Number{"collision.torque_share", collision.torque_share},
+                           Number{"collision.motion_share", collision.motion_share},
+                           Number{"collision.force_n", collision.force_n},
+                           Number{"collision.load_share", collision.load_share},
+                           Number{"collision.lever_m", collision.lever_m},
+                           Number{"collision.measurements", 1.0 * collision.measurements, false},
+                           Number{"collision.contact_max_n", collision.contact_max_n},
+                           Number{"control.fade_s", settings.control.fade_s, false},
+                           Number{"control.bias_s", settings.control.bias_s, false},
+                           Number{"control.compliance.stiffness_n_m", compliance.stiffness_n_m},
+                           Number{"control.compliance.stiffness_nm_rad", compliance.stiffness_nm_rad},
+                           Number{"control.compliance.damping_ns_m", compliance.damping_ns_m, false},
+                           Number{"control.compliance.damping_nms_rad", compliance.damping_nms_rad, false},
+                           Number{"control.compliance.force_n", compliance.force_n, false},
+                           Number{"control.compliance.lever_m", compliance.lever_m}};
+  for (const auto& [name, value, may_be_zero] : numbers) {
+    if (std::isfinite(value) && (value > 0 || (may_be_zero && value == 0))) continue;
+    return fail(fmt::format("is {}", value), fmt::format("settings.{}", name),
+                may_be_zero ? "give it a number, 0 or more" : "give it a number above 0");
+  }
+  return {};
+}
+
 Expected<void> check_settings(const Settings& settings) {
   const std::array<std::pair<const char*, Duration>, 9> durations{
       {{"period", settings.period},
@@ -63,22 +109,7 @@ Expected<void> check_settings(const Settings& settings) {
   for (const auto& [name, duration] : durations) {
     if (duration <= Duration{0}) return fail("is not above 0", fmt::format("settings.{}", name), "give it some time");
   }
-  const Gains& gains = settings.gains;
-  const std::array<std::pair<const char*, double>, 10> numbers{
-      {{"gains.position_1_s2", gains.position_1_s2},
-       {"gains.speed_1_s", gains.speed_1_s},
-       {"gains.integral_1_s3", gains.integral_1_s3},
-       {"gains.integral_max_rad_s2", gains.integral_max_rad_s2},
-       {"following_error_rad", settings.following_error_rad},
-       {"standstill_rad_s", settings.standstill_rad_s},
-       {"max_payload_kg", settings.max_payload_kg},
-       {"rate.slower_1_s", settings.rate.slower_1_s},
-       {"rate.faster_1_s", settings.rate.faster_1_s},
-       {"rate.change_1_s2", settings.rate.change_1_s2}}};
-  for (const auto& [name, number] : numbers) {
-    if (!std::isfinite(number) || number < 0)
-      return fail(fmt::format("is {}", number), fmt::format("settings.{}", name), "give it a number, 0 or more");
-  }
+  if (auto good = check_numbers(settings); !good) return good;
   if (!(settings.recovery_share > 0 && settings.recovery_share <= 1))
     return fail(fmt::format("is {}", settings.recovery_share), "settings.recovery_share",
                 "a share is above 0, at most 1");

@@ -56,6 +56,11 @@ bool Cerebellum::take(const link::Command& command, Time now) {
     case CommandKind::kControl:
       return operational && take_control(command, now);
     case CommandKind::kBelt:
+      if (command.belt > link::Belt::kWaits) {
+        if (stop(StopCause::kBadCommand, now))
+          log_.write(now, "command {}: a belt neither runs nor waits", command.sequence);
+        return false;
+      }
       if (operational) state_.belt = command.belt;
       return operational;
     case CommandKind::kReset:
