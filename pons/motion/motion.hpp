@@ -24,8 +24,7 @@ struct Waypoint {
 // slowest axis. Errors: start or end outside the limits, not finite, no profile.
 [[nodiscard]] Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits);
 
-// Spent on the speeds at via points. Rough, to choose among many ways, takes a third of the time, and its motion is a
-// tenth longer.
+// Spent on the speeds at via points. Rough is for choosing among many ways; the fine motion is never longer.
 enum class Effort : std::uint8_t { kRough, kFine };
 
 // Through `vias` (positions only; speeds there are chosen to keep the whole short) to `end`.

@@ -31,9 +31,12 @@ std::uint64_t seed_of(const AxisVector& from, const AxisVector& to) {
 
 Detour::Detour(const world::World& world, const model::RobotModel& model)
     : world_(world),
+      has_obstacles_(!standing(world).empty()),
       model_(model.copy()),
       collision_(model.copy(), kMargins),
-      scene_(model.copy(), {.scene_m = kMargins.scene_m}) {}
+      scene_(model.copy(), {.scene_m = kMargins.scene_m}) {
+  scene_.surround(standing(world));
+}
 
 // On the chords of every 20 ms: at its acceleration limit an axis bends off them by a thousandth of a radian.
 bool Detour::clear(const motion::Trajectory& way, model::CollisionModel& judge) {
@@ -46,9 +49,7 @@ bool Detour::clear(const motion::Trajectory& way, model::CollisionModel& judge) 
 }
 
 bool Detour::keeps_off(const motion::Trajectory& way, const Load* load) {
-  const std::vector<model::Box> boxes = standing(world_);
-  if (boxes.empty()) return true;
-  scene_.surround(boxes);
+  if (!has_obstacles_) return true;
   scene_.carry(carried(load));
   return clear(way, scene_);
 }

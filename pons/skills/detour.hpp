@@ -31,7 +31,7 @@ class Detour {
   void refresh() { advanced_ = false; }
   [[nodiscard]] bool searching() const { return sought_ && !sought_->corners && advanced_; }
 
-  [[nodiscard]] bool has_obstacles() const { return !standing(world_).empty(); }
+  [[nodiscard]] bool has_obstacles() const { return has_obstacles_; }
   // Whether a motion keeps off the world's own obstacles; where there are none, it does.
   [[nodiscard]] bool keeps_off(const motion::Trajectory& way, const Load* load);
 
@@ -45,6 +45,7 @@ class Detour {
                                                    const std::vector<AxisVector>& corners, const AxisLimits& limits);
 
   const world::World& world_;
+  bool has_obstacles_;
   model::RobotModel model_;
   model::CollisionModel collision_, scene_;  // the latter of what stands there alone
   struct Sought {
