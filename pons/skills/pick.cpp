@@ -34,7 +34,7 @@ constexpr double kElsewhere_m = 0.015;  // and by so much, when it is too late f
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
 // A load hangs on springs: lifted faster it bounces, and what bounces cannot be weighed.
 constexpr double kLifted_m_s2 = 5.0;
-constexpr double kLifted_m = 0.030;  // nothing below supports the load any more
+constexpr double kLifted_m = 0.020;  // nothing below supports the load any more: the bellows stretch 12 mm at most
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
 constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily

@@ -8,7 +8,10 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kSpan_s = 0.15;  // the slowest swing of a load on the bellows
+// How long a load swings once on the bellows, which are springs: the heavier the slower. Rounded up, for they rub.
+constexpr double kSwing_s_per_root_kg = 0.08;
+constexpr double kQuickest_s = 0.05,
+                 kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 
 // What pulls the wrist down.
@@ -67,8 +70,10 @@ std::optional<Weight> Scale::weigh(const Cell& cell) const {
     while (first > 0 && readings_[last].time_s - readings_[first].time_s < span_s) --first;
     return first;
   };
-  const std::size_t first = since(kSpan_s), middle = since(kSpan_s / 2);
-  if (readings_[last].time_s - readings_[first].time_s < kSpan_s) return std::nullopt;
+  const double about_kg = std::max(0.0, mass_kg(since(kSlowest_s), last) - tool_kg);
+  const double swing_s = std::clamp(kSwing_s_per_root_kg * std::sqrt(about_kg), kQuickest_s, kSlowest_s);
+  const std::size_t first = since(swing_s), middle = since(swing_s / 2);
+  if (readings_[last].time_s - readings_[first].time_s < swing_s) return std::nullopt;
   const double whole_kg = mass_kg(first, last) - tool_kg;
   const double change_kg = std::abs(mass_kg(first, middle) - mass_kg(middle, last));
   if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
