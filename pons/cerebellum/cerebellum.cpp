@@ -21,15 +21,19 @@ constexpr double kTooFast = 1.01;
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
 
+// No sensor of an arm reads more, in any of its units.
+constexpr double kLargest = 1e6;
+// No axis turns faster than its speed limit times this, whatever pushes it; and it is where its speed has taken it, but
+// for the errors of encoders.
+constexpr double kNeverFaster = 10, kEncoders_rad = 0.02;
+
 // All that is passed on or reckoned with.
-bool is_finite(const body::Sensors& sensors, Eigen::Index axes) {
-  const auto finite = [](const auto& values) {
-    return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-  };
-  return sensors.position.size() == axes && sensors.speed.size() == axes && sensors.position.allFinite() &&
-         sensors.speed.allFinite() && finite(sensors.wrist_force_n) && finite(sensors.wrist_torque_nm) &&
-         finite(sensors.cup_vacuum_kpa) && std::isfinite(sensors.belt_travel_m) &&
-         std::isfinite(sensors.belt_speed_m_s);
+bool is_sensible(const body::Sensors& sensors, Eigen::Index axes) {
+  const auto sensible = [](double value) { return std::abs(value) <= kLargest; };  // not a number: it is not
+  const auto all = [&](const auto& values) { return std::all_of(values.begin(), values.end(), sensible); };
+  return sensors.position.size() == axes && sensors.speed.size() == axes && all(sensors.position) &&
+         all(sensors.speed) && all(sensors.wrist_force_n) && all(sensors.wrist_torque_nm) &&
+         all(sensors.cup_vacuum_kpa) && sensible(sensors.belt_travel_m) && sensible(sensors.belt_speed_m_s);
 }
 
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
@@ -103,8 +107,8 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   const bool driven = powered_ && driven_.out().powered;
   if (driven) collision_.drive(driven_.out().torque_nm, dt_s_);
   const Eigen::Index axes = commanded_.position.size();
-  const bool good = is_finite(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
-                    sensors.stamp <= now + settings_.silence_timeout;
+  const bool good = is_sensible(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
+                    sensors.stamp <= now + settings_.silence_timeout && !leaps(sensors);
   if (good) {
     const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s);
     Eigen::Index fastest = 0;
@@ -142,6 +146,18 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     position_now_ += age_s * (measured_speed_ + age_s / 2 * laws_.acting().acceleration);
     speed_now_ += age_s * laws_.acting().acceleration;
   }
+}
+
+// Whether it cannot have come there since the last good measurement, at any speed between the two that were measured.
+// Without power an arm may be carried to anywhere, by hand or by whoever restarts its encoders.
+bool Cerebellum::leaps(const body::Sensors& sensors) const {
+  if (!seen_ || !powered_) return false;
+  if ((sensors.speed.array().abs() > kNeverFaster * robot_limits().speed_rad_s.array()).any()) return true;
+  // Silent for longer it brakes blind, and what leapt is not believed before the power is off.
+  const double half_s = 0.5 * to_s(std::min(sensors.stamp - measured_stamp_, settings_.silence_timeout));
+  const auto off = sensors.position - measured_position_ - half_s * (sensors.speed + measured_speed_);
+  const auto unsure = half_s * (sensors.speed - measured_speed_);
+  return (off.array().abs() > unsure.array().abs() + kEncoders_rad).any();
 }
 
 void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {
@@ -190,11 +206,11 @@ void Cerebellum::watch_zones(Time now) {
   state_.speed_share = share;
 }
 
-void Cerebellum::watch_speed(Time now) {
-  if (!slow_since_ || now - *slow_since_ < settings_.slow_within || !moves(state_.safety)) return;
-  const double share = commanded_.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
-  if (share > state_.speed_share * (1 + kSlowTolerance) && stop(StopCause::kNotSlowed, now))
-    log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * share, 100 * state_.speed_share);
+// The share of a speed limit that `next` takes when a zone allows it no longer; nothing where it does.
+std::optional<double> Cerebellum::too_fast(const AxisState& next, Time now) const {
+  if (!slow_since_ || now - *slow_since_ < settings_.slow_within) return std::nullopt;
+  const double share = next.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
+  return share > state_.speed_share * (1 + kSlowTolerance) ? std::optional(share) : std::nullopt;
 }
 
 void Cerebellum::watch_contact(Time now) {
@@ -298,10 +314,12 @@ void Cerebellum::follow(Time now) {
     ++statistics_.refused;
     if (stop(StopCause::kLimit, now))
       log_.write(now, "axis {} would have gone beyond its {} limit", breach->axis + 1, name(breach->limit));
+  } else if (const auto share = too_fast(next, now)) {
+    if (stop(StopCause::kNotSlowed, now))
+      log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * *share, 100 * state_.speed_share);
   } else {
     commanded_ = next;
     if (state_.safety == SafetyState::kRecovery) narrow();
-    watch_speed(now);
   }
 }
 

@@ -77,7 +77,8 @@ class Cerebellum {
   // One tick at `now`, which grows from call to call: takes in the measurement and all commands, moves the commanded
   // state on, and says what the drives shall do until the next. What is commanded, checked and sent is the motion of
   // `now` and the robot's drive delay, for it acts by then; a measurement is held against what acts now. Measurements
-  // that are not finite, of another length, from the future or not newer than the last count as none. One thread.
+  // that are not finite or beyond what a sensor reads, of another length, from the future, not newer than the last, or
+  // that a powered axis cannot have come to since the last, count as none. One thread.
   //
   // Which commands do what, and what refuses them (refused = counted in State::dropped; all need the present epoch
   // unless stated; another kind is refused):
@@ -112,11 +113,12 @@ class Cerebellum {
  private:
   void watch_loop(Time now);
   void take_measurement(Time now, const body::Sensors& sensors);
+  [[nodiscard]] bool leaps(const body::Sensors& sensors) const;
   void feel(const body::Sensors& sensors, WristSense::Bias bias);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);
   void watch_zones(Time now);
-  void watch_speed(Time now);
+  [[nodiscard]] std::optional<double> too_fast(const AxisState& next, Time now) const;
   void watch_contact(Time now);
   void watch_cups(Time now);
   void take_commands(Time now, link::CerebellumEnd& link);

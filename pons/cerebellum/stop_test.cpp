@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -49,6 +50,7 @@ struct StopCase {
   std::function<void(Bench&)> release;
   const char* detail = "";  // what the log adds to the cause
   Settings settings;
+  double jerk = 1 + 1e-5;  // of the limit, at most; a change of the motion's rate adds what a seam may
 };
 
 void nothing(Bench&) {}
@@ -58,6 +60,31 @@ Settings without_collisions() {
   Settings settings;
   settings.collision.torque_share = 1e9;
   return settings;
+}
+
+// Somebody in zone 1 stops the arm, or slows it at once.
+Settings with_zone(double share) {
+  Settings settings;
+  settings.zone_speed_share[0] = share;
+  settings.slow_within = 1ms;
+  return settings;
+}
+
+void come_in(Bench& bench) { bench.plant.sensors.zones_occupied = 1; }
+void go_out(Bench& bench) { bench.plant.sensors.zones_occupied = 0; }
+
+// Goes on as planned, but for an acceleration that grows at twice the jerk limit.
+void send_beyond_limit(Bench& bench) {
+  Segment beyond;
+  beyond.start = bench.now + 20ms;
+  beyond.duration = 200ms;
+  for (Time until = beyond.start; bench.now < until;) bench.tick();
+  const AxisState& from = bench.state().commanded;
+  beyond.start = bench.now;
+  for (Eigen::Index i = 0; i < 6; ++i)
+    beyond.coefficients[static_cast<std::size_t>(i)] = {
+        from.position[i], from.speed[i], 0.5 * from.acceleration[i], 2 * bench_robot().limits.jerk_rad_s3[i] / 6, 0, 0};
+  bench.send(motion_command(beyond, true));
 }
 
 const StopCase kCases[] = {
@@ -75,6 +102,11 @@ const StopCase kCases[] = {
      [](Bench& b) { b.plant.blocked = false; }, "of what no collision explains"},
     {"BadCommand", StopCause::kBadCommand, false, [](Bench& b) { b.send(motion_command(Segment{}, false)); }, nothing,
      "of no sensible duration"},
+    {"Limit", StopCause::kLimit, false, send_beyond_limit, nothing, "beyond its jerk limit"},
+    {"Zone", StopCause::kZone, false, come_in, go_out, "somebody is in zone 1", with_zone(0)},
+    {"NotSlowed", StopCause::kNotSlowed, false, come_in, go_out, "% are allowed", with_zone(0.1), 1 + 1e-3},
+    {"LoopStalled", StopCause::kLoopStalled, false, [](Bench& b) { b.now += Settings{}.stall_timeout; }, nothing,
+     "no step for 21.0 ms"},
 };
 
 class Stop : public testing::TestWithParam<StopCase> {};
@@ -110,7 +142,7 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
   EXPECT_EQ(bench.plant.set_points.power, !GetParam().emergency);
   EXPECT_EQ(bench.state().epoch, GetParam().emergency ? 2u : 1u);
   EXPECT_EQ(bench.cerebellum.statistics().violations, 0u);
-  EXPECT_LE(bench.cerebellum.statistics().commanded.jerk, 1 + 1e-5);
+  EXPECT_LE(bench.cerebellum.statistics().commanded.jerk, GetParam().jerk);
 }
 
 TEST_P(Stop, IsToldWithItsCauseAndItsStandstill) {
@@ -156,6 +188,15 @@ TEST_P(Stop, OnlyResetAndArmLeaveItAndNeitherMovesAnything) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Causes, Stop, testing::ValuesIn(kCases), [](const auto& c) { return c.param.name; });
+
+// The others have tests of their own below: a body that is silent can confirm nothing, and without power nothing brakes
+// along limits.
+TEST(StopCauses, AreAllHereThatBrakeAndCanBeConfirmed) {
+  for (const CauseRow& row : cerebellum::kCauses) {
+    const bool here = std::ranges::any_of(kCases, [&](const StopCase& c) { return c.cause == row.cause; });
+    EXPECT_EQ(here, row.event != SafetyEvent::kPowerCut && row.cause != StopCause::kBodySilent) << name(row.cause);
+  }
+}
 
 TEST(StopLatch, ResetIsRefusedWhileTheWordOrTheInputIsHeld) {
   Bench bench;
@@ -215,6 +256,9 @@ TEST(BodySilence, StopsBlindAndSaysFailedThenPowersOff) {
   bench.run(5ms);
   EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStopping);
   EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
+  const Time braked_by = bench.now + from_s(shortest_stop_s(bench.state().commanded) + 2e-3);
+  while (bench.state().safety == SafetyState::kEmergencyStopping && !is_at_rest(bench.state().commanded)) bench.tick();
+  EXPECT_LE(bench.now, braked_by);
   bench.run(500ms);
   EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
   EXPECT_EQ(bench.state().stop_result, StopResult::kFailed);
