@@ -55,7 +55,9 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   const auto setup = body_setup(options.setup, options.parcels.seed, world);
   if (!setup) return bad_input(setup.error());
   const std::string name = options.link.empty() ? default_link(world.name) : options.link;
-  auto place = MeetingPlace::make(name, world, identity_of(world, manifest));
+  const auto identity = identity_of(world, manifest);
+  if (!identity) return bad_input(identity.error());
+  auto place = MeetingPlace::make(name, world, *identity);
   if (!place) return bad_input(place.error());
   auto body = BodyHalf::build(world, manifest, *setup, place->meeting());
   if (!body) return bad_input(body.error());

@@ -100,7 +100,9 @@ int bridge(const BridgeCommandOptions& options) {
         fmt::format("{}: waiting up to {:.0f} s for a body: pons body {}\n", name, options.wait_s, world->name));
   runner::await_body(name, from_s(options.wait_s), interrupted);
   if (interrupted()) return kExitInterrupted;
-  const auto place = MeetingPlace::join(name, *world, identity_of(*world, *manifest));
+  const auto identity = identity_of(*world, *manifest);
+  if (!identity) return bad_input(identity.error());
+  const auto place = MeetingPlace::join(name, *world, *identity);
   if (!place) return bad_input(place.error());
   return run_bridge(options, *world, *manifest, *place);
 }

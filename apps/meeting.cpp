@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <utility>
 
@@ -13,41 +15,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void add(Digest& digest, const Pose& pose) { digest.add(std::span<const double>(pose.matrix().data(), 16)); }
-void add(Digest& digest, const AxisVector& values) {
-  digest.add(std::span<const double>(values.data(), static_cast<std::size_t>(values.size())));
-}
-void add(Digest& digest, const Vector3& vector) { digest.add(std::span<const double>(vector.data(), 3)); }
-
-std::uint64_t cell_of(const world::World& world) {
+// All that says what the cell is: a limit, a camera or a link's mass in one of them makes it another.
+Expected<std::uint64_t> cell_of(const world::World& world) {
   Digest digest;
-  const world::Robot& robot = world.robot;
-  digest.add(robot.name);
-  digest.add(robot.flange_link);
-  add(digest, robot.world_from_base);
-  add(digest, robot.home);
-  const AxisLimits& limits = robot.limits;
-  for (const AxisVector* values : {&limits.position_min, &limits.position_max, &limits.speed_rad_s,
-                                   &limits.acceleration_rad_s2, &limits.jerk_rad_s3, &limits.torque_nm})
-    add(digest, *values);
-  add(digest, robot.tool.flange_from_tip);
-  for (const Vector3& cup : robot.tool.cups_m) add(digest, cup);
-  const world::Belt& belt = world.belt;
-  for (const double value : {belt.x_start_m, belt.x_end_m, belt.y_center_m, belt.width_m, belt.surface_z_m,
-                             belt.speed_m_s, belt.pick_x_min_m, belt.pick_x_max_m})
-    digest.add(value);
-  for (const world::Place& place : world.places) {
-    digest.add(place.name);
-    add(digest, place.center_m);
-    add(digest, place.size_m);
-  }
-  for (const world::CameraSpec& camera : world.cameras) {
-    digest.add(camera.name);
-    digest.add(camera.watches);
-    add(digest, camera.world_from_optical);
-    digest.add(camera.width);
-    digest.add(camera.height);
-    digest.add(camera.fovy_rad);
+  for (const fs::path& path :
+       {world.folder / "world.yaml", world.scene_mjcf, world.robot.urdf, world.robot.tool.mjcf}) {
+    std::ifstream file(path, std::ios::binary);
+    const std::string text((std::istreambuf_iterator<char>(file)), {});
+    if (!file || file.bad()) return fail("cannot be read", path.string(), "it was there when the world was loaded");
+    digest.add(text);
+    digest.add(text.size());
   }
   return digest.value();
 }
@@ -68,10 +45,12 @@ rt::SharedMemory::Layout layout_of(const link::FramePages& pages) { return {page
 
 std::string default_link(const std::string& world) { return fmt::format("{}-{}", world, getuid()); }
 
-link::Identity identity_of(const world::World& world, const world::Manifest& manifest) {
+Expected<link::Identity> identity_of(const world::World& world, const world::Manifest& manifest) {
+  const auto cell = cell_of(world);
+  if (!cell) return std::unexpected(cell.error());
   link::Identity identity;
   world.name.copy(identity.world.data(), identity.world.size() - 1);
-  identity.cell = cell_of(world);
+  identity.cell = *cell;
   identity.orders = orders_of(manifest);
   return identity;
 }

@@ -19,7 +19,8 @@ namespace pons::apps {
 // The name under which a world's body and bridge of this user meet when none is given.
 [[nodiscard]] std::string default_link(const std::string& world);
 
-[[nodiscard]] link::Identity identity_of(const world::World& world, const world::Manifest& manifest);
+// Of the world's files as they are now. Error: one that cannot be read.
+[[nodiscard]] Expected<link::Identity> identity_of(const world::World& world, const world::Manifest& manifest);
 
 // One side's hold on what both share.
 class MeetingPlace {

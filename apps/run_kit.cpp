@@ -178,7 +178,8 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   const cerebellum::Statistics& loop = body.cerebellum->statistics();
   report.limits = {.violations = static_cast<std::int64_t>(verdict->violations + loop.violations),
                    .worst_ratio = std::max({verdict->worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
-                                            loop.commanded.jerk, loop.commanded.torque})};
+                                            loop.commanded.jerk, loop.commanded.torque}),
+                   .saturated = static_cast<std::int64_t>(loop.saturated)};
   report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
                  .missed = static_cast<std::int64_t>(result.loop.missed),
                  .p50_us = result.loop.p50_us,

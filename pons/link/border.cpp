@@ -10,8 +10,9 @@ Expected<void> check_same(const Identity& body, const Identity& bridge, const st
                 "name that world, or choose another --link");
   }
   if (body.cell != bridge.cell) {
-    return fail(fmt::format("the body's '{}' has another robot, belt or cameras", body.world.data()), name,
-                "start both from the same folder of worlds");
+    return fail(
+        fmt::format("the body's '{}' is another cell: its world, scene, robot or tool differs", body.world.data()),
+        name, "start both from the same folder of worlds");
   }
   if (body.orders != bridge.orders) {
     return fail("the body was started with other parcels", name,

@@ -21,12 +21,12 @@ namespace pons::link {
 // What must be equal on both sides, beside the program's version.
 struct Identity {
   std::array<char, 65> world{};  // its name
-  std::uint64_t cell = 0;        // digest of robot, cameras and belt
+  std::uint64_t cell = 0;        // digest of the files that say what it is: world, scene, robot and tool
   std::uint64_t orders = 0;      // digest of what is to be sorted
   bool operator==(const Identity&) const = default;
 };
 
-// Errors: the body is of another world, of the same name with another robot or cameras, or sorts other parcels.
+// Errors: the body is of another world, of one of the same name from other files, or sorts other parcels.
 [[nodiscard]] Expected<void> check_same(const Identity& body, const Identity& bridge, const std::string& name);
 
 enum class Stage : std::uint32_t {
@@ -41,7 +41,8 @@ enum class Closing : std::uint32_t { kOpen, kComplete, kBrokenOff };
 // Made by the body, in shared memory (rt::Shared). No pointer is in it. Either side may be killed at any instant: what
 // changes is one word, or a channel that bears it.
 struct Border {
-  static constexpr std::uint64_t kVersion = 1;
+  // Grows with every change of what lies in here, messages included: of a field, its unit or an enumerator's value.
+  static constexpr std::uint64_t kVersion = 2;
   static constexpr std::size_t kLongestPath = 4096;
 
   Border(const Identity& who, std::uint64_t life) : identity(who), body(life) {}

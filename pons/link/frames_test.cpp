@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 #include <new>
@@ -82,6 +83,26 @@ TEST(FramePages, EveryCameraHasPagesOfItsOwn) {
   EXPECT_EQ(frames[1].rgb[0], 2) << "a copy is one";
 }
 
+// A change here is a change of what two processes must agree on: give Border another version, and these figures with
+// it.
+TEST(Border, ItsVersionIsThatOfThisLayout) {
+  EXPECT_EQ(Border::kVersion, 2U);
+  EXPECT_EQ(sizeof(Command), 632U);
+  EXPECT_EQ(sizeof(State), 896U);
+  EXPECT_EQ(sizeof(Link), 650304U);
+  EXPECT_EQ(sizeof(Frames), 1040U);
+  EXPECT_EQ(sizeof(Border), 655680U);
+  EXPECT_EQ(offsetof(Command, contact_n), 456U);
+  EXPECT_EQ(offsetof(Command, belt), 624U);
+  EXPECT_EQ(offsetof(State, tip_wrench), 624U);
+  EXPECT_EQ(offsetof(State, late), 888U);
+  EXPECT_EQ(static_cast<int>(CommandKind::kBelt), 10);
+  EXPECT_EQ(static_cast<int>(SafetyState::kRecovery), 6);
+  EXPECT_EQ(static_cast<int>(StopCause::kCollision), 14);
+  EXPECT_EQ(static_cast<int>(VacuumPhase::kReleasing), 4);
+  EXPECT_EQ(static_cast<int>(Controller::kAdmittance), 2);
+}
+
 TEST(Border, AnotherWorldCellOrDayIsRefusedByName) {
   Identity body;
   std::string_view("parcel_cell").copy(body.world.data(), 64);
@@ -93,7 +114,8 @@ TEST(Border, AnotherWorldCellOrDayIsRefusedByName) {
   EXPECT_EQ(check_same(body, other, "x").error().what, "the body runs the world 'parcel_cell', not 'qarcel_cell'");
   other = body;
   other.cell = 7;
-  EXPECT_EQ(check_same(body, other, "x").error().what, "the body's 'parcel_cell' has another robot, belt or cameras");
+  EXPECT_EQ(check_same(body, other, "x").error().what,
+            "the body's 'parcel_cell' is another cell: its world, scene, robot or tool differs");
   other = body;
   other.orders = 7;
   EXPECT_EQ(check_same(body, other, "x").error().what, "the body was started with other parcels");

@@ -42,7 +42,9 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
   json["retries"] = report.retries;
-  json["limits"] = {{"violations", report.limits.violations}, {"worst_ratio", number(report.limits.worst_ratio)}};
+  json["limits"] = {{"violations", report.limits.violations},
+                    {"worst_ratio", number(report.limits.worst_ratio)},
+                    {"saturated", report.limits.saturated}};
   json["loop"] = {{"ticks", loop.ticks},
                   {"missed", loop.missed},
                   {"p50_us", number(loop.p50_us)},
@@ -84,8 +86,11 @@ std::string summary(const Report& report) {
                          ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",
                                        report.throughput.seconds_per_parcel, report.throughput.parcels_per_hour)
                          : std::string("nothing sorted"));
-  line("limits", fmt::format("{} violations, closest {:.1f} % of a limit", report.limits.violations,
-                             100 * report.limits.worst_ratio));
+  line("limits", fmt::format("{} violations, closest {:.1f} % of a limit{}", report.limits.violations,
+                             100 * report.limits.worst_ratio,
+                             report.limits.saturated == 0
+                                 ? std::string()
+                                 : fmt::format(", {} ticks of clamped torque", report.limits.saturated)));
   line("control loop", fmt::format("{} ticks, {} missed, step {:.1f} µs median, {:.1f} µs p99", report.loop.ticks,
                                    report.loop.missed, report.loop.p50_us, report.loop.p99_us));
   if (std::isfinite(report.loop.late_p50_us))

@@ -34,6 +34,8 @@ struct Report {
   struct Limits {
     std::int64_t violations = 0;  // axis-ticks beyond a limit
     double worst_ratio = 0;       // the closest that anything came to its limit, or the furthest beyond: 1 is the limit
+    std::int64_t saturated =
+        0;  // ticks in which control asked a drive for more torque than it has, and got what it has
   };
   struct Loop {
     std::int64_t ticks = 0;

@@ -230,15 +230,27 @@ TEST_F(Processes, WhatDoesNotBelongTogetherIsRefusedByName) {
   EXPECT_THAT(refused(small), HasSubstr("the body runs the world 'parcel_cell', not 'small_cell'"));
   EXPECT_THAT(refused({"bridge", "parcel_cell", "--link", link_}), HasSubstr("no journal is named"));
   EXPECT_THAT(refused({"body", "parcel_cell", "--link", "a/b"}), HasSubstr("is no name for shared memory"));
-  // The same name, another camera: the run cannot be the same.
+  // The same name, but another camera, robot or tool: the run cannot be the same.
   const std::filesystem::path worlds = folder_ / "worlds";
   std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
-  std::string text = read_text(worlds / "parcel_cell/world.yaml");
-  text.replace(text.find("width: 928"), 10, "width: 960");
-  write_text(worlds / "parcel_cell/world.yaml", text);
-  const Finished other = run_pons(bridge(6), {"PONS_WORLDS=" + worlds.string()});
-  EXPECT_EQ(other.code, kBadInput);
-  EXPECT_THAT(other.err, HasSubstr("has another robot, belt or cameras"));
+  struct Change {
+    const char *file, *from, *to;
+  };
+  for (const auto& [file, from, to] : {Change{"parcel_cell/world.yaml", "width: 928", "width: 960"},
+                                       {"parcel_cell/world.yaml", "sealed_kpa: 35.0", "sealed_kpa: 36.0"},
+                                       {"parcel_cell/scene.xml", "<mujoco", "<!-- --><mujoco"},
+                                       {"robots/ur5e/ur5e.urdf", "<robot", "<!-- --><robot"},
+                                       {"robots/suction4/gripper.xml", "<mujoco", "<!-- --><mujoco"}}) {
+    const std::string text = read_text(worlds / file);
+    std::string changed = text;
+    ASSERT_NE(text.find(from), std::string::npos) << file;
+    changed.replace(text.find(from), std::string_view(from).size(), to);
+    write_text(worlds / file, changed);
+    const Finished other = run_pons(bridge(6), {"PONS_WORLDS=" + worlds.string()});
+    EXPECT_EQ(other.code, kBadInput);
+    EXPECT_THAT(other.err, HasSubstr("is another cell: its world, scene, robot or tool differs")) << file;
+    write_text(worlds / file, text);
+  }
 
   Running bridge_process(folder_.path(), "bridge", bridge(6));
   ASSERT_TRUE(eventually([&] { return gate::ask(folder_ / "s", {{"op", "list"}}).has_value(); }));

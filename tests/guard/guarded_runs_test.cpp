@@ -31,6 +31,14 @@ TEST(Guarded, AWholeRun) {
                         kGuarded));
 }
 
+// Here the loop has a thread of its own, and sleeps, is woken and shares memory as on a robot.
+TEST(Guarded, AWholeRunInRealTime) {
+  const Folder folder;
+  expect_clean(run_pons({"run", "parcel_cell", "--parcels", "3", "--seed", "1", "--realtime", "--socket", folder / "s",
+                         "--journal", folder / "j.db"},
+                        kGuarded));
+}
+
 TEST(Guarded, NotInAModeThatNobodyKnows) {
   const Finished run = run_pons({"--version"}, {"LD_PRELOAD=" PONS_GUARD_LIBRARY, "PONS_GUARD=rport"});
   EXPECT_EQ(run.code, 2);

@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <string>
@@ -47,21 +48,17 @@ int loop_thread() {
   return found;
 }
 
-// Whether it sleeps until its next tick, rather than is still setting out.
-bool sleeps(int thread) {
+// The word that a thread sleeps on; 0 if it does something else.
+std::uintptr_t sleeps_on(int thread) {
   long call = -1;
-  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/syscall") >> call;
-  return call == SYS_futex;
+  std::uintptr_t word = 0;
+  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/syscall") >> call >> std::hex >> word;
+  return call == SYS_futex ? word : 0;
 }
 
-class HeldLoop : public testing::Test {
+class RealTimeLoop : public testing::Test {
  protected:
   void SetUp() override {
-    struct sigaction action{};
-    action.sa_handler = stand_still;
-    sigaction(SIGUSR1, &action, nullptr);
-    hold.store(0);
-    held.store(0);
     auto world = world::load("worlds", "small_cell");
     ASSERT_TRUE(world) << world.error().line();
     const auto manifest = world::draw_manifest(*world, 1, 1);
@@ -70,6 +67,34 @@ class HeldLoop : public testing::Test {
     ASSERT_TRUE(built) << built.error().line();
     cell_ = std::move(*built);
     parts_ = cell_->parts();
+  }
+
+  std::unique_ptr<apps::Assembly> cell_;
+  Parts parts_;
+};
+
+// An emergency stop must not wait for the next tick: the word that is raised is the one on which the loop sleeps.
+TEST_F(RealTimeLoop, SleepsOnTheEmergencyWord) {
+  const auto word = reinterpret_cast<std::uintptr_t>(&parts_.body.link->emergency_word());
+  std::atomic<std::uintptr_t> slept_on{0};
+  parts_.body.plant.advance = [&](Time now) {
+    if (const int thread = loop_thread(); slept_on != word && thread != 0) slept_on = sleeps_on(thread);
+    cell_->body->simulation->advance_to(now);
+  };
+  int ticks = 0;
+  ASSERT_TRUE(run_realtime(parts_, {.interrupted = [&] { return ++ticks > 200 || slept_on == word; }}));
+  EXPECT_EQ(slept_on.load(), word);
+}
+
+class HeldLoop : public RealTimeLoop {
+ protected:
+  void SetUp() override {
+    RealTimeLoop::SetUp();
+    struct sigaction action{};
+    action.sa_handler = stand_still;
+    sigaction(SIGUSR1, &action, nullptr);
+    hold.store(0);
+    held.store(0);
   }
   // What was left behind must not touch the parts when they are gone.
   void TearDown() override {
@@ -81,14 +106,12 @@ class HeldLoop : public testing::Test {
   void seize_loop() {
     int thread = 0;
     for (thread = loop_thread(); thread == 0; thread = loop_thread()) std::this_thread::yield();
-    while (!sleeps(thread)) std::this_thread::yield();
+    // Until its next tick, rather than still setting out.
+    while (sleeps_on(thread) == 0) std::this_thread::yield();
     hold.store(1);
     ASSERT_EQ(syscall(SYS_tgkill, getpid(), thread, SIGUSR1), 0);
     held.wait(0);
   }
-
-  std::unique_ptr<apps::Assembly> cell_;
-  Parts parts_;
 };
 
 TEST_F(HeldLoop, ALoopThatIsGoneForGoodEndsTheRunWithAnError) {
