@@ -37,7 +37,7 @@ void measure(double jump_rad) {
       Chunk chunk{.observed = path.executed(now), .period = milliseconds(50)};
       const double jump = jump_rad * random.normal();
       for (std::int64_t j = 1; j <= 20; ++j) {
-        const double phase = turn * 0.05 * static_cast<double>(chunk.observed + j);
+        const double phase = turn * 0.05 * (chunk.observed + static_cast<double>(j));
         chunk.actions.emplace_back(AxisVector::Constant(kAxes, 0.4 * std::sin(phase) + jump));
       }
       const auto begun = std::chrono::steady_clock::now();

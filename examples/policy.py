@@ -19,7 +19,7 @@ SECONDS = 6.0
 
 
 def act(home, first, count):
-    """Actions number first, first + 1, … of the stream: joint angles (rad)."""
+    """So many actions, when `first` (a real number) of the stream have been executed: joint angles (rad)."""
     sway = [0.05 * math.sin(0.5 * math.pi * PERIOD_S * (first + j + 1)) for j in range(count)]
     return [[home[0] + s, *home[1:]] for s in sway]
 
@@ -50,9 +50,9 @@ def main(path, task_id="sway"):
     while asked + ACTIONS < ends:
         observed = seen["executed"]
         if observed >= asked + EVERY:
-            count = min(ACTIONS, ends - observed)
+            count = min(ACTIONS, math.ceil(ends - observed))
             chunk = {"observed": observed, "period_ms": 1e3 * PERIOD_S, "actions": act(home, observed, count)}
-            answer = pons.ask(op="chunk", stream=seen["stream"], last=observed + count == ends, **chunk)
+            answer = pons.ask(op="chunk", stream=seen["stream"], last=observed + count >= ends, **chunk)
             if answer["ok"]:
                 asked, chunks = observed, chunks + 1
             elif not answer["error"].startswith("chunk_stopped"):

@@ -30,12 +30,12 @@ class Stream final : public task::ChunkStream {
     return {.stamp = now,
             .position = AxisVector::Zero(6),
             .speed = AxisVector::Zero(6),
-            .executed = executed,
+            .executed = static_cast<double>(executed),
             .enough = (end - executed) * kPeriod};
   }
   [[nodiscard]] Expected<void> take(const Chunk& chunk, Time now) override {
-    EXPECT_LE(chunk.observed, executed);
-    end = chunk.observed + static_cast<std::int64_t>(chunk.actions.size());
+    EXPECT_LE(chunk.observed, static_cast<double>(executed));
+    end = static_cast<std::int64_t>(chunk.observed) + static_cast<std::int64_t>(chunk.actions.size());
     if (!began) began = now;
     ++taken;
     return {};

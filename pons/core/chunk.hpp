@@ -1,7 +1,6 @@
 // What a learned policy says: where the arm shall be at each of the next few moments.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "pons/core/axes.hpp"
@@ -9,11 +8,11 @@
 
 namespace pons {
 
-// The actions of a stream are numbered from 0 and stand `period` apart. A chunk holds a few of them in a row: its
-// action j is action observed + j of the stream, and the arm is to be there when observed + j + 1 actions have been
-// executed. So it does not matter when a chunk arrives: what was executed meanwhile is left out.
+// The actions of a stream stand `period` apart. How many have been executed is a real number: half way from the third
+// to the fourth it is 3.5. A chunk holds a few actions in a row, and the arm is to be at its action j when observed + j
+// + 1 have been executed. So it does not matter when a chunk arrives: what was executed meanwhile is left out.
 struct Chunk {
-  std::int64_t observed = 0;        // actions that had been executed when the observation was made
+  double observed = 0;              // actions that had been executed when the observation was made
   Duration period{0};               // at the policy's pace
   std::vector<AxisVector> actions;  // rad
   bool last = false;                // the stream ends with it

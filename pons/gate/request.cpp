@@ -24,7 +24,7 @@ constexpr std::string_view kSchema = R"({
     "task": {"type": "object"},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
     "stream": {"type": "integer", "minimum": 0, "maximum": 1000000000},
-    "observed": {"type": "integer", "minimum": 0, "maximum": 1000000000},
+    "observed": {"type": "number", "minimum": 0, "maximum": 1000000000},
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
     "actions": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
     "last": {"type": "boolean"}
@@ -69,7 +69,7 @@ Expected<void> check_members(const Json& json, std::string_view operation) {
 
 Expected<Asked> chunk_from(const Json& json) {
   Asked asked{.operation = Operation::kChunk, .stream = json.at("stream").get<std::uint64_t>()};
-  asked.chunk.observed = json.at("observed").get<std::int64_t>();
+  asked.chunk.observed = json.at("observed").get<double>();
   asked.chunk.period = from_s(1e-3 * json.at("period_ms").get<double>());
   asked.chunk.last = json.value("last", false);
   for (const Json& values : json.at("actions")) {

@@ -24,11 +24,11 @@ TEST(AskedFrom, ReadsEachQuestion) {
 
 TEST(AskedFrom, ReadsAChunk) {
   const auto asked =
-      asked_from(R"({"op":"chunk","stream":3,"observed":17,"period_ms":50,"actions":[[0,0.5],[1,-2]],"last":true})");
+      asked_from(R"({"op":"chunk","stream":3,"observed":17.25,"period_ms":50,"actions":[[0,0.5],[1,-2]],"last":true})");
   ASSERT_TRUE(asked) << asked.error().line();
   EXPECT_EQ(asked->operation, Operation::kChunk);
   EXPECT_EQ(asked->stream, 3u);
-  EXPECT_EQ(asked->chunk.observed, 17);
+  EXPECT_EQ(asked->chunk.observed, 17.25);
   EXPECT_EQ(asked->chunk.period, std::chrono::milliseconds(50));
   ASSERT_EQ(asked->chunk.actions.size(), 2u);
   EXPECT_EQ(asked->chunk.actions[1], Eigen::Vector2d(1, -2));
@@ -55,7 +55,7 @@ TEST(AskedFrom, RefusesEverythingElse) {
                            R"({"op":"chunk"})",
                            R"({"op":"observe","stream":1})",
                            R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[[null]]})",
-                           R"({"op":"chunk","stream":1,"observed":0.5,"period_ms":50,"actions":[[0]]})",
+                           R"({"op":"chunk","stream":1,"observed":"0","period_ms":50,"actions":[[0]]})",
                            R"({"op":"chunk","stream":1,"observed":-1,"period_ms":50,"actions":[[0]]})",
                            R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[[1e999]]})",
                            R"({"op":"chunk","stream":1,"observed":0,"period_ms":50,"actions":[0]})",

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 
 namespace pons::motion {
@@ -16,10 +17,12 @@ constexpr std::int64_t kFixed = 3;  // control points before the first free one 
 constexpr std::int64_t kRemember = 100;  // knots: how far back it can be asked
 constexpr int kMostKnots = 240;          // of one splice: the cerebellum's queue holds 256 segments
 constexpr int kRest = 3;                 // equal control points at which the spline rests
-constexpr double kSame = 1e-9;           // actions
+constexpr double kSame = 1e-6;           // actions
 // What is tried, in this order: paces from the fastest that the chunk itself allows, and for each the shortest way to
-// brake at its end and the shortest to blend into it (knots).
+// brake at its end and the shortest to blend into it (knots) that leaves the next blend room; else the one that leaves
+// most, where a longer one must save so much. At 50 chunks a second each bends what is still being blended.
 constexpr double kSlower = 0.65, kSlowest = 0.04;
+constexpr double kWorth = 0.02;          // of the limits
 constexpr int kRamp = 8;                 // knots, to take up the pace again
 constexpr double kPace = 1 - 1e-6;       // of the pace, and it is the pace
 constexpr double kReserve = 0.9;         // of the limits: what the next blend adds needs room
@@ -98,7 +101,7 @@ double fastest_pace(const Use& use) {
 
 Expected<void> check_chunk(const Chunk& chunk, const AxisLimits& limits) {
   const Eigen::Index axes = limits.position_min.size();
-  if (chunk.observed < 0)
+  if (!std::isfinite(chunk.observed) || chunk.observed < 0)
     return fail(fmt::format("{} executed actions were observed", chunk.observed), "chunk_observed", "count from 0");
   if (chunk.actions.empty()) return fail("has no action", "chunk_empty", "give at least one");
   if (chunk.period < kShortestPeriod || chunk.period > kLongestPeriod)
@@ -131,11 +134,9 @@ class ChunkPath::Course {
  public:
   explicit Course(const Chunk& chunk) : chunk_(chunk) {}
 
-  [[nodiscard]] double end() const {
-    return static_cast<double>(chunk_.observed) + static_cast<double>(chunk_.actions.size());
-  }
+  [[nodiscard]] double end() const { return chunk_.observed + static_cast<double>(chunk_.actions.size()); }
   [[nodiscard]] AxisVector at(double progress) const {
-    const double since = progress - static_cast<double>(chunk_.observed);
+    const double since = progress - chunk_.observed;
     const auto i = static_cast<std::int64_t>(std::floor(since));
     const double t = since - std::floor(since);
     return spline<AxisVector>(point(i - 1), point(i), point(i + 1), point(i + 2), t);
@@ -155,8 +156,8 @@ class ChunkPath::Course {
   const Chunk& chunk_;
 };
 
-ChunkPath::ChunkPath(const AxisVector& position, Time at, std::int64_t executed) : origin_(at) {
-  knots_.push_back({position, static_cast<double>(executed), Want::kNone});
+ChunkPath::ChunkPath(const AxisVector& position, Time at, double executed) : origin_(at) {
+  knots_.push_back({position, executed, Want::kNone});
 }
 
 const ChunkPath::Knot& ChunkPath::at(std::int64_t index) const {
@@ -180,14 +181,10 @@ double ChunkPath::progress_between(double index) const {
                      index - std::floor(index));
 }
 
-double ChunkPath::progress(Time time) const {
+double ChunkPath::executed(Time time) const {
   const std::int64_t i = knot_at(time);
   const double t = std::clamp(to_s(time - origin_ - i * kKnot) / kKnot_s, 0.0, 1.0);
   return spline(at(i - 1).progress, at(i).progress, at(i + 1).progress, at(i + 2).progress, t);
-}
-
-std::int64_t ChunkPath::executed(Time time) const {
-  return static_cast<std::int64_t>(std::floor(progress(time) + kSame));
 }
 
 bool ChunkPath::starved(Time time) const {
@@ -259,14 +256,23 @@ bool ChunkPath::draw_within(const Chunk& chunk, const AxisLimits& limits) {
       draw(chunk, candidate);
       if (use_of(plain_, limits).worst() <= most) break;
     }
+    std::optional<Candidate> gentlest;
+    double least = 0;
     for (const int blend : kBlends) {
       candidate.blend = blend;
       for (const int ramp : {std::min(blend, kRamp), blend}) {
         candidate.ramp = ramp;
         draw(chunk, candidate);
-        if (use_of(drawn_, limits).worst() <= 1) return true;
+        const double worst = use_of(drawn_, limits).worst();
+        if (worst <= kReserve) return true;
+        if (worst > (gentlest ? least - kWorth : 1)) continue;
+        least = worst;
+        gentlest = candidate;
       }
     }
+    if (!gentlest) continue;
+    draw(chunk, *gentlest);
+    return true;
   }
   return false;
 }
@@ -303,12 +309,12 @@ Trajectory ChunkPath::take_over(std::int64_t free) {
 
 Expected<Trajectory> ChunkPath::splice(const Chunk& chunk, Time now, Time from, const AxisLimits& limits) {
   if (auto good = check_chunk(chunk, limits); !good) return std::unexpected(good.error());
-  if (chunk.observed > executed(now))
-    return fail(fmt::format("{} actions were observed as executed, and {} are", chunk.observed, executed(now)),
+  if (chunk.observed > executed(now) + kSame)
+    return fail(fmt::format("{:.3f} actions were observed as executed, and {:.3f} are", chunk.observed, executed(now)),
                 "chunk_future", "count those that observe answers");
   free_ = (from - origin_ + kKnot - Duration(1)) / kKnot + 2;
   if (Course(chunk).end() <= at(free_ - 1).progress + kSame)
-    return fail(fmt::format("its last action is {:.0f}, and {:.1f} are executed by the splice", Course(chunk).end() - 1,
+    return fail(fmt::format("it leads up to {:.1f} actions, and {:.1f} are executed by the splice", Course(chunk).end(),
                             at(free_ - 1).progress),
                 "chunk_past", "send more actions, or sooner");
   if (!draw_within(chunk, limits))

@@ -24,14 +24,14 @@ inline constexpr Duration kLongestChunk = std::chrono::seconds(4);  // at the po
 
 // Whether a chunk makes sense by itself. Errors, by `where`: chunk_empty; chunk_period; chunk_long; chunk_size, an
 // action has another number of axes; chunk_not_finite; chunk_position, an action lies outside the position limits;
-// chunk_observed, a negative count.
+// chunk_observed, a count that is negative or not finite.
 [[nodiscard]] Expected<void> check_chunk(const Chunk& chunk, const AxisLimits& limits);
 
 // Of one stream. Times are the motion's. One thread.
 class ChunkPath {
  public:
   // The arm rests at `position`, from `at` on, and `executed` actions have been executed.
-  ChunkPath(const AxisVector& position, Time at, std::int64_t executed);
+  ChunkPath(const AxisVector& position, Time at, double executed);
 
   // Takes a chunk in: what replaces the queued motion from front().start on, which is `from` or up to a knot later.
   // It ends at rest at the chunk's last action, so a stream that dries up stops by itself, and every control point lies
@@ -45,9 +45,8 @@ class ChunkPath {
   // them; the motion, which ends at rest by itself, is as it was.
   [[nodiscard]] Expected<Trajectory> stop(Time from, const AxisLimits& limits);
 
-  // How many actions have been executed at `time`, as a real number.
-  [[nodiscard]] double progress(Time time) const;
-  [[nodiscard]] std::int64_t executed(Time time) const;
+  // How many actions have been executed at `time`.
+  [[nodiscard]] double executed(Time time) const;
   // Whether the motion is slower there than the policy's pace for want of actions: it brakes for the end of what has
   // come, rests there, or takes up speed again. Not before the first chunk, nor at the end of the last one.
   [[nodiscard]] bool starved(Time time) const;

@@ -96,7 +96,7 @@ struct Tally {
   std::int64_t starved = 0, taken = 0, past = 0, unreachable = 0;
   double worst_off = 0;
 };
-using Act = std::function<std::vector<AxisVector>(std::int64_t observed)>;
+using Act = std::function<std::vector<AxisVector>(double observed)>;
 using Judge = std::function<void(const ChunkPath&, const Follower&)>;
 Tally run(ChunkPath& path, Follower& follower, const AxisLimits& limits, const Act& act, Duration period,
           const Latency& latency, double for_s, const Judge& judge) {
@@ -112,7 +112,7 @@ Tally run(ChunkPath& path, Follower& follower, const AxisLimits& limits, const A
     const Time now = follower.now();
     if (now.ns() % kBridgeTick.count() == 0) {
       if (now >= next_ask && (warm || pending.empty())) {
-        const std::int64_t observed = path.executed(now);
+        const double observed = path.executed(now);
         pending.push_back({now + (warm ? latency.usual : latency.first), {observed, period, act(observed)}});
         next_ask = now + latency.every;
       }
@@ -140,10 +140,9 @@ Tally run(ChunkPath& path, Follower& follower, const AxisLimits& limits, const A
 // ---- alignment ----
 
 // Actions on a straight line: wherever the arm is on it tells how many it has executed.
-std::vector<AxisVector> ramp(std::int64_t observed, std::size_t count, double step) {
+std::vector<AxisVector> ramp(double observed, std::size_t count, double step) {
   std::vector<AxisVector> actions;
-  for (std::size_t j = 0; j < count; ++j)
-    actions.push_back(all(2, step * static_cast<double>(observed + static_cast<std::int64_t>(j) + 1)));
+  for (std::size_t j = 0; j < count; ++j) actions.push_back(all(2, step * (observed + static_cast<double>(j) + 1)));
   return actions;
 }
 
@@ -158,21 +157,21 @@ TEST_P(ChunksAtDelay, ActionsAreWhereTheyBelongAndNoneIsMissed) {
   Follower follower(all(2, 0), limits);
   double off = 0;
   const Tally result = run(
-      path, follower, limits, [](std::int64_t observed) { return ramp(observed, 20, 0.01); }, period,
+      path, follower, limits, [](double observed) { return ramp(observed, 20, 0.01); }, period,
       {milliseconds(GetParam()), milliseconds(1500), milliseconds(200)}, 12,
       [&](const ChunkPath& p, const Follower& f) {
         if (f.now() < Time(from_s(2.5))) return;
-        off = std::max(off, std::abs(f.state().position[0] - 0.01 * p.progress(f.now())));
+        off = std::max(off, std::abs(f.state().position[0] - 0.01 * p.executed(f.now())));
       });
   std::printf("delay %d ms: %lld of 12000 ticks starved, %lld chunks taken, %.1e rad off, %.1f actions executed\n",
               GetParam(), static_cast<long long>(result.starved), static_cast<long long>(result.taken), off,
-              path.progress(follower.now()));
+              path.executed(follower.now()));
   EXPECT_EQ(result.starved, 0);
   EXPECT_EQ(result.past, 0);
   EXPECT_EQ(result.unreachable, 0);
   EXPECT_LT(off, 1e-9);
   // From rest it takes up the pace within 0.2 s; from then on it loses nothing.
-  EXPECT_GT(path.progress(follower.now()), (12 - 1.5 - 0.2) / 0.05);
+  EXPECT_GT(path.executed(follower.now()), (12 - 1.5 - 0.2) / 0.05);
   EXPECT_LT(follower.seam(), 1e-9);
   EXPECT_LE(follower.use().worst(), 1 + 1e-9);
 }
@@ -188,20 +187,20 @@ TEST(Chunks, StarveByNameWhereTheDelayIsTooLong) {
     double off = 0;
     // One inference at a time.
     const Tally result = run(
-        path, follower, limits, [](std::int64_t observed) { return ramp(observed, 20, 0.01); }, milliseconds(50),
+        path, follower, limits, [](double observed) { return ramp(observed, 20, 0.01); }, milliseconds(50),
         {milliseconds(delay_ms), milliseconds(1500), milliseconds(delay_ms)}, 12,
         [&](const ChunkPath& p, const Follower& f) {
           if (!p.starved(f.now())) return;
           const bool rests = f.state().speed.cwiseAbs().maxCoeff() < 1e-12 && p.executed(f.now()) > 0;
           rested = rested || rests;
-          if (rests) off = std::max(off, std::abs(f.state().position[0] - 0.01 * p.progress(f.now())));
+          if (rests) off = std::max(off, std::abs(f.state().position[0] - 0.01 * p.executed(f.now())));
         });
     std::printf("delay %d ms, one inference at a time: %lld of 12000 ticks starved, %.1f actions executed\n", delay_ms,
-                static_cast<long long>(result.starved), path.progress(follower.now()));
+                static_cast<long long>(result.starved), path.executed(follower.now()));
     EXPECT_GT(result.starved, 500);
     EXPECT_TRUE(rested || delay_ms < 900);
     EXPECT_LT(off, 1e-9);  // where it rests all its actions have been executed
-    EXPECT_GT(path.progress(follower.now()), 60);
+    EXPECT_GT(path.executed(follower.now()), 60);
     EXPECT_LT(follower.seam(), 1e-9);
     EXPECT_LE(follower.use().worst(), 1 + 1e-9);
   }
@@ -221,12 +220,12 @@ struct RandomPolicy {
         turn_rad_s(random.uniform(0.2, 3.0)),
         noise(random.fork(1)) {}
 
-  std::vector<AxisVector> act(std::int64_t observed) {
+  std::vector<AxisVector> act(double observed) {
     const double jump = jump_rad * noise.normal();
     std::vector<AxisVector> actions;
     for (std::size_t j = 0; j < count; ++j) {
       AxisVector action(axes);
-      const double at_s = to_s(period) * static_cast<double>(observed + static_cast<std::int64_t>(j) + 1);
+      const double at_s = to_s(period) * (observed + static_cast<double>(j) + 1);
       for (Eigen::Index i = 0; i < axes; ++i) {
         const double phase = turn_rad_s * at_s * (1 + 0.3 * static_cast<double>(i));
         action[i] = std::clamp(amplitude * std::sin(phase) + jump + noise_rad * noise.normal(), -2.9, 2.9);
@@ -261,9 +260,9 @@ TEST(Chunks, RandomStreamsKeepEveryLimitAndNeverJump) {
                           from_s(random.uniform(0.02, 0.3))};
     double last_progress = 0;
     const Tally result = run(
-        path, follower, limits, [&](std::int64_t observed) { return policy.act(observed); }, policy.period, latency, 4,
+        path, follower, limits, [&](double observed) { return policy.act(observed); }, policy.period, latency, 4,
         [&](const ChunkPath& p, const Follower& f) {
-          const double progress = p.progress(f.now());
+          const double progress = p.executed(f.now());
           ASSERT_GE(progress, last_progress - 1e-9) << "actions were taken back";
           last_progress = progress;
         });
@@ -271,7 +270,7 @@ TEST(Chunks, RandomStreamsKeepEveryLimitAndNeverJump) {
     while (follower.now() < path.end()) follower.step();
     follower.step();
     EXPECT_TRUE(follower.state().speed.isZero(1e-9));
-    if (std::abs(path.progress(follower.now()) - path.queued()) > 1e-9) ++rests_elsewhere;
+    if (std::abs(path.executed(follower.now()) - path.queued()) > 1e-9) ++rests_elsewhere;
     seam = std::max(seam, follower.seam());
     worst = std::max(worst, follower.use().worst());
     ASSERT_LT(follower.seam(), 1e-9);
@@ -296,11 +295,11 @@ TEST(Chunks, StopComesToRestOnThePath) {
     Follower follower(all(2, 0), limits);
     const double step = random.uniform(0.005, 0.035), stop_s = random.uniform(0.2, 3);
     (void)run(
-        path, follower, limits, [&](std::int64_t observed) { return ramp(observed, 20, step); }, milliseconds(50),
+        path, follower, limits, [&](double observed) { return ramp(observed, 20, step); }, milliseconds(50),
         {milliseconds(100), milliseconds(100), milliseconds(100)}, std::round(100 * stop_s) / 100,
         [](const ChunkPath&, const Follower&) {});
     const Time now = follower.now();
-    const double before = path.progress(now);
+    const double before = path.executed(now);
     const auto way = path.stop(now + kLead, limits);
     ASSERT_TRUE(way) << way.error().line();
     follower.queue(*way);
@@ -308,11 +307,11 @@ TEST(Chunks, StopComesToRestOnThePath) {
     while (follower.now() < path.end()) follower.step();
     EXPECT_TRUE(follower.state().speed.isZero(1e-9));
     EXPECT_FALSE(path.starved(follower.now()));
-    EXPECT_GE(path.progress(follower.now()), before);
+    EXPECT_GE(path.executed(follower.now()), before);
     // Both axes have the same way to go: on the path they are at the same place.
     EXPECT_NEAR(follower.state().position[0], follower.state().position[1], 1e-12);
     if (before > 10) {
-      EXPECT_NEAR(follower.state().position[0], step * path.progress(follower.now()), 1e-9);
+      EXPECT_NEAR(follower.state().position[0], step * path.executed(follower.now()), 1e-9);
     }
     EXPECT_LT(follower.seam(), 1e-9);
     EXPECT_LE(follower.use().worst(), 1 + 1e-6);
@@ -365,8 +364,11 @@ TEST_F(RefusedChunk, IsNamed) {
   chunk.actions.resize(81, all(2, 0.1));
   EXPECT_EQ(error_of(chunk), "chunk_long");
   chunk = good();
-  chunk.observed = -1;
-  EXPECT_EQ(error_of(chunk), "chunk_observed");
+  for (const double observed : {-1.0, std::nan(""), HUGE_VAL}) {
+    chunk = good();
+    chunk.observed = observed;
+    EXPECT_EQ(error_of(chunk), "chunk_observed");
+  }
 }
 
 TEST_F(RefusedChunk, IsOfThePastWhenAllItsActionsAreExecuted) {
@@ -378,7 +380,7 @@ TEST_F(RefusedChunk, IsOfThePastWhenAllItsActionsAreExecuted) {
 
 TEST_F(RefusedChunk, IsOfTheFutureWhenMoreWasObservedThanIsExecuted) {
   Chunk chunk = good();
-  chunk.observed += 1;
+  chunk.observed += 0.01;
   EXPECT_EQ(error_of(chunk), "chunk_future");
 }
 
@@ -386,7 +388,7 @@ TEST_F(RefusedChunk, IsOfTheFutureWhenMoreWasObservedThanIsExecuted) {
 // up speed first.
 TEST_F(RefusedChunk, IsWhatCountsByTheClock) {
   Chunk chunk = good();
-  chunk.observed = follower_.now().since_start() / chunk.period;
+  chunk.observed = to_s(follower_.now().since_start()) / to_s(chunk.period);
   EXPECT_EQ(error_of(chunk), "chunk_future");
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -17,6 +18,7 @@ using task::Status;
 
 constexpr Duration kTick = std::chrono::milliseconds(1);  // of the loop: what starvation is counted in
 constexpr Duration kSilence = std::chrono::seconds(10);   // then the policy is taken for dead
+constexpr double kSame = 1e-6;                            // actions
 constexpr Duration kLongestStream = std::chrono::seconds(600);
 
 class FollowPolicy final : public task::Skill, public task::ChunkStream {
@@ -88,7 +90,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     heard_ = now;
     if (!first_chunk_) first_chunk_ = now;
     last_.reset();
-    if (chunk.last) last_ = chunk.observed + static_cast<std::int64_t>(chunk.actions.size());
+    if (chunk.last) last_ = chunk.observed + static_cast<double>(chunk.actions.size());
     return {};
   }
 
@@ -99,7 +101,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     if (!path_ || ending_ || !cell_.arm.operational())
       return fail("no motion is taken now", "chunk_stopped", "wait until observe says that it goes on");
     if (chunk.observed < oldest_)
-      return fail(fmt::format("it was observed at {} actions, before the arm was stopped", chunk.observed),
+      return fail(fmt::format("it was observed at {:.1f} actions, before the arm was stopped", chunk.observed),
                   "chunk_stale", "observe again");
     motion::ChunkPath next = *path_;
     auto way = next.splice(chunk, motion_time(now), motion_time(cell_.arm.splice_time(now)), cell_.limits_planned());
@@ -129,7 +131,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
 
   // What was sent in before a stop must not move the arm after it.
   Progress stopped(Time now) {
-    if (path_) oldest_ = path_->executed(motion_time(now)) + 1;
+    if (path_) oldest_ = std::floor(path_->executed(motion_time(now))) + 1;
     path_.reset();
     return ending_ ? verdict_ : Progress{};
   }
@@ -151,16 +153,17 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
 
   // What is played slowly may be longer than what can be queued.
   [[nodiscard]] Progress whole() const {
-    if (path_->executed(path_->end()) >= *last_) return succeeded();
+    if (path_->executed(path_->end()) >= *last_ - kSame) return succeeded();
     return {Status::kFailed, "the limits make the last chunk too slow to be queued whole", detail()};
   }
   [[nodiscard]] Progress succeeded() const { return {Status::kSucceeded, {}, detail()}; }
   [[nodiscard]] task::Json detail() const {
-    task::Json told{{"policy", arguments_.at("policy")},
-                    {"chunks", chunks_},
-                    {"refused", refused_},
-                    {"executed", path_ ? path_->executed(counted_) : oldest_},
-                    {"starved_ticks", starved_}};
+    task::Json told{
+        {"policy", arguments_.at("policy")},
+        {"chunks", chunks_},
+        {"refused", refused_},
+        {"executed", static_cast<std::int64_t>(std::floor((path_ ? path_->executed(counted_) : oldest_) + kSame))},
+        {"starved_ticks", starved_}};
     if (refused_ > 0) told["last_refusal"] = last_refusal_;
     return told;
   }
@@ -170,12 +173,12 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   const std::uint64_t number_;
   const Duration for_;
   std::optional<motion::ChunkPath> path_;  // not while the arm is stopped
-  std::int64_t oldest_ = 0;                // observations of fewer actions were made before a stop
+  double oldest_ = 0;                      // observations of fewer actions were made before a stop
   Time counted_, heard_;
   std::optional<Time> first_chunk_;
   std::int64_t chunks_ = 0, refused_ = 0, starved_ = 0;
   std::string last_refusal_;
-  std::optional<std::int64_t> last_;  // how many actions the stream has, once the policy has said its last
+  std::optional<double> last_;  // how many actions the stream has, once the policy has said its last
   bool ending_ = false;
   Progress verdict_;
 };

@@ -15,7 +15,7 @@ namespace pons::task {
 struct Observation {
   Time stamp;                         // of the arm's measurement, and what the beliefs are predicted to
   AxisVector position, speed;         // measured, rad and rad/s
-  std::int64_t executed = 0;          // actions of the stream by then: what the chunk made of it says as `observed`
+  double executed = 0;                // actions of the stream by then: what the chunk made of it says as `observed`
   Duration enough{0};                 // for so long the arm still moves at the policy's pace on what has come
   std::vector<ObjectBelief> objects;  // and after them what is only an obstacle
 };

@@ -110,7 +110,7 @@ TEST_F(OutsidePolicy, HearsWhatIsWrongWithAChunk) {
     EXPECT_THAT(with("actions", json::array({{9, 0, 0, -1, 0, 1, 0}})), StartsWith("chunk_position"));
     EXPECT_THAT(with("actions", "all"), HasSubstr("/actions"));
     // The two actions of the first one are executed soon; then a chunk of the same is of the past.
-    while (ask({{"op", "observe"}}).value("executed", 2) < 2) {
+    while (ask({{"op", "observe"}}).value("executed", 2.0) < 1.999) {
     }
     EXPECT_THAT(error_of(chunk), StartsWith("chunk_past"));
   });

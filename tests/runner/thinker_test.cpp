@@ -21,11 +21,11 @@ class Slow final : public task::Policy {
 TEST(Thinker, NobodyWaitsForItAndItAnswersInOrder) {
   Thinker thinker;
   const auto slow = std::make_shared<Slow>();
-  for (std::int64_t i = 0; i < 3; ++i) thinker.ask(slow, {.executed = i});
+  for (int i = 0; i < 3; ++i) thinker.ask(slow, {.executed = 1.0 * i});
   slow->begun.wait();
   EXPECT_FALSE(thinker.take());
   slow->go_on.count_down();
-  for (std::int64_t i = 0; i < 3;) {
+  for (int i = 0; i < 3;) {
     if (const auto chunk = thinker.take()) {
       EXPECT_EQ(chunk->observed, i++);
     }
