@@ -1,15 +1,22 @@
 // What crosses the link while bridges die and others follow and the body's threads go on. A killed bridge is one that
 // goes no further; its successor begins after it, as the operating system's lock on the memory sees to.
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <csignal>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <span>
+#include <string>
 #include <thread>
 
+#include "pons/link/border.hpp"
 #include "pons/link/frames.hpp"
 #include "pons/link/link.hpp"
 
@@ -21,7 +28,9 @@ constexpr int kShots = 12'000, kKilled = 400;
 constexpr Intrinsics kSmall{.width = 32, .height = 24};
 
 // A frame shows its number in what was measured with it and in every pixel.
-Shot shot_of(int number) { return {Time(Duration(number)), AxisVector::Constant(6, number), double(number)}; }
+Shot shot_of(int number) {
+  return {Time(Duration(number)), AxisVector::Constant(6, number), static_cast<double>(number)};
+}
 std::uint8_t colour_of(int number) { return static_cast<std::uint8_t>(number % 251); }
 
 bool shows(const Shot& shot, int number) {
@@ -79,7 +88,8 @@ void develop(Darkroom& room, rt::SpscRing<int, 4>& exposed) {
       room.half_developed.store(number);
       while (room.followed.load() < dying) std::this_thread::yield();
     }
-    std::ranges::fill(std::span(views[camera].depth_m.data(), views[camera].depth_m.size()), float(number));
+    std::ranges::fill(std::span(views[camera].depth_m.data(), views[camera].depth_m.size()),
+                      static_cast<float>(number));
     room.frames.hand_over(camera);
   }
   room.done.store(true);
@@ -207,7 +217,8 @@ TEST(Link, NothingOfADeadBridgeIsTakenInOnceAnotherHasTakenOver) {
       continue;
     }
     const std::uint64_t number = command.sequence, who = number / Succession::kMost;
-    const bool whole = command.payload_com_m[0] == double(number) && command.payload_com_m[2] == double(number);
+    const bool whole = command.payload_com_m[0] == static_cast<double>(number) &&
+                       command.payload_com_m[2] == static_cast<double>(number);
     const bool next = number == (who == last / Succession::kMost ? last + 1 : Succession::number(who, 0));
     if (!whole || !next || who < since) all->sound.store(false);
     last = number;
@@ -215,6 +226,40 @@ TEST(Link, NothingOfADeadBridgeIsTakenInOnceAnotherHasTakenOver) {
   bridges.join();
   EXPECT_TRUE(all->sound.load());
   EXPECT_EQ(last, Succession::number(Succession::kBridges, 2 * Link::kCommands - 1));
+}
+
+// What a process that is killed shares with this one.
+struct Named {
+  Border border{Identity{}, 1};
+  std::atomic<int> names{0};
+};
+
+// The bridge is killed again and again wherever it is in naming its journal.
+TEST(Border, AJournalsPathIsWholeWhereverItsBridgeIsKilled) {
+  constexpr int kKills = 100;
+  void* const memory = mmap(nullptr, sizeof(Named), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(memory, MAP_FAILED);
+  auto* const shared = new (memory) Named;
+  const std::array<std::string, 2> paths{"/" + std::string(3000, 'a'), "/" + std::string(4000, 'b')};
+  bool whole = true;
+  for (int kill_number = 0; kill_number < kKills; ++kill_number) {
+    const int before = shared->names.load();
+    const pid_t bridge = fork();
+    if (bridge == 0) {
+      for (std::size_t i = 0;; ++i) {
+        (void)shared->border.name_journal(paths[i % 2]);
+        ++shared->names;
+      }
+    }
+    ASSERT_GT(bridge, 0);
+    while (shared->names.load() < before + 2 + kill_number % 5) std::this_thread::yield();
+    kill(bridge, SIGKILL);
+    waitpid(bridge, nullptr, 0);
+    const std::string journal = shared->border.journal();
+    whole = whole && (journal == paths[0] || journal == paths[1]);
+  }
+  EXPECT_TRUE(whole);
+  munmap(memory, sizeof(Named));
 }
 
 }  // namespace
