@@ -171,7 +171,7 @@ struct Succession {
 
   Link link;
   std::atomic<std::uint64_t> taken_over{0};  // by whom
-  std::atomic<std::uint64_t> looked{0};      // since whose taking over the cerebellum has looked for commands
+  std::atomic<std::uint64_t> heard{0};       // of whose taking over the cerebellum knows, and has acted by that once
   std::atomic<bool> sound{true}, done{false};
 
   // The cerebellum takes in nothing while one of these lives.
@@ -184,6 +184,7 @@ struct Succession {
 void send(Succession& all, std::uint64_t who) {
   BridgeEnd end(all.link);
   all.taken_over.store(who);
+  while (who % 4 != 1 && all.heard.load() < who) std::this_thread::yield();
   const std::size_t room = end.room();
   const std::array<std::size_t, 4> commands{0, 2 * Link::kCommands, std::min<std::size_t>(room, who % 300), room};
   Command command;
@@ -193,7 +194,6 @@ void send(Succession& all, std::uint64_t who) {
     while (!end.send(command) && all.sound.load()) std::this_thread::yield();
   }
   if (who % 4 == 3 && end.send(command)) all.sound.store(false);
-  while (who % 4 == 0 && all.looked.load() < who) std::this_thread::yield();
 }
 
 TEST(Link, NothingOfADeadBridgeIsTakenInOnceAnotherHasTakenOver) {
@@ -210,7 +210,7 @@ TEST(Link, NothingOfADeadBridgeIsTakenInOnceAnotherHasTakenOver) {
     const std::uint64_t since = all->taken_over.load();
     const bool held_back = Succession::is_held_back(since);
     const bool got = !held_back && all->sound.load() && cerebellum.receive(command);
-    if (!held_back) all->looked.store(since);
+    all->heard.store(since);
     if (!got) {
       if (over) break;
       std::this_thread::yield();
