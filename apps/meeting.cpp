@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -87,14 +86,12 @@ Expected<MeetingPlace> MeetingPlace::join(const std::string& name, const world::
   return place;
 }
 
-fs::path journal_of(const link::Border& border) { return std::string(border.journal.data()); }
+fs::path journal_of(const link::Border& border) { return border.journal(); }
 
 Expected<void> name_journal(link::Border& border, const fs::path& journal) {
   std::error_code ignored;
-  const std::string path = fs::absolute(journal, ignored).string();
-  if (path.size() >= border.journal.size()) return fail("the path is too long", "--journal", "choose a shorter one");
-  border.journal.fill(0);
-  std::ranges::copy(path, border.journal.begin());
+  if (!border.name_journal(fs::absolute(journal, ignored).string()))
+    return fail("the path is too long", "--journal", "choose a shorter one");
   return {};
 }
 

@@ -27,7 +27,7 @@ def errors_of(model: Path, variant: str | None) -> tuple[int, str]:
 
 
 def main() -> int:
-    models = [Path(name) for name in sys.argv[1:]] or sorted(MODELS.glob("*.pml"))
+    models = [Path(name).resolve() for name in sys.argv[1:]] or sorted(MODELS.glob("*.pml"))
     bad = 0
     for model in models:
         text = model.read_text(encoding="utf-8")

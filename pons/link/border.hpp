@@ -39,7 +39,7 @@ enum class Stage : std::uint32_t {
 enum class Closing : std::uint32_t { kOpen, kComplete, kBrokenOff };
 
 // Made by the body, in shared memory (rt::Shared). No pointer is in it. Either side may be killed at any instant: what
-// changes is one word, or a channel that bears it.
+// changes is one word, what one word tells, or a channel that bears it.
 struct Border {
   // Grows with every change of what lies in here, messages included: of a field, its unit or an enumerator's value.
   static constexpr std::uint64_t kVersion = 2;
@@ -63,10 +63,20 @@ struct Border {
   std::atomic<Closing> closing{Closing::kOpen};
   std::atomic<std::int64_t> last_outcome_ns{0};  // of a task that the brain asked for
   std::atomic<std::int64_t> retries{0};          // of all bridges
-  std::array<char, kLongestPath> journal{};      // an absolute path, ended by a zero; whole before `closing` says so
+
+  // The bridge's journal, by its absolute path. False: the path is too long. A bridge that comes after the end names
+  // none.
+  [[nodiscard]] bool name_journal(std::string_view path);
+  // The body's call, after the end: what was named last, by a bridge that may be dead. Empty: none has come so far.
+  [[nodiscard]] std::string journal() const;
 
   [[nodiscard]] Stage now_at() const { return static_cast<Stage>(stage.value()); }
   void go_to(Stage next) { stage.set(static_cast<std::uint32_t>(next)); }
+
+ private:
+  // A path is written where the present one does not lie, and told when it is whole. Each ends with a zero.
+  std::array<std::array<char, kLongestPath>, 2> paths_{};
+  std::atomic<std::uint32_t> named_{0};  // how many were; the present one is paths_[named_ % 2]
 };
 
 // The memory of the frames' pixels, beside a border of that name.

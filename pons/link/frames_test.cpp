@@ -121,5 +121,21 @@ TEST(Border, AnotherWorldCellOrDayIsRefusedByName) {
   EXPECT_EQ(check_same(body, other, "x").error().what, "the body was started with other parcels");
 }
 
+TEST(Border, TheJournalIsTheOneNamedLastBeforeTheEnd) {
+  const auto border = std::make_unique<Border>(Identity{}, 1);
+  EXPECT_EQ(border->journal(), "");
+  EXPECT_FALSE(border->name_journal(std::string(Border::kLongestPath, 'x')));
+  EXPECT_EQ(border->journal(), "");
+  ASSERT_TRUE(border->name_journal("/a/long/path"));
+  EXPECT_EQ(border->journal(), "/a/long/path");
+  ASSERT_TRUE(border->name_journal("/another"));
+  EXPECT_EQ(border->journal(), "/another") << "nothing of an older one hangs on it";
+  ASSERT_TRUE(border->name_journal("/b"));
+  EXPECT_EQ(border->journal(), "/b");
+  border->go_to(Stage::kEnded);
+  EXPECT_TRUE(border->name_journal("/too/late"));
+  EXPECT_EQ(border->journal(), "/b") << "the body may be reading";
+}
+
 }  // namespace
 }  // namespace pons::link

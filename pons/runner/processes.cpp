@@ -127,8 +127,9 @@ Expected<void> await_begin(const Crossing& crossing, const std::function<bool()>
   rt::PeriodicLoop loop(own, kLook, border.stage);
   bool gone = false;
   loop.run([&](Time) {
-    gone = border.now_at() == Stage::kEnded || !crossing.other_lives();
-    return !gone && border.now_at() == Stage::kWaiting && !interrupted();
+    const Stage stage = border.now_at();  // once: a body that is ended as it waits has never begun
+    gone = stage == Stage::kEnded || !crossing.other_lives();
+    return !gone && stage == Stage::kWaiting && !interrupted();
   });
   if (gone) return std::unexpected(body_gone(border));
   return {};
