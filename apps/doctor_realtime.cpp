@@ -39,7 +39,7 @@ Finding try_grant() {
     worst = std::max(worst, grant.pinned ? say(Finding::kGood, "a CPU for the loop", fmt::format("CPU {}", cpu))
                                          : say(Finding::kDegraded, "a CPU for the loop", "pinning refused"));
   }
-  if (grant.degraded()) say(Finding::kDegraded, "what helps", grant.refused);
+  for (const std::string& refused : grant.refused) say(Finding::kDegraded, "what helps", refused);
   return worst;
 }
 
