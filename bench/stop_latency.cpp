@@ -30,7 +30,6 @@ namespace {
 
 using namespace pons;
 using namespace std::chrono_literals;
-using link::CommandKind;
 using link::SafetyState;
 
 constexpr Duration kPeriod = 1ms, kLead = 50ms;
