@@ -70,11 +70,13 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   tell_people(fmt::format("the body waits for its bridge: pons bridge {}", world.name));
   runner::BodyParts parts = (*body)->parts();
   const auto began = std::chrono::steady_clock::now();
-  const auto result = runner::run_body_process(parts, place->crossing(tell_people),
-                                               {.interrupted = interrupted,
-                                                .progress = {},
-                                                .said = [&log](Time at, std::string_view text) { log.say(at, text); },
-                                                .limit = Time{}});
+  const auto result =
+      runner::run_body_process(parts, place->crossing(tell_people),
+                               {.interrupted = interrupted,
+                                .progress = {},
+                                .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+                                .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
+                                .limit = Time{}});
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   if (!result) return bad_run(result.error());
   return reckon_up(options, world, **body, *place, *result, wall_s);

@@ -59,6 +59,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
             progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
           },
       .said = {},
+      .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
       .limit = border.clock.now() + slowest(manifest.size())};
   const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);
   progress.finish();
@@ -72,6 +73,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
                           "journal: {}\n",
                           result->complete ? "complete" : "broken off", std::min(tally.settled, total), total,
                           tally.sorted, result->bridge->p50_ms, result->bridge->max_ms, options.journal.string()));
+  if (!result->degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->degraded));
   // A bridge that a person ends leaves its body to the next one.
   if (interrupted() && !asked) return kExitInterrupted;
   border.closing.store(result->complete ? link::Closing::kComplete : link::Closing::kBrokenOff);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <string>
 #include <string_view>
 
 #include "pons/core/time.hpp"
@@ -12,6 +14,14 @@ enum class Finding : std::uint8_t { kGood, kDegraded, kBad };
 
 // One line of the diagnosis; gives `finding` back.
 Finding say(Finding finding, std::string_view what, std::string_view how);
+
+// Who sets the clock rate of the CPU that a loop of the calling thread's would run on. `sys`: where the kernel's files
+// lie.
+struct Governor {
+  int cpu = 0;
+  std::string name;  // empty: nobody; the rate is not this system's to choose
+};
+[[nodiscard]] Governor loop_governor(const std::filesystem::path& sys = "/sys");
 
 // What the control loop needs of this machine: tries each thing, reads the settings that trials do not show, and runs
 // an empty 1 kHz loop for that long (0: not). The worst of its findings.

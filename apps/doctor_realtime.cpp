@@ -1,6 +1,7 @@
 // The part of pons doctor that is about the control loop.
 
 #include <fmt/format.h>
+#include <sched.h>
 #include <sys/mman.h>
 #include <unistd.h>
 #include <algorithm>
@@ -39,12 +40,12 @@ Finding try_grant() {
     worst = std::max(worst, grant.pinned ? say(Finding::kGood, "a CPU for the loop", fmt::format("CPU {}", cpu))
                                          : say(Finding::kDegraded, "a CPU for the loop", "pinning refused"));
   }
-  if (grant.degraded()) say(Finding::kDegraded, "what helps", grant.refused);
+  for (const std::string& refused : grant.refused) say(Finding::kDegraded, "what helps", refused);
   return worst;
 }
 
 // The first line of a file of the kernel's; empty if there is none.
-std::string line_of(const char* file) {
+std::string line_of(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line;
   std::getline(in, line);
@@ -69,9 +70,10 @@ Finding read_settings() {
                                                : "not PREEMPT_RT: expect single ticks late by milliseconds");
   const std::string clock = line_of("/sys/devices/system/clocksource/clocksource0/current_clocksource");
   check(clock == "tsc" || clock == "arch_sys_counter", "clock source", clock.empty() ? "unknown" : clock);
-  const std::string governor = line_of("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor");
+  const auto [cpu, governor] = loop_governor();
   check(governor.empty() || governor == "performance", "CPU governor",
-        governor.empty() ? "none: the clock rate is not this system's to choose" : governor);
+        governor.empty() ? "none: the clock rate is not this system's to choose"
+                         : fmt::format("{}, of CPU {}", governor, cpu));
   const std::string pages = line_of("/sys/kernel/mm/transparent_hugepage/enabled");
   check(pages.find("[always]") == std::string::npos, "huge pages", pages.empty() ? "none" : pages);
   const std::string swappiness = line_of("/proc/sys/vm/swappiness");
@@ -119,6 +121,12 @@ Finding measure(Duration how_long) {
 }
 
 }  // namespace
+
+Governor loop_governor(const std::filesystem::path& sys) {
+  const int pinned = rt::loop_cpu();
+  const int cpu = pinned >= 0 ? pinned : sched_getcpu();
+  return {cpu, line_of(sys / fmt::format("devices/system/cpu/cpu{}/cpufreq/scaling_governor", cpu))};
+}
 
 Finding try_realtime(Duration jitter) {
   Finding worst = try_grant();

@@ -9,20 +9,6 @@
 #include "apps/commands.hpp"
 
 namespace pons::apps {
-
-// fmt::print throws where nobody reads: what a command comes to must not depend on that.
-void say(std::FILE* out, const std::string& text) { (void)std::fputs(text.c_str(), out); }
-
-int bad_input(const Error& error) {
-  say(stderr, fmt::format("pons: {}\n", error.line()));
-  return kExitBadInput;
-}
-
-int bad_run(const Error& error) {
-  say(stderr, fmt::format("pons: {}\n", error.line()));
-  return kExitBadRun;
-}
-
 namespace {
 
 // Where the options of what was asked for stand.

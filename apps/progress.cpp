@@ -49,6 +49,8 @@ void Progress::bar(const Figures& figures, double rate) {
   shown_ = figures.done;
 }
 
+void Progress::put(std::string_view line) { write(fmt::format("{}{}", terminal_ ? "\r\x1b[K" : "", line)); }
+
 void Progress::finish() {
   if (terminal_ && shown_ >= 0) write("\n");
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
 #include "pons/core/time.hpp"
 
@@ -23,6 +24,8 @@ class Progress {
   };
   // Draws when enough has changed; cheap otherwise.
   void show(const Figures& figures);
+  // A line of something else, which ends with its line feed; the bar is drawn anew below it.
+  void put(std::string_view line);
   // Ends the bar's line.
   void finish();
 

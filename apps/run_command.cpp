@@ -86,6 +86,7 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 }
               },
           .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+          .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
           .limit = Time(slowest(static_cast<std::size_t>(total)))};
 }
 

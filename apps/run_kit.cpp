@@ -147,6 +147,8 @@ void LoopLog::say(Time at, std::string_view text) {
   std::fflush(file_.get());
 }
 
+std::string degraded_line(std::string_view refused) { return fmt::format("pons: degraded: {}\n", refused); }
+
 bool Reckoning::good() const {
   return verdict.lost == 0 && verdict.missorted == 0 && verdict.duplicated == 0 && report.limits.violations == 0;
 }
@@ -184,7 +186,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                  .missed = static_cast<std::int64_t>(result.loop.missed),
                  .p50_us = result.loop.p50_us,
                  .p99_us = result.loop.p99_us,
-                 .degraded = result.loop.degraded};
+                 .degraded = result.degraded};
   if (const auto& late = result.loop.late) {
     report.loop.late_p50_us = late->p50_us;
     report.loop.late_p99_us = late->p99_us;

@@ -73,6 +73,9 @@ class LoopLog {
   std::unique_ptr<std::FILE, Close> file_;
 };
 
+// For people, at once, --quiet or not: what the operating system refused, and what would help.
+[[nodiscard]] std::string degraded_line(std::string_view refused);
+
 // ---- the end ----
 
 // What a run came to, as far as the referee does not see it.

@@ -5,6 +5,7 @@
 // usage: stop_latency [--gate] [STOPS (200)]      --gate: exit 1 where a bar is missed
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <atomic>
@@ -29,7 +30,6 @@ namespace {
 
 using namespace pons;
 using namespace std::chrono_literals;
-using link::CommandKind;
 using link::SafetyState;
 
 constexpr Duration kPeriod = 1ms, kLead = 50ms;
@@ -75,7 +75,7 @@ class Loop {
 
   Found run() {
     const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
-    if (grant.degraded()) fmt::print("degraded: {}\n", grant.refused);
+    if (grant.degraded()) fmt::print("degraded: {}\n", fmt::join(grant.refused, "; "));
     rt::PeriodicLoop loop(clock, kPeriod, end_.emergency_word());
     Found found;
     found.over_shortest.reserve(100'000);

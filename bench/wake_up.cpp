@@ -5,6 +5,7 @@
 // usage: wake_up [--gate] [SECONDS a run (10)] [RUNS (5)]      --gate: exit 1 where a ratio is beyond its bar
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -113,7 +114,7 @@ Run run_both(int cpu, int priority, int seconds) {
   Run run;
   std::thread loop_thread([&] {
     const rt::Grant grant = rt::make_realtime({.priority = priority, .cpu = cpu});
-    if (priority > 0 && !grant.fifo) fmt::print("degraded: {}\n", grant.refused);
+    if (priority > 0 && !grant.fifo) fmt::print("degraded: {}\n", fmt::join(grant.refused, "; "));
     timespec start{};
     clock_gettime(CLOCK_MONOTONIC, &start);
     start = {.tv_sec = start.tv_sec + 2, .tv_nsec = 0};

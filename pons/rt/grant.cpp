@@ -28,18 +28,15 @@ std::string own_path() {
   return length > 0 ? std::string(path, static_cast<std::size_t>(length)) : "pons";
 }
 
-// Capabilities on the file are the quickest remedy; root has them all, and then it is the group's budget.
-std::string remedy(const char* capability) {
-  if (geteuid() == 0)
-    return "give this process's cgroup a real-time budget (cpu.rt_runtime_us), or its container the capability "
-           "cap_" +
-           std::string(capability);
-  return "sudo setcap cap_sys_nice,cap_ipc_lock+ep " + own_path() + ", or run it as the service in packaging/";
+// Capabilities on the file are the quickest remedy, but not for root, from whom its surroundings keep something.
+std::string remedy(const char* for_root) {
+  if (geteuid() == 0) return for_root;
+  return "sudo setcap cap_sys_nice,cap_ipc_lock+ep " + own_path() +
+         ", or run it as a service, by a unit of packaging/systemd/";
 }
 
 void note(Grant& grant, const char* what, int error, const std::string& mend) {
-  if (!grant.refused.empty()) grant.refused += "; ";
-  grant.refused += std::string(what) + " refused (" + std::strerror(error) + "): " + mend;
+  grant.refused.push_back(std::string(what) + " refused (" + std::strerror(error) + "): " + mend);
 }
 
 // The kernel's list form, "0-3,6". An unreadable one holds nothing.
@@ -81,7 +78,10 @@ Grant make_realtime(const Scheduling& scheduling) {
     const sched_param param{.sched_priority = scheduling.priority};
     const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
     grant.fifo = error == 0;
-    if (error != 0) note(grant, "SCHED_FIFO", error, remedy("sys_nice"));
+    if (error != 0)
+      note(grant, "SCHED_FIFO", error,
+           remedy("give this process's cgroup a real-time budget (cpu.rt_runtime_us), or its container the capability "
+                  "cap_sys_nice"));
   }
   if (scheduling.cpu >= 0) {
     cpu_set_t cpus;
@@ -92,7 +92,8 @@ Grant make_realtime(const Scheduling& scheduling) {
     if (error != 0) note(grant, "pinning", error, "name a CPU that this process may use");
   }
   grant.locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-  if (!grant.locked) note(grant, "locking memory", errno, remedy("ipc_lock"));
+  if (!grant.locked)
+    note(grant, "locking memory", errno, remedy("give this process's container the capability cap_ipc_lock"));
   grant.awake = AwakeCpus(open_latency_device());
   if (!grant.awake.held())
     note(grant, "keeping CPUs awake", errno, std::string("needs write access to ") + kLatencyDevice + ": packaging/");

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace pons::rt {
 
@@ -37,7 +38,7 @@ struct Grant {
   bool locked = false;  // all memory of the process, present and future
   bool pinned = false;  // on the asked CPU
   AwakeCpus awake;
-  std::string refused;  // one line: what was refused, why, and what would allow it; empty when all was given
+  std::vector<std::string> refused;  // a line each: what was refused, why, and what would allow it
   [[nodiscard]] bool degraded() const { return !refused.empty(); }
 };
 

@@ -166,7 +166,7 @@ TEST_F(SharedMemoryTest, AUserThatIsKilledLeavesItsChannelsUsable) {
       ASSERT_TRUE(got.whole());
       ASSERT_GT(got.words[0], newest);
       newest = got.words[0];
-      of_this += newest >> 32U == sender ? 1 : 0;
+      of_this += newest >> 32U == sender ? 1U : 0U;
       ++popped;
     }
     kill(child, SIGKILL);

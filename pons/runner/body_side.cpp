@@ -81,8 +81,8 @@ void BodySide::fail(const Error& what) {
 
 void BodySide::run_body() {
   name_thread("pons_body");
-  // A real body would have a computer of its own. What is refused here, the loop's own grant reports.
-  (void)rt::make_realtime({.priority = kBodyPriority});
+  // A real body would have a computer of its own.
+  refusals_.note(rt::make_realtime({.priority = kBodyPriority}));
   body::Sensors sensors;
   const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
   rt::PeriodicLoop loop(own, kControlPeriod);
@@ -113,6 +113,7 @@ void BodySide::run_body() {
 LoopFigures BodySide::run_loop() {
   name_thread("pons_loop");
   const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
+  refusals_.note(grant);
   Asked asked;
   rt::PeriodicLoop loop(clock_, kControlPeriod, parts_.link->emergency_word());
   loop.run([&](Time now) {
@@ -134,8 +135,7 @@ LoopFigures BodySide::run_loop() {
           .missed = loop.missed() + static_cast<std::uint64_t>(clock_.stood_still() / kControlPeriod),
           .p50_us = 1e6 * to_s(loop.execution().percentile(50)),
           .p99_us = 1e6 * to_s(loop.execution().percentile(99)),
-          .late = Lateness{late_us(50), late_us(99), 1e6 * to_s(loop.lateness().max())},
-          .degraded = grant.refused};
+          .late = Lateness{late_us(50), late_us(99), 1e6 * to_s(loop.lateness().max())}};
 }
 
 }  // namespace pons::runner

@@ -10,6 +10,7 @@
 
 #include "pons/rt/clock.hpp"
 #include "pons/rt/triple_buffer.hpp"
+#include "pons/runner/refusals.hpp"
 #include "pons/runner/run.hpp"
 
 namespace pons::runner {
@@ -31,6 +32,8 @@ class BodySide {
   [[nodiscard]] bool finished() const { return finished_.load(); }
   // Error: body or camera failed, or nothing has come from the loop for a second; the loop has stopped. Any thread.
   [[nodiscard]] Expected<void> health() const;
+  // What was refused to the two threads, and to whoever else notes it here.
+  [[nodiscard]] Refusals& refusals() { return refusals_; }
   // Ends both threads. Once. Error: the loop does not end. Its thread is left behind, and this, its parts and its clock
   // must outlive it: leave them, too, and end the process.
   [[nodiscard]] Expected<LoopFigures> end();
@@ -51,6 +54,7 @@ class BodySide {
   rt::TripleBuffer<body::Sensors> measured_;
   rt::TripleBuffer<Asked> asked_;
   std::atomic<bool> running_{true}, finished_{false};
+  Refusals refusals_;
   mutable std::mutex mutex_;
   std::optional<Error> error_;
   std::future<LoopFigures> figures_;  // the loop's, once it has ended

@@ -88,6 +88,7 @@ Expected<RunResult> run_body_process(BodyParts& parts, const Crossing& crossing,
   rt::PeriodicLoop loop(own, kLook);
   loop.run([&](Time) {
     border.finished.store(side->finished());
+    side->refusals().tell(watch);
     pass_on_events(parts, watch);
     good = side->health();
     const bool lives = bridge.look();
@@ -97,6 +98,8 @@ Expected<RunResult> run_body_process(BodyParts& parts, const Crossing& crossing,
   });
   result.end = border.clock.now();
   const auto figures = side->end();
+  side->refusals().tell(watch);
+  result.degraded = side->refusals().line();
   if (!figures) (void)side.release();  // a loop that is stuck is left with it
   pass_on_events(parts, watch);
   result.complete = border.closing.load() == Closing::kComplete;
@@ -139,11 +142,13 @@ Expected<RunResult> run_bridge_process(BridgeSide& bridge_side, Observer& observ
                                        const Watch& watch) {
   Border& border = *crossing.border;
   const std::int64_t retries_before = border.retries.load();
+  Refusals refusals;
   Watch both = watch;
   both.interrupted = [&] { return (watch.interrupted && watch.interrupted()) || border.now_at() == Stage::kEnding; };
   both.progress = [&](Time now) {
     border.last_outcome_ns.store(bridge_side.last_outcome().ns());
     border.retries.store(retries_before + bridge_side.retries());
+    refusals.tell(watch);
     if (watch.progress) watch.progress(now);
   };
   const Vigil vigil(crossing);
@@ -152,7 +157,9 @@ Expected<RunResult> run_bridge_process(BridgeSide& bridge_side, Observer& observ
                         if (vigil.gone().value() == 0) return {};
                         return std::unexpected(body_gone(border));
                       }};
-  return run_bridge(bridge_side, observer, body, both);
+  auto result = run_bridge(bridge_side, observer, body, refusals, both);
+  if (result) result->degraded = refusals.line();
+  return result;
 }
 
 }  // namespace pons::runner

@@ -14,8 +14,9 @@ constexpr int kBridgePriority = 10;  // below loop and body: neither must wait f
 
 }  // namespace
 
-Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body, const Watch& watch) {
-  (void)rt::make_realtime({.priority = kBridgePriority});
+Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body, Refusals& refusals,
+                               const Watch& watch) {
+  refusals.note(rt::make_realtime({.priority = kBridgePriority}));
   RunResult result;
   Expected<void> good;
   Ending ending(watch, bridge_side);
@@ -43,13 +44,16 @@ Expected<RunResult> run_realtime(Parts& parts, const Watch& watch) {
   const rt::WakeWord gone;  // not while this process lives
   Watch both = watch;
   both.progress = [&](Time now) {
+    body->refusals().tell(watch);
     if (watch.progress) watch.progress(now);
     pass_on_events(parts.body, watch);
   };
-  auto result =
-      run_bridge(*parts.bridge_side, *parts.observer,
-                 {clock.get(), &gone, [&] { return body->finished(); }, [&] { return body->health(); }}, both);
+  auto result = run_bridge(*parts.bridge_side, *parts.observer,
+                           {clock.get(), &gone, [&] { return body->finished(); }, [&] { return body->health(); }},
+                           body->refusals(), both);
   const auto figures = body->end();
+  body->refusals().tell(watch);
+  if (result) result->degraded = body->refusals().line();
   if (!figures) {
     (void)body.release();
     (void)clock.release();

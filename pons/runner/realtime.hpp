@@ -3,6 +3,7 @@
 
 #include "pons/rt/clock.hpp"
 #include "pons/rt/wake_word.hpp"
+#include "pons/runner/refusals.hpp"
 #include "pons/runner/run.hpp"
 
 namespace pons::runner {
@@ -20,8 +21,9 @@ struct BodyView {
   std::function<Expected<void>()> health;     // an error ends the run
 };
 
-// The bridge's side alone, on the caller's thread; the loop's figures stay empty. Error: the body's, or the journal's.
+// The bridge's side alone, on the caller's thread, which notes in `refusals` what it was refused before its first tick;
+// the loop's figures stay empty. Error: the body's, or the journal's.
 [[nodiscard]] Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body,
-                                             const Watch& watch);
+                                             Refusals& refusals, const Watch& watch);
 
 }  // namespace pons::runner

@@ -39,6 +39,7 @@ struct Watch {
   std::function<bool()> interrupted;
   std::function<void(Time)> progress;
   std::function<void(Time, std::string_view)> said;  // an event of the control loop: stops, arming, refused commands
+  std::function<void(std::string_view)> refused;     // real time only: what the operating system refused, at the start
   Time limit;                                        // a run that takes longer is broken off
 };
 
@@ -51,7 +52,6 @@ struct LoopFigures {
   std::uint64_t ticks = 0, missed = 0;
   double p50_us = 0, p99_us = 0;  // time of one control step
   std::optional<Lateness> late;   // real time only
-  std::string degraded;           // real time only: what the operating system refused; empty when nothing
 };
 
 // Time of one bridge tick.
@@ -64,6 +64,7 @@ struct RunResult {
   bool complete = false;  // false: broken off
   LoopFigures loop;
   std::optional<BridgeFigures> bridge;  // real time only: in lockstep a tick waits for the cameras' frames
+  std::string degraded;  // real time only: what the operating system refused this process; empty when nothing
 };
 
 // Tells the watch what the control loop has said since the last time.
