@@ -23,9 +23,9 @@ constexpr double kSlowTolerance = 0.01;
 
 // No sensor of an arm reads more, in any of its units.
 constexpr double kLargest = 1e6;
-// No axis turns faster than its speed limit times this, whatever pushes it; and it is where its speed has taken it, but
+// No axis turns faster than its speed limit times this, whatever strikes it; and it is where its speed has taken it, but
 // for the errors of encoders.
-constexpr double kNeverFaster = 10, kEncoders_rad = 0.02;
+constexpr double kNeverFaster = 100, kEncoders_rad = 0.02;
 
 // All that is passed on or reckoned with.
 bool is_sensible(const body::Sensors& sensors, Eigen::Index axes) {

@@ -91,7 +91,7 @@ TEST(Border, ItsVersionIsThatOfThisLayout) {
   EXPECT_EQ(sizeof(State), 896U);
   EXPECT_EQ(sizeof(Link), 650304U);
   EXPECT_EQ(sizeof(Frames), 1040U);
-  EXPECT_EQ(sizeof(Border), 655680U);
+  EXPECT_EQ(sizeof(Border), 659776U);
   EXPECT_EQ(offsetof(Command, contact_n), 456U);
   EXPECT_EQ(offsetof(Command, belt), 624U);
   EXPECT_EQ(offsetof(State, tip_wrench), 624U);
