@@ -95,6 +95,9 @@ int bridge(const BridgeCommandOptions& options) {
   if (!world) return bad_input(world.error());
   const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
   if (!manifest) return bad_input(manifest.error());
+  // Before it waits: the files may have changed by then.
+  const auto identity = identity_of(*world, *manifest);
+  if (!identity) return bad_input(identity.error());
 
   const std::string name = options.link.empty() ? default_link(world->name) : options.link;
   if (!rt::SharedMemory::is_owned(name) && !options.quiet)
@@ -102,8 +105,6 @@ int bridge(const BridgeCommandOptions& options) {
         fmt::format("{}: waiting up to {:.0f} s for a body: pons body {}\n", name, options.wait_s, world->name));
   runner::await_body(name, from_s(options.wait_s), interrupted);
   if (interrupted()) return kExitInterrupted;
-  const auto identity = identity_of(*world, *manifest);
-  if (!identity) return bad_input(identity.error());
   const auto place = MeetingPlace::join(name, *world, *identity);
   if (!place) return bad_input(place.error());
   return run_bridge(options, *world, *manifest, *place);

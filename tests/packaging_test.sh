@@ -31,7 +31,7 @@ done
 # Who keeps a journal keeps it where it survives; a run has its own, and all bridges of a run have the same.
 grep -q -- ' --journal ${STATE_DIRECTORY}/%i-${INVOCATION_ID}.db ' systemd/pons@.service || die "pons@ keeps no journal"
 grep -q -- ' --journal ${STATE_DIRECTORY}/%i-${RUN}.db ' systemd/pons-bridge@.service || die "pons-bridge@ keeps no journal"
-for setting in Restart=on-failure 'RestartPreventExitStatus=2 3' EnvironmentFile=%S/pons/%i.run \
+for setting in Restart=on-failure StartLimitIntervalSec=0 'RestartPreventExitStatus=2 3' EnvironmentFile=%S/pons/%i.run \
   BindsTo=pons-body@%i.service After=pons-body@%i.service; do
   has pons-bridge@.service "$setting"
 done

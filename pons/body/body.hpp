@@ -12,7 +12,7 @@
 
 namespace pons::body {
 
-// What the robot measures. Fixed size.
+// What the robot measures. Fixed size. A measurement must be sensible, and follow from the one before: plausible.hpp.
 struct Sensors {
   Time stamp;
   AxisVector position;                      // rad
@@ -39,9 +39,9 @@ struct SetPoints {
 // A robot. One thread calls read and write, in turn, once a tick.
 //
 // Its watchdog. A body with power that hears no write() for watchdog() of its own time takes the power off by itself:
-// drives off, brakes on, belt to rest, cups as they were told last. That is latched: the body says so in Sensors, and takes
-// set-points with power for ones without until it has heard some without; the next ones with power ask for it anew.
-// Without power silence means nothing. conformance.hpp checks a body against all this.
+// drives off, brakes on, belt to rest, cups as they were told last. That is latched: the body says so in Sensors, and
+// takes set-points with power for ones without until it has heard some without; the next ones with power ask for it
+// anew. Without power silence means nothing. conformance.hpp checks a body against all this.
 class Body {
  public:
   virtual ~Body() = default;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pons/body/plausible.hpp"
+
 namespace pons::body {
 namespace {
 
@@ -36,7 +38,12 @@ class Kit {
     while (subject_.now < until) {
       subject_.now = std::min(until, subject_.now + subject_.period);
       subject_.advance(subject_.now);
+      const Sensors before = sensors_;
       subject_.body.read(sensors_);
+      if (before.position.size() != sensors_.position.size() || before.speed.size() != sensors_.speed.size()) continue;
+      expect(
+          follows({before.position, before.speed}, {sensors_.position, sensors_.speed}, sensors_.stamp - before.stamp),
+          "it is not where its speed has taken it");
     }
   }
   void tell(const SetPoints& set_points, Duration duration) {
@@ -64,12 +71,7 @@ class Kit {
         sensors_.position = sensors_.speed = AxisVector::Zero(axes);
         continue;
       }
-      bool finite = sensors_.position.allFinite() && sensors_.speed.allFinite() &&
-                    std::isfinite(sensors_.belt_travel_m) && std::isfinite(sensors_.belt_speed_m_s);
-      for (const double value : sensors_.cup_vacuum_kpa) finite = finite && std::isfinite(value);
-      for (std::size_t k = 0; k < 3; ++k)
-        finite = finite && std::isfinite(sensors_.wrist_force_n[k]) && std::isfinite(sensors_.wrist_torque_nm[k]);
-      expect(finite, "a measurement is not finite");
+      expect(is_sensible(sensors_, axes), "a measurement is not finite, or larger than any sensor's");
     }
   }
 

@@ -172,6 +172,42 @@ TEST_P(BadMeasurements, CountAsNoneAndStopTheArmWhenTheyLast) {
 INSTANTIATE_TEST_SUITE_P(Fields, BadMeasurements, testing::ValuesIn(kMeasurements),
                          [](const auto& c) { return c.param.name; });
 
+TEST(OddMeasurements, OfABeltThatHasRunForYearsAreBelieved) {
+  Bench bench;
+  get_moving(bench);
+  bench.spoil = [](body::Sensors& s) { s.belt_travel_m = 1e9; };
+  run_unharmed(bench, 1s);
+  EXPECT_TRUE(bench.operational());
+  EXPECT_EQ(bench.state().belt_travel_m, 1e9);
+}
+
+// What a silence hid is no leap: the arm went on meanwhile, and brakes with what it measures again.
+TEST(OddMeasurements, AfterASilenceAreBelieved) {
+  Bench bench;
+  get_moving(bench);
+  bench.plant.silent = true;
+  bench.run(40ms);
+  EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
+  bench.plant.silent = false;
+  bench.run(3ms);
+  EXPECT_LT((bench.state().position - bench.plant.sensors.position).cwiseAbs().maxCoeff(), 0.02);
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+}
+
+// Carried on by its speed, a measurement is past the wall that stopped the arm; the next one is not.
+TEST(OddMeasurements, OfAnArmThatMetAWallAreBelieved) {
+  Bench bench;
+  get_moving(bench);
+  const AxisVector carried_on = bench.plant.sensors.position + 0.009 * bench.plant.sensors.speed;
+  bench.spoil = [&](body::Sensors& s) { s.position = carried_on; };
+  bench.tick();
+  bench.spoil = {};
+  bench.plant.blocked = true;
+  bench.run(4ms);
+  EXPECT_LT((bench.state().position - bench.plant.sensors.position).cwiseAbs().maxCoeff(), 1e-12);
+}
+
 TEST(BadTime, RunningBackOrStandingStillChangesNothing) {
   Bench bench;
   get_moving(bench);
@@ -200,6 +236,17 @@ TEST(BadTime, AGapInTheTicksStopsTheArmWithoutALeap) {
   EXPECT_LT((bench.state().commanded.acceleration - before.acceleration).cwiseAbs().maxCoeff(), 0.41);
   run_unharmed(bench, 1s);
   EXPECT_TRUE(bench.state().safety == SafetyState::kProtectiveStop || bench.state().cause == StopCause::kNoStandstill);
+}
+
+// The arm has gone on, and that is no leap: what stopped was the loop.
+TEST(BadTime, AGapOfAnArmThatGoesOnIsNoSilence) {
+  Bench bench;
+  get_moving(bench);
+  bench.now += 40ms;
+  bench.tick();
+  EXPECT_EQ(bench.state().cause, StopCause::kLoopStalled);
+  EXPECT_EQ(bench.state().safety, SafetyState::kStopping);
+  EXPECT_EQ(bench.state().position, bench.plant.sensors.position);
 }
 
 TEST(BodyWatchdog, WhatTheBodySwitchedOffIsNotFollowedFurther) {

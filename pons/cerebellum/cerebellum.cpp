@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "pons/body/plausible.hpp"
 #include "pons/motion/stop.hpp"
 #include "pons/rt/guard.hpp"
 
@@ -20,21 +21,6 @@ using link::StopResult;
 constexpr double kTooFast = 1.01;
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
-
-// No sensor of an arm reads more, in any of its units.
-constexpr double kLargest = 1e6;
-// No axis turns faster than its speed limit times this, whatever strikes it; and it is where its speed has taken it, but
-// for the errors of encoders.
-constexpr double kNeverFaster = 100, kEncoders_rad = 0.02;
-
-// All that is passed on or reckoned with.
-bool is_sensible(const body::Sensors& sensors, Eigen::Index axes) {
-  const auto sensible = [](double value) { return std::abs(value) <= kLargest; };  // not a number: it is not
-  const auto all = [&](const auto& values) { return std::all_of(values.begin(), values.end(), sensible); };
-  return sensors.position.size() == axes && sensors.speed.size() == axes && all(sensors.position) &&
-         all(sensors.speed) && all(sensors.wrist_force_n) && all(sensors.wrist_torque_nm) &&
-         all(sensors.cup_vacuum_kpa) && sensible(sensors.belt_travel_m) && sensible(sensors.belt_speed_m_s);
-}
 
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
   settings.compliance = with_delay(settings.compliance, delay_s);
@@ -107,8 +93,10 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   const bool driven = powered_ && driven_.out().powered;
   if (driven) collision_.drive(driven_.out().torque_nm, dt_s_);
   const Eigen::Index axes = commanded_.position.size();
-  const bool good = is_sensible(sensors, axes) && (!seen_ || sensors.stamp > measured_stamp_) &&
-                    sensors.stamp <= now + settings_.silence_timeout && !leaps(sensors);
+  const bool fresh = body::is_sensible(sensors, axes) && (!seen_ || sensors.stamp > heard_stamp_) &&
+                     sensors.stamp <= now + settings_.silence_timeout;
+  const bool good = fresh && !leaps(sensors);
+  if (fresh) heard_stamp_ = sensors.stamp;
   if (good) {
     const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s);
     Eigen::Index fastest = 0;
@@ -148,16 +136,15 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   }
 }
 
-// Whether it cannot have come there since the last good measurement, at any speed between the two that were measured.
-// Without power an arm may be carried to anywhere, by hand or by whoever restarts its encoders.
+// Whether it cannot have come there since the last good measurement. Without power an arm may be carried to anywhere,
+// by hand or by whoever restarts its encoders.
 bool Cerebellum::leaps(const body::Sensors& sensors) const {
   if (!seen_ || !powered_) return false;
-  if ((sensors.speed.array().abs() > kNeverFaster * robot_limits().speed_rad_s.array()).any()) return true;
-  // Silent for longer it brakes blind, and what leapt is not believed before the power is off.
-  const double half_s = 0.5 * to_s(std::min(sensors.stamp - measured_stamp_, settings_.silence_timeout));
-  const auto off = sensors.position - measured_position_ - half_s * (sensors.speed + measured_speed_);
-  const auto unsure = half_s * (sensors.speed - measured_speed_);
-  return (off.array().abs() > unsure.array().abs() + kEncoders_rad).any();
+  // Time passes for what was not measured, not for what has been leaping about: that is not believed before the power
+  // is off.
+  const Duration unheard = sensors.stamp - heard_stamp_, passed = sensors.stamp - measured_stamp_;
+  return !body::follows({measured_position_, measured_speed_}, {sensors.position, sensors.speed},
+                        std::min(passed, std::max(unheard, settings_.silence_timeout)));
 }
 
 void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {

@@ -77,8 +77,8 @@ class Cerebellum {
   // One tick at `now`, which grows from call to call: takes in the measurement and all commands, moves the commanded
   // state on, and says what the drives shall do until the next. What is commanded, checked and sent is the motion of
   // `now` and the robot's drive delay, for it acts by then; a measurement is held against what acts now. Measurements
-  // that are not finite or beyond what a sensor reads, of another length, from the future, not newer than the last, or
-  // that a powered axis cannot have come to since the last, count as none. One thread.
+  // that are not sensible, from the future, not newer than the last, or that do not follow from the last good one while
+  // there is power (body/plausible.hpp), count as none. One thread.
   //
   // Which commands do what, and what refuses them (refused = counted in State::dropped; all need the present epoch
   // unless stated; another kind is refused):
@@ -177,7 +177,7 @@ class Cerebellum {
 
   // Measurement: the newest good one, and what it says of this tick (carried on by its speed).
   bool seen_ = false;
-  Time measured_stamp_, fresh_at_;
+  Time measured_stamp_, heard_stamp_, fresh_at_;  // heard: believed or not
   AxisVector measured_position_, measured_speed_, position_now_, speed_now_;
   bool is_still_ = false, is_too_fast_ = false;
   Time still_since_;

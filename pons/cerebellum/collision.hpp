@@ -30,6 +30,7 @@ void contact_bound(const CollisionSettings& settings, const AxisVector& torque_l
 // where the arm cannot tell (near singular poses).
 [[nodiscard]] Vector6 tip_wrench(const model::Jacobian& tip_jacobian, const AxisVector& external_nm) PONS_NONBLOCKING;
 
+// Axes in rad, rad/s, N·m. The loop's thread.
 class CollisionWatch {
  public:
   CollisionWatch(model::RobotModel model, const CollisionSettings& settings);

@@ -16,6 +16,7 @@ struct ControlSettings {
   double bias_s = 0.5;   // time constant of the wrist sensor's bias
 };
 
+// Axes in rad, rad/s, rad/s², N·m. The loop's thread.
 class ControlLaws {
  public:
   // What it asks of the drives acts `delay` ticks later.

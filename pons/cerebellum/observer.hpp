@@ -11,7 +11,7 @@ namespace pons::cerebellum {
 // by the drives' torques, by its own rate, and by what pushes from outside. Between two measurements that balance gives
 // the mean external torque exactly; a first-order low-pass with pole `bandwidth_rad_s`, discretised exactly, smooths
 // it. Nothing is integrated over more than two intervals, so nothing drifts. No bias at rest; a constant push shows
-// with 63 % after one time constant.
+// with 63 % after one time constant. Axes in rad, rad/s, N·m. The loop's thread.
 class MomentumObserver {
  public:
   MomentumObserver(int axes, double bandwidth_rad_s);

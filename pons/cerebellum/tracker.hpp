@@ -23,7 +23,7 @@ struct Gains {
 // Torques that act `delay` ticks after they were sent are computed for then: q_d, v_d, a_d are what is commanded for
 // that moment, and e what the error will be by then. Computed torque leaves of the arm ë = -(correction - ∫), so what
 // was corrected already and is still on its way is taken off the measured error (Smith 1957; Manitius and Olbrot 1979):
-// the loop keeps the poles that it has without a delay.
+// the loop keeps the poles that it has without a delay. Axes in rad, rad/s, rad/s², N·m. The loop's thread.
 class Tracker {
  public:
   Tracker(model::RobotModel model, const Gains& gains, std::size_t delay);

@@ -18,7 +18,7 @@ namespace pons::cerebellum {
 
 // What the tip feels by the wrist's sensor: less the weight and inertia of tool and payload in the motion that is
 // commanded, and less the sensor's bias, which is what remains on average while nothing is touched. The arm need not
-// rest for that.
+// rest for that. The loop's thread.
 class WristSense {
  public:
   explicit WristSense(double bias_s) : bias_s_(bias_s) {}

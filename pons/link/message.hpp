@@ -122,7 +122,7 @@ struct State {
   StopResult stop_result = StopResult::kNone;
   Time motion_end;                        // when the queued motion ends; in the past when it is done
   AxisState commanded;                    // what the loop asks of the arm: for now, or a drive's delay later
-  AxisVector position, speed;             // measured
+  AxisVector position, speed;             // measured, rad and rad/s
   AxisVector torque_nm;                   // asked of the drives
   AxisVector external_nm;                 // on each axis from outside, as the momentum observer has it
   std::array<double, 6> tip_wrench{};     // what explains it: force (N), moment about the tip (N·m), world axes
@@ -130,7 +130,7 @@ struct State {
                                           // wrist's sensor, or, of an arm without one, by the observer
   std::array<double, 3> wrist_force_n{};  // flange frame, raw
   std::array<double, 3> wrist_torque_nm{};
-  std::array<double, 8> cup_vacuum_kpa{};
+  std::array<double, 8> cup_vacuum_kpa{};  // below the air's pressure
   std::uint32_t vacuum_on = 0;
   Vacuum vacuum;
   Controller controller = Controller::kTracking;

@@ -18,6 +18,7 @@ constexpr std::int64_t kRemember = 100;  // knots: how far back it can be asked
 constexpr int kMostKnots = 240;          // of one splice: the cerebellum's queue holds 256 segments
 constexpr int kRest = 3;                 // equal control points at which the spline rests
 constexpr double kSame = 1e-6;           // actions
+constexpr double kAhead = 0.05;          // actions: what is known of the motion's time may be a tick old
 // What is tried, in this order: paces from the fastest that the chunk itself allows, and for each the shortest way to
 // brake at its end and the shortest to blend into it (knots) that leaves the next blend room; else the one that leaves
 // most, where a longer one must save so much. At 50 chunks a second each bends what is still being blended.
@@ -309,7 +310,7 @@ Trajectory ChunkPath::take_over(std::int64_t free) {
 
 Expected<Trajectory> ChunkPath::splice(const Chunk& chunk, Time now, Time from, const AxisLimits& limits) {
   if (auto good = check_chunk(chunk, limits); !good) return std::unexpected(good.error());
-  if (chunk.observed > executed(now) + kSame)
+  if (chunk.observed > executed(now) + kAhead)
     return fail(fmt::format("{:.3f} actions were observed as executed, and {:.3f} are", chunk.observed, executed(now)),
                 "chunk_future", "count those that observe answers");
   free_ = (from - origin_ + kKnot - Duration(1)) / kKnot + 2;

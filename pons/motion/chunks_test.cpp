@@ -380,7 +380,7 @@ TEST_F(RefusedChunk, IsOfThePastWhenAllItsActionsAreExecuted) {
 
 TEST_F(RefusedChunk, IsOfTheFutureWhenMoreWasObservedThanIsExecuted) {
   Chunk chunk = good();
-  chunk.observed += 0.01;
+  chunk.observed += 0.1;
   EXPECT_EQ(error_of(chunk), "chunk_future");
 }
 

@@ -1,4 +1,5 @@
-// From where the arm is to where it shall be, jerk-limited and as fast as the limits allow.
+// From where the arm is to where it shall be, jerk-limited and as fast as the limits allow. Joint space: rad, rad/s and
+// so on. Pure functions, any thread; they allocate, and are not for a tick of the loop.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,7 @@ namespace pons::motion {
 
 using Trajectory = std::vector<Segment>;  // contiguous in time; position, speed, acceleration continuous
 
-// Where a motion ends, or passes: acceleration there is zero at the end, free at a via point.
+// Where a motion ends, or passes (rad, rad/s): acceleration there is zero at the end, free at a via point.
 struct Waypoint {
   AxisVector position;
   AxisVector speed;

@@ -1,5 +1,5 @@
 // A way round what is in the way: a path of straight lines in joint space, found by sampling. When, and how fast, is
-// another matter: motion.hpp.
+// another matter: motion.hpp. Joint angles in rad. Any thread, but one at a time for one PathFinder.
 #pragma once
 
 #include <cstdint>

@@ -102,6 +102,21 @@ TEST_F(Conformance, FindsABodyThatLetsGoWhenItTrips) {
   EXPECT_THAT(findings(body), testing::ElementsAre("the cups let go when its watchdog trips"));
 }
 
+TEST_F(Conformance, FindsABodyWhoseEncoderSlips) {
+  class : public Spoiled {
+   public:
+    using Spoiled::Spoiled;
+    void read(body::Sensors& sensors) PONS_NONBLOCKING override {
+      good_.read(sensors);
+      sensors.position[2] += ++reads_ % 50 == 0 ? 0.05 : 0;
+    }
+
+   private:
+    int reads_ = 0;
+  } body(simulation_->body());
+  EXPECT_THAT(findings(body), testing::Contains("it is not where its speed has taken it"));
+}
+
 TEST_F(Conformance, FindsAnImpatientWatchdogAndMeasurementsThatAreNone) {
   class : public Spoiled {
    public:
@@ -114,7 +129,8 @@ TEST_F(Conformance, FindsAnImpatientWatchdogAndMeasurementsThatAreNone) {
     }
   } body(simulation_->body());
   EXPECT_THAT(findings(body), testing::IsSupersetOf({"a measurement is not newer than the one before",
-                                                     "a measurement is not finite", "its watchdog trips too early"}));
+                                                     "a measurement is not finite, or larger than any sensor's",
+                                                     "its watchdog trips too early"}));
 }
 
 }  // namespace

@@ -363,8 +363,8 @@ class Pick final : public task::Skill {
     rides_until_ = up->rides_until;
     cell_.held = Held{.code = code_, .load = load_of(target_, grasp_.orientation)};
     const Vector3& size = cell_.held->load.size_m;
-    const double expected_kg = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
-    cell_.arm.payload(expected_kg, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
+    expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
+    cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
     cell_.forget(target_.track);
     phase_ = Phase::kLift;
     return {};
@@ -380,7 +380,7 @@ class Pick final : public task::Skill {
     }
     if (height < kLifted_m) return {};
     scale_.add(cell_);
-    const std::optional<Weight> weighed = scale_.weigh(cell_);
+    const std::optional<Weight> weighed = scale_.weigh(cell_, expected_kg_);
     const bool at_rest = now >= lift_end_ + (weighed ? kWeighAtRest : kWeighAtMost);
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
@@ -467,6 +467,7 @@ class Pick final : public task::Skill {
   ObjectBelief target_;
   Vector3 lift_from_ = Vector3::Zero();
   double lift_travel_m_ = 0;  // of the belt then
+  double expected_kg_ = 0;    // of the load, by its size
   Scale scale_;
   SetDown set_down_;
   Delay delay_;

@@ -61,7 +61,7 @@ double Scale::mass_kg(std::size_t first, std::size_t last) const {
   return impulse(&Reading::force_n, first, last) / std::max(per_kg, 0.1 * kGravity_m_s2 * span_s);
 }
 
-std::optional<Weight> Scale::weigh(const Cell& cell) const {
+std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   const double tool_kg = cell.world.robot.tool.mass_kg;
   if (readings_.size() < 3) return std::nullopt;
   const std::size_t last = readings_.size() - 1;
@@ -70,7 +70,7 @@ std::optional<Weight> Scale::weigh(const Cell& cell) const {
     while (first > 0 && readings_[last].time_s - readings_[first].time_s < span_s) --first;
     return first;
   };
-  const double about_kg = std::max(0.0, mass_kg(since(kSlowest_s), last) - tool_kg);
+  const double about_kg = std::max(expected_kg, mass_kg(since(kSlowest_s), last) - tool_kg);
   const double swing_s = std::clamp(kSwing_s_per_root_kg * std::sqrt(about_kg), kQuickest_s, kSlowest_s);
   const std::size_t first = since(swing_s), middle = since(swing_s / 2);
   if (readings_[last].time_s - readings_[first].time_s < swing_s) return std::nullopt;

@@ -22,8 +22,8 @@ class Scale {
   // Call once a bridge tick while nothing supports the load.
   void add(Cell& cell);
   // Of the load over the latest readings; nothing until they span a swing and their halves agree: until then something
-  // may still bear a part of it.
-  [[nodiscard]] std::optional<Weight> weigh(const Cell& cell) const;
+  // may still bear a part of it. A swing is that of `expected_kg`, or of what is felt where that is more.
+  [[nodiscard]] std::optional<Weight> weigh(const Cell& cell, double expected_kg) const;
 
  private:
   struct Reading {
