@@ -186,6 +186,23 @@ TEST(MoveThrough, AViaOnTheWayCostsLittle) {
   EXPECT_LE(detour, 1.05 * direct);
 }
 
+// As a tool goes up and over: the vias near the ends. There the descent often ends in a longer motion than it began
+// with.
+TEST(MoveThrough, MoreEffortIsNeverLonger) {
+  Random random(11);
+  const AxisLimits limits = arm_limits();
+  for (int i = 0; i < 1000; ++i) {
+    const AxisState start = i % 2 == 0 ? at_rest(draw(random, 6, 2)) : moving(random, limits);
+    const Waypoint end{draw(random, 6, 2), draw(random, 6, i % 3 == 0 ? 0.5 : 0)};
+    const std::vector<AxisVector> vias{start.position + draw(random, 6, 0.3), end.position + draw(random, 6, 0.3)};
+    const auto rough = move_through(start, kAt, vias, end, limits, Effort::kRough);
+    const auto fine = move_through(start, kAt, vias, end, limits, Effort::kFine);
+    ASSERT_EQ(rough.has_value(), fine.has_value());
+    if (!rough) continue;
+    EXPECT_LE(fine->back().end(), rough->back().end()) << i;
+  }
+}
+
 TEST(MoveThrough, IsRepeatable) {
   Random random(5);
   const AxisLimits limits = arm_limits();
