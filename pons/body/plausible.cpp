@@ -1,7 +1,7 @@
 #include "pons/body/plausible.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace pons::body {
 namespace {
@@ -11,16 +11,22 @@ constexpr double kLargest = 1e6;
 constexpr double kFastest_rad_s = 300;  // a light wrist axis that is struck included
 constexpr double kEncoders_rad = 0.02;
 
-bool sensible(double value) { return std::abs(value) <= kLargest; }  // what is not a number is not
+// What is not a number is none of a sensor's.
+bool all_sensible(std::span<const double> values) PONS_NONBLOCKING {
+  for (const double value : values) {
+    if (!(std::abs(value) <= kLargest)) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
 bool is_sensible(const Sensors& sensors, Eigen::Index axes) PONS_NONBLOCKING {
-  const auto all = [](const auto& values) { return std::all_of(values.begin(), values.end(), sensible); };
-  return sensors.position.size() == axes && sensors.speed.size() == axes && all(sensors.position) &&
-         (sensors.speed.array().abs() <= kFastest_rad_s).all() && all(sensors.wrist_force_n) &&
-         all(sensors.wrist_torque_nm) && all(sensors.cup_vacuum_kpa) && std::isfinite(sensors.belt_travel_m) &&
-         sensible(sensors.belt_speed_m_s);
+  return sensors.position.size() == axes && sensors.speed.size() == axes &&
+         (sensors.position.array().abs() <= kLargest).all() && (sensors.speed.array().abs() <= kFastest_rad_s).all() &&
+         all_sensible(sensors.wrist_force_n) && all_sensible(sensors.wrist_torque_nm) &&
+         all_sensible(sensors.cup_vacuum_kpa) && std::isfinite(sensors.belt_travel_m) &&
+         std::abs(sensors.belt_speed_m_s) <= kLargest;
 }
 
 bool follows(const Measured& before, const Measured& after, Duration passed) PONS_NONBLOCKING {

@@ -15,7 +15,7 @@ namespace pons::model {
 namespace {
 
 using Method = RobotModel::InverseMethod;
-constexpr double kPi = std::numbers::pi, kHalfPi = kPi / 2;
+constexpr double kPi = std::numbers::pi;
 
 const world::TestFolder folder;
 
