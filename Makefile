@@ -12,7 +12,7 @@ TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan bench bench-peers clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan gates bench bench-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -88,6 +88,10 @@ bench-peers: ## build what the benchmarks compare against
 	mkdir -p build/release/bench/peers
 	g++ -std=c++17 -O3 -DNDEBUG -Wall -Wextra -Werror -isystem /usr/include/eigen3 bench/peers/kdl_inverse.cpp \
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
+
+gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
+	for program in control_step inverse_kinematics stop_latency wake_up; do build/release/bench/$$program --gate || exit 1; done
+	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \

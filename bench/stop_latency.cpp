@@ -2,7 +2,7 @@
 // thread, an arm that does as it is told, in full motion; requests at any phase of the period. And how the stopping
 // time compares with the shortest that the jerk limits allow.
 //
-// usage: stop_latency [--gate] [STOPS (200)]      --gate: exit 1 where a bar is missed
+// usage: stop_latency [--gate] [STOPS a round (100)] [ROUNDS (5)]      --gate: exit 1 where a bar is missed
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -56,28 +56,39 @@ double shortest_stop_s(const AxisState& state, const AxisLimits& limits) {
 
 // What the loop's thread found; read when it has ended.
 struct Found {
-  rt::Histogram latency;              // from the request to the end of the step that decelerates
-  std::vector<double> over_shortest;  // stopping time over the shortest there is
+  std::vector<rt::Histogram> latency;  // a round: from the request to the end of the step that decelerates
+  std::vector<double> over_shortest;   // stopping time over the shortest there is
 };
+
+// The arm here is where it was told to be, whatever its torques: to the observer that looks like a push.
+cerebellum::Settings without_collisions() {
+  cerebellum::Settings settings;
+  settings.collision.torque_share = 1e9;
+  return settings;
+}
 
 // The loop's thread: steps the cerebellum, lets the arm follow, and notes stops.
 class Loop {
  public:
   Loop(const world::World& world, link::Link& link)
-      : end_(link), cerebellum_(must(model::RobotModel::load(world.robot)), {}, Time{}), limits_(world.robot.limits) {
+      : end_(link),
+        cerebellum_(must(model::RobotModel::load(world.robot)), without_collisions(), Time{}),
+        limits_(world.robot.limits) {
     sensors_.position = world.robot.home;
     sensors_.speed = AxisVector::Zero(sensors_.position.size());
   }
 
   const rt::MonotonicClock clock;
   std::atomic<std::int64_t> raised_ns{0};
+  std::atomic<std::size_t> round{0};
   std::atomic<bool> running{true};
 
-  Found run() {
+  Found run(std::size_t rounds) {
     const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
     if (grant.degraded()) fmt::print("degraded: {}\n", fmt::join(grant.refused, "; "));
     rt::PeriodicLoop loop(clock, kPeriod, end_.emergency_word());
     Found found;
+    found.latency.resize(rounds);
     found.over_shortest.reserve(100'000);
     loop.run([&](Time now) {
       tick(now, found);
@@ -95,7 +106,7 @@ class Loop {
     const link::State& state = cerebellum_.state();
     const bool began = was == SafetyState::kOperational && state.safety == SafetyState::kEmergencyStopping;
     if (began && state.cause == link::StopCause::kEmergencyWord) {
-      found.latency.record(clock.now() - Time(Duration(raised_ns.load())));
+      found.latency[round.load()].record(clock.now() - Time(Duration(raised_ns.load())));
       shortest_s_ = shortest_stop_s(before, limits_);
       began_ = last_;
     }
@@ -161,37 +172,62 @@ class Bridge {
   bool there_ = false;
 };
 
+double median(std::vector<double> values) {
+  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+// Whether the bars are kept.
+bool report(const Found& found, int asked) {
+  std::vector<double> half, most, worst;
+  std::uint64_t count = 0;
+  for (const rt::Histogram& round : found.latency) {
+    half.push_back(1e6 * to_s(round.percentile(50)));
+    most.push_back(1e6 * to_s(round.percentile(99)));
+    worst.push_back(1e6 * to_s(round.max()));
+    count += round.count();
+    fmt::print("round: {} stops, {:.1f} µs (50 %), {:.1f} (99 %), {:.1f} (worst)\n", round.count(), half.back(),
+               most.back(), worst.back());
+  }
+  fmt::print(
+      "{} of {} stops in motion: request to decelerating set-points {:.1f} µs (50 %), {:.1f} (99 %), medians of "
+      "{} rounds; {:.1f} (worst)\n",
+      count, asked, median(half), median(most), found.latency.size(), *std::ranges::max_element(worst));
+  const double longest = found.over_shortest.empty() ? 0 : *std::ranges::max_element(found.over_shortest);
+  fmt::print("stopping time over the shortest within the jerk limits: {:.3f} at most, of {} stops\n", longest,
+             found.over_shortest.size());
+  const bool all = count >= static_cast<std::uint64_t>(asked) - 1;  // the first one is asked for at rest
+  const bool good = all && median(half) <= kBar50_us && median(most) <= kBar99_us && longest <= kBarTime;
+  fmt::print("bars {}\n", good ? "kept" : "MISSED");
+  return good;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   const bool gate = argc > 1 && std::strcmp(argv[1], "--gate") == 0;
-  const int stops = argc > (gate ? 2 : 1) ? std::atoi(argv[gate ? 2 : 1]) : 200;
-  if (stops < 1) {
-    fmt::print(stderr, "usage: stop_latency [--gate] [STOPS (200)]\n");
+  const int first = gate ? 2 : 1;
+  const int stops = argc > first ? std::atoi(argv[first]) : 100;
+  const int rounds = argc > first + 1 ? std::atoi(argv[first + 1]) : 5;
+  if (stops < 1 || rounds < 1) {
+    fmt::print(stderr, "usage: stop_latency [--gate] [STOPS a round (100)] [ROUNDS (5)]\n");
     return 2;
   }
   const world::World world = must(world::load(apps::worlds_folder(), "parcel_cell"));
   const auto link = std::make_unique<link::Link>();
   const auto loop = std::make_unique<Loop>(world, *link);
   Found found;
-  std::thread thread([&] { found = loop->run(); });
+  std::thread thread([&] { found = loop->run(static_cast<std::size_t>(rounds)); });
   const rt::Grant grant = rt::make_realtime({.priority = kBridgePriority});  // as in a run: heartbeats must not wait
   Bridge bridge(world, *link, *loop);
   std::mt19937 random(1);
   std::uniform_int_distribution<std::int64_t> after_ms(180, 450), phase_us(0, 1000);
-  for (int i = 0; i < stops; ++i)
-    bridge.stop_in_motion(std::chrono::milliseconds(after_ms(random)), std::chrono::microseconds(phase_us(random)));
+  for (int round = 0; round < rounds; ++round) {
+    loop->round.store(static_cast<std::size_t>(round));
+    for (int i = 0; i < stops; ++i)
+      bridge.stop_in_motion(std::chrono::milliseconds(after_ms(random)), std::chrono::microseconds(phase_us(random)));
+  }
   loop->running.store(false);
   thread.join();
-  const auto us = [&](double percent) { return 1e6 * to_s(found.latency.percentile(percent)); };
-  if (found.over_shortest.empty()) return 1;  // a machine so busy that every request came after the motion
-  const double longest = *std::ranges::max_element(found.over_shortest);
-  fmt::print("{} stops in motion: request to decelerating set-points {:.1f} µs (50 %), {:.1f} (99 %), {:.1f} (worst)\n",
-             found.latency.count(), us(50), us(99), 1e6 * to_s(found.latency.max()));
-  fmt::print("stopping time over the shortest within the jerk limits: {:.3f} at most, of {} stops\n", longest,
-             found.over_shortest.size());
-  const bool good = found.latency.count() == static_cast<std::uint64_t>(stops) && us(50) <= kBar50_us &&
-                    us(99) <= kBar99_us && longest <= kBarTime;
-  fmt::print("bars {}\n", good ? "kept" : "MISSED");
-  return gate && !good ? 1 : 0;
+  return report(found, stops * rounds) || !gate ? 0 : 1;
 }
