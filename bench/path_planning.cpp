@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <numbers>
 #include <vector>
 
@@ -126,7 +127,7 @@ int run(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   Options options;
   CLI::App app{"Paths round obstacles in a cluttered cell"};
   app.add_option("--world", options.world);
@@ -137,4 +138,7 @@ int main(int argc, char** argv) {
   app.add_option("--least", options.least_percent, "Fails where fewer are solved, %")->check(CLI::Range(0.0, 100.0));
   CLI11_PARSE(app, argc, argv);
   return run(options);
+} catch (const std::exception& error) {
+  fmt::print(stderr, "path_planning: {}\n", error.what());
+  return 2;
 }
