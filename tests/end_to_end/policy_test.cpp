@@ -157,7 +157,7 @@ TEST(Policy, StarvesWhereItIsTooLateAndGoesOnWhenMoreComes) {
 Chunk chunk_of(const PolicyRun& run, double observed, std::size_t count, double by) {
   Chunk chunk{.observed = observed, .period = std::chrono::milliseconds(50)};
   for (std::size_t j = 1; j <= count; ++j)
-    chunk.actions.push_back(run.world.robot.home.array() + by * static_cast<double>(j) / static_cast<double>(count));
+    chunk.actions.emplace_back(run.world.robot.home.array() + by * static_cast<double>(j) / static_cast<double>(count));
   return chunk;
 }
 
