@@ -21,7 +21,7 @@ Expected<std::uint64_t> cell_of(const world::World& world) {
        {world.folder / "world.yaml", world.scene_mjcf, world.robot.urdf, world.robot.tool.mjcf}) {
     std::ifstream file(path, std::ios::binary);
     const std::string text((std::istreambuf_iterator<char>(file)), {});
-    if (!file || file.bad()) return fail("cannot be read", path.string(), "it was there when the world was loaded");
+    if (!file) return fail("cannot be read", path.string(), "it was there when the world was loaded");
     digest.add(text);
     digest.add(text.size());
   }

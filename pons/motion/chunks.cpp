@@ -17,7 +17,6 @@ constexpr std::int64_t kFixed = 3;  // control points before the first free one 
 constexpr std::int64_t kRemember = 100;  // knots: how far back it can be asked
 constexpr int kMostKnots = 240;          // of one splice: the cerebellum's queue holds 256 segments
 constexpr int kRest = 3;                 // equal control points at which the spline rests
-constexpr double kSame = 1e-6;           // actions
 constexpr double kAhead = 0.05;          // actions: what is known of the motion's time may be a tick old
 // What is tried, in this order: paces from the fastest that the chunk itself allows, and for each the shortest way to
 // brake at its end and the shortest to blend into it (knots) that leaves the next blend room; else the one that leaves
@@ -233,7 +232,7 @@ void ChunkPath::draw(const Chunk& chunk, const Candidate& candidate) {
       progress += step;
     }
     // Where the new motion is slower than the old one was, the old one is slowed with it.
-    old += old_step > kSame && braking == 0 ? std::min(1.0, (progress - before) / old_step) : 1.0;
+    old += old_step > kSameProgress && braking == 0 ? std::min(1.0, (progress - before) / old_step) : 1.0;
     const Knot from = between(old);
     const bool brakes = braking > 0 && !chunk.last, recovers = from.want == Want::kActions && step < kPace * pace;
     const Want want = brakes || recovers ? Want::kActions : Want::kNone;
@@ -314,7 +313,7 @@ Expected<Trajectory> ChunkPath::splice(const Chunk& chunk, Time now, Time from, 
     return fail(fmt::format("{:.3f} actions were observed as executed, and {:.3f} are", chunk.observed, executed(now)),
                 "chunk_future", "count those that observe answers");
   free_ = (from - origin_ + kKnot - Duration(1)) / kKnot + 2;
-  if (Course(chunk).end() <= at(free_ - 1).progress + kSame)
+  if (Course(chunk).end() <= at(free_ - 1).progress + kSameProgress)
     return fail(fmt::format("it leads up to {:.1f} actions, and {:.1f} are executed by the splice", Course(chunk).end(),
                             at(free_ - 1).progress),
                 "chunk_past", "send more actions, or sooner");

@@ -18,6 +18,7 @@
 namespace pons::motion {
 
 inline constexpr Duration kKnot = std::chrono::milliseconds(20);
+inline constexpr double kSameProgress = 1e-6;  // actions: as many have been executed
 inline constexpr Duration kShortestPeriod = std::chrono::milliseconds(20);
 inline constexpr Duration kLongestPeriod = std::chrono::milliseconds(200);
 inline constexpr Duration kLongestChunk = std::chrono::seconds(4);  // at the policy's pace

@@ -18,7 +18,6 @@ using task::Status;
 
 constexpr Duration kTick = std::chrono::milliseconds(1);  // of the loop: what starvation is counted in
 constexpr Duration kSilence = std::chrono::seconds(10);   // then the policy is taken for dead
-constexpr double kSame = 1e-6;                            // actions
 constexpr Duration kLongestStream = std::chrono::seconds(600);
 
 class FollowPolicy final : public task::Skill, public task::ChunkStream {
@@ -153,17 +152,17 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
 
   // What is played slowly may be longer than what can be queued.
   [[nodiscard]] Progress whole() const {
-    if (path_->executed(path_->end()) >= *last_ - kSame) return succeeded();
+    if (path_->executed(path_->end()) >= *last_ - motion::kSameProgress) return succeeded();
     return {Status::kFailed, "the limits make the last chunk too slow to be queued whole", detail()};
   }
   [[nodiscard]] Progress succeeded() const { return {Status::kSucceeded, {}, detail()}; }
   [[nodiscard]] task::Json detail() const {
-    task::Json told{
-        {"policy", arguments_.at("policy")},
-        {"chunks", chunks_},
-        {"refused", refused_},
-        {"executed", static_cast<std::int64_t>(std::floor((path_ ? path_->executed(counted_) : oldest_) + kSame))},
-        {"starved_ticks", starved_}};
+    task::Json told{{"policy", arguments_.at("policy")},
+                    {"chunks", chunks_},
+                    {"refused", refused_},
+                    {"executed", static_cast<std::int64_t>(std::floor((path_ ? path_->executed(counted_) : oldest_) +
+                                                                      motion::kSameProgress))},
+                    {"starved_ticks", starved_}};
     if (refused_ > 0) told["last_refusal"] = last_refusal_;
     return told;
   }
