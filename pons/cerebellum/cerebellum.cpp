@@ -33,19 +33,19 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
     : settings_(settings),
       delay_ticks_(delay_ticks(model.robot().drive_delay_s, settings.period)),
       delay_(static_cast<std::int64_t>(delay_ticks_) * settings.period),
-      tracker_(std::move(model), settings.gains, delay_ticks_),
-      limits_(tracker_.robot_model().robot().limits),
+      model_(std::move(model)),
+      limits_(model_.robot().limits),
       limit_watch_(limits_),
-      collision_(tracker_.robot_model().copy(), settings.collision),
-      laws_(tracker_, with_delay(settings.control, to_s(delay_)), delay_ticks_),
+      collision_(model_.copy(), settings.collision),
+      laws_(model_, settings.gains, with_delay(settings.control, to_s(delay_)), delay_ticks_),
       wrist_(settings.control.bias_s),
-      vacuum_settings_(VacuumSettings::of(tracker_.robot_model().robot().tool)),
+      vacuum_settings_(VacuumSettings::of(model_.robot().tool)),
       motion_time_(settings.rate),
       stepped_(start),
       fresh_at_(start),
-      driven_(delay_ticks_, {.torque_nm = AxisVector::Zero(tracker_.robot_model().axes())}),
+      driven_(delay_ticks_, {.torque_nm = AxisVector::Zero(model_.axes())}),
       heard_at_(start) {
-  const AxisVector zero = AxisVector::Zero(tracker_.robot_model().axes());
+  const AxisVector zero = AxisVector::Zero(model_.axes());
   commanded_ = before_ = at_rest(zero);
   driven_nm_ = zero;
   measured_position_ = measured_speed_ = position_now_ = speed_now_ = zero;
@@ -55,7 +55,7 @@ Cerebellum::Cerebellum(model::RobotModel model, const Settings& settings, Time s
   queue_.rest(zero, start);
 }
 
-const AxisLimits& Cerebellum::robot_limits() const { return tracker_.robot_model().robot().limits; }
+const AxisLimits& Cerebellum::robot_limits() const { return model_.robot().limits; }
 
 void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
                       body::SetPoints& set_points) PONS_NONBLOCKING {
@@ -150,8 +150,8 @@ bool Cerebellum::leaps(const body::Sensors& sensors) const {
 void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {
   model::RobotModel& model = collision_.robot_model();
   if (model.robot().wrist_sensor)
-    wrist_.feel(model, {measured_position_, measured_speed_, laws_.acting().acceleration}, tracker_.payload(), sensors,
-                bias, dt_s_);
+    wrist_.feel(model, {measured_position_, measured_speed_, laws_.acting().acceleration}, payload_, sensors, bias,
+                dt_s_);
   else
     wrist_.infer(collision_.wrench(), model.world_from_tip(measured_position_).linear(), bias, dt_s_);
 }
@@ -312,7 +312,7 @@ void Cerebellum::follow(Time now) {
 
 void Cerebellum::hold_measured(Time now) {
   gives_way_ = false;
-  tracker_.reset();
+  laws_.forget();
   laws_.reset();
   commanded_ = before_ = at_rest(measured_position_);
   laws_.rest(commanded_);
@@ -355,7 +355,7 @@ void Cerebellum::judge_stop(Time now) {
   if (state_.cause == StopCause::kFollowingError) {
     // Something holds the arm off: holding the commanded place would go on pressing.
     commanded_ = at_rest(measured_position_);
-    tracker_.reset();
+    laws_.forget();
     laws_.reset();
     laws_.rest(commanded_);
   }
@@ -372,14 +372,13 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
     return;
   }
   AxisVector& torque = set_points.torque_nm;
-  const ControlLaws::Now does{.commanded = commanded_,
-                              .position = position_now_,
-                              .speed = speed_now_,
+  const ControlLaws::Now does{.arm = {.position = position_now_, .speed = speed_now_, .payload = payload_},
+                              .commanded = commanded_,
                               .felt = wrist_.at_tip(),
                               .dt_s = dt_s_,
                               .presses = state_.safety == SafetyState::kOperational};
   if (is_silent(now))
-    laws_.blind(commanded_, torque);
+    laws_.blind(does, torque);
   else if (gives_way_)
     laws_.yield(does, torque);
   else

@@ -17,7 +17,6 @@
 #include "pons/cerebellum/motion_queue.hpp"
 #include "pons/cerebellum/motion_time.hpp"
 #include "pons/cerebellum/safety_machine.hpp"
-#include "pons/cerebellum/tracker.hpp"
 #include "pons/cerebellum/vacuum.hpp"
 #include "pons/cerebellum/wrist.hpp"
 #include "pons/core/error.hpp"
@@ -155,8 +154,9 @@ class Cerebellum {
   const Settings settings_;
   const std::size_t delay_ticks_;
   const Duration delay_;  // of the drives
-  Tracker tracker_;
-  AxisLimits limits_;  // in force: the robot's, or what recovery makes of them
+  model::RobotModel model_;
+  model::Payload payload_;  // told
+  AxisLimits limits_;       // in force: the robot's, or what recovery makes of them
   LimitWatch limit_watch_;
   CollisionWatch collision_;
   ControlLaws laws_;

@@ -84,7 +84,7 @@ bool Cerebellum::take_motion(const link::Command& command, Time now) {
 }
 
 bool Cerebellum::take_vacuum(const link::Command& command, Time now) {
-  const std::size_t cups = tracker_.robot_model().robot().tool.cups_m.size();
+  const std::size_t cups = model_.robot().tool.cups_m.size();
   if (cups < kMaxCups && (command.vacuum_on >> cups) != 0) {
     if (stop(StopCause::kBadCommand, now))
       log_.write(now, "command {}: cups {:#x} where there are {}", command.sequence, command.vacuum_on, cups);
@@ -103,8 +103,8 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
                  command.payload_kg);
     return false;
   }
-  tracker_.carry({command.payload_kg, com});
-  collision_.carry({command.payload_kg, com});
+  payload_ = {command.payload_kg, com};
+  collision_.carry(payload_);
   return true;
 }
 
@@ -176,7 +176,7 @@ bool Cerebellum::recover(Time now) {
 bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) {
   const bool had_power = powered_;
   if (!enter(event)) return false;
-  if (!had_power) tracker_.reset();
+  if (!had_power) laws_.forget();
   collision_.reset();
   collision_.expect(0);
   laws_.reset();

@@ -71,8 +71,8 @@ ComplianceLimits with_delay(ComplianceLimits limits, double delay_s) {
 }
 
 void impedance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
-               const AxisState& commanded, const AxisVector& position, const AxisVector& speed,
-               const model::Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING {
+               const ArmNow& arm, const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING {
+  const auto& [position, speed, payload] = arm;
   const Pose wanted = model.world_from_tip(commanded.position);
   const model::Jacobian wanted_jacobian = in_tip_axes(model.tip_jacobian(commanded.position), wanted.linear());
   const Pose tip = model.world_from_tip(position);

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string_view>
 
+#include "pons/cerebellum/arm_now.hpp"
 #include "pons/core/axes.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/link/message.hpp"
@@ -34,8 +35,7 @@ struct ComplianceLimits {
 // f/K exactly, whatever the arm's inertia. Of seven axes, the one motion that leaves the tip where it is follows the
 // commanded posture, decoupled by inertia (Khatib 1987). Weight, tool and payload are compensated.
 void impedance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
-               const AxisState& commanded, const AxisVector& position, const AxisVector& speed,
-               const model::Payload& payload, AxisVector& torque_nm) PONS_NONBLOCKING;
+               const ArmNow& arm, const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING;
 
 // What admittance remembers: how far the tip has given way.
 struct Admittance {

@@ -77,8 +77,8 @@ Vector6 along(int axis, double value) {
   return wrench;
 }
 
-// How far the tip gives way along its axis to a steady force, which must be one that the tracker's bounded integral can
-// hold on the light axes of the wrist: about 12 N across the tool here.
+// How far the tip gives way along its axis to a steady force, which must be one that the bounded integral of computed
+// torque can hold on the light axes of the wrist: about 12 N across the tool here.
 double yields(Controller controller, double stiffness, int axis, double force) {
   Bench bench({.step = 1ms});
   bench.arm();
@@ -144,10 +144,11 @@ TEST(Compliance, TheSeventhAxisFollowsItsPostureWithoutMovingTheTip) {
   }
   const double aside = (position - robot.home).norm();
   ASSERT_GT(aside, 0.2);
+  const model::Payload empty;
   double off_m = 0;
   const double began_m = (model.world_from_tip(position).translation() - wanted.translation()).norm();
   for (int tick = 0; tick < 1500; ++tick) {
-    impedance(model, springs(1000, 60), {}, {robot.home, zero, zero}, position, speed, {}, torque);
+    impedance(model, springs(1000, 60), {}, {position, speed, empty}, {robot.home, zero, zero}, torque);
     model.forward_dynamics(position, speed, torque, {}, acceleration);
     speed += 1e-3 * acceleration;
     position += 1e-3 * speed;

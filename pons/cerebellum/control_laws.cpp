@@ -6,19 +6,22 @@ namespace pons::cerebellum {
 
 using link::Controller;
 
-ControlLaws::ControlLaws(Tracker& tracker, const ControlSettings& settings, std::size_t delay)
-    : tracker_(tracker),
+ControlLaws::ControlLaws(model::RobotModel& model, const Gains& gains, const ControlSettings& settings,
+                         std::size_t delay)
+    : model_(model),
+      gains_(gains),
       settings_(settings),
-      asked_(delay, at_rest(AxisVector::Zero(tracker.robot_model().axes()))),
-      fading_nm_(AxisVector::Zero(tracker.robot_model().axes())) {
+      corrections_(model.axes(), delay),
+      asked_(delay, at_rest(AxisVector::Zero(model.axes()))),
+      fading_nm_(AxisVector::Zero(model.axes())) {
   admittance_.axis_way = fading_nm_;
 }
 
 void ControlLaws::select(Controller controller, const link::Compliance& compliance) PONS_NONBLOCKING {
   compliance_ = compliance;
   changed_ = true;
-  if (controller == controller_) return;  // a spring, damper or wrench may change while the arm gives way
-  if (controller_ == Controller::kImpedance) tracker_.reset();  // it has not tracked since
+  if (controller == controller_) return;                // a spring, damper or wrench may change while the arm gives way
+  if (controller_ == Controller::kImpedance) forget();  // it has not tracked since
   controller_ = controller;
   admittance_.way.setZero();
   admittance_.speed.setZero();
@@ -49,18 +52,17 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
   switch (controller_) {
     case Controller::kTracking:
       asked_.push(now.commanded);
-      tracker_.track(now.commanded, acting(), now.position, now.speed, now.dt_s, torque_nm);
+      computed_torque(model_, gains_, now.arm, now.commanded, acting(), now.dt_s, corrections_, torque_nm);
       break;
     case Controller::kImpedance:
       asked_.push(now.commanded);
-      impedance(tracker_.robot_model(), compliance, settings_.compliance, acting(), now.position, now.speed,
-                tracker_.payload(), torque_nm);
+      impedance(model_, compliance, settings_.compliance, now.arm, acting(), torque_nm);
       break;
     case Controller::kAdmittance:
-      admittance(tracker_.robot_model(), compliance, settings_.compliance, now.commanded,
+      admittance(model_, compliance, settings_.compliance, now.commanded,
                  now.presses ? now.felt : Vector6(Vector6::Zero()), now.dt_s, admittance_, reference_);
       asked_.push(reference_);
-      tracker_.track(reference_, acting(), now.position, now.speed, now.dt_s, torque_nm);
+      computed_torque(model_, gains_, now.arm, reference_, acting(), now.dt_s, corrections_, torque_nm);
       break;
   }
   if (changed_) fading_nm_ = last_nm - torque_nm;
@@ -69,14 +71,14 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
   fading_nm_ *= std::exp(-now.dt_s / settings_.fade_s);
 }
 
-void ControlLaws::blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING {
-  asked_.push(commanded);
-  tracker_.track_blind(commanded, torque_nm);
+void ControlLaws::blind(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING {
+  asked_.push(now.commanded);
+  feed_forward(model_, now.commanded, now.arm.payload, corrections_, torque_nm);
 }
 
 void ControlLaws::yield(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING {
   asked_.push(now.commanded);
-  tracker_.yield(now.position, now.speed, torque_nm);
+  give_way(model_, gains_, now.arm, corrections_, torque_nm);
 }
 
 }  // namespace pons::cerebellum

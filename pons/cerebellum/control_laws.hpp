@@ -1,9 +1,10 @@
-// By which law the arm follows its commanded motion, and the change from one to another without a jump in torque.
+// By which law the arm follows its commanded motion, what the laws remember, and the change from one to another without
+// a jump in torque.
 #pragma once
 
 #include "pons/cerebellum/compliance.hpp"
+#include "pons/cerebellum/computed_torque.hpp"
 #include "pons/cerebellum/delay_line.hpp"
-#include "pons/cerebellum/tracker.hpp"
 #include "pons/core/axes.hpp"
 #include "pons/core/realtime.hpp"
 #include "pons/link/message.hpp"
@@ -19,13 +20,15 @@ struct ControlSettings {
 // Axes in rad, rad/s, rad/s², N·m. The loop's thread.
 class ControlLaws {
  public:
-  // What it asks of the drives acts `delay` ticks later.
-  ControlLaws(Tracker& tracker, const ControlSettings& settings, std::size_t delay);
+  // What it asks of the drives acts `delay` ticks later. The model must outlive it.
+  ControlLaws(model::RobotModel& model, const Gains& gains, const ControlSettings& settings, std::size_t delay);
 
   // From the next torques() on. Changing the law keeps torques continuous. Parameters must have no fault().
   void select(link::Controller controller, const link::Compliance& compliance) PONS_NONBLOCKING;
-  // Tracking, with nothing remembered.
+  // Tracking, from the next torques() on.
   void reset() PONS_NONBLOCKING;
+  // What computed torque has corrected so far counts no longer: the arm is elsewhere, or had no power.
+  void forget() PONS_NONBLOCKING { corrections_.forget(); }
   [[nodiscard]] link::Controller controller() const { return controller_; }
   // Where the arm is held while it is commanded to be at `commanded`: where tracking goes on from when the law changes.
   [[nodiscard]] AxisVector held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING;
@@ -37,23 +40,25 @@ class ControlLaws {
 
   // What the arm does at this tick.
   struct Now {
-    const AxisState& commanded;          // for when these torques will act
-    const AxisVector &position, &speed;  // as measured, for this moment
-    const Vector6& felt;                 // WristSense::at_tip()
+    ArmNow arm;
+    const AxisState& commanded;  // for when these torques will act
+    const Vector6& felt;         // WristSense::at_tip()
     double dt_s;
     bool presses;  // false: the wrench that was asked for is not exerted, and felt ones move nothing: it is stopping
   };
   // Not clamped. `last_nm` are the torques of the tick before.
   void torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING;
   // Instead of torques(): without a measurement; and giving way to what pushes.
-  void blind(const AxisState& commanded, AxisVector& torque_nm) PONS_NONBLOCKING;
+  void blind(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING;
   void yield(const Now& now, AxisVector& torque_nm) PONS_NONBLOCKING;
 
  private:
-  Tracker& tracker_;
-  ControlSettings settings_;
+  model::RobotModel& model_;
+  const Gains gains_;
+  const ControlSettings settings_;
   link::Controller controller_ = link::Controller::kTracking;
   link::Compliance compliance_;
+  Corrections corrections_;
   Admittance admittance_;
   AxisState reference_;
   DelayLine<AxisState> asked_;

@@ -1,0 +1,39 @@
+#include "pons/cerebellum/computed_torque.hpp"
+
+namespace pons::cerebellum {
+
+void computed_torque(model::RobotModel& model, const Gains& gains, const ArmNow& arm, const AxisState& commanded,
+                     const AxisState& acting, double dt_s, Corrections& corrections,
+                     AxisVector& torque_nm) PONS_NONBLOCKING {
+  const double most = gains.integral_max_rad_s2;
+  AxisVector error = acting.position - arm.position;
+  AxisVector rate = acting.speed - arm.speed;
+  AxisVector& integral = corrections.integral;
+  integral += gains.integral_1_s3 * dt_s * error;
+  integral = integral.cwiseMax(-most).cwiseMin(most);
+  for (std::size_t ago = corrections.sent.ticks(); ago > 0; --ago) {
+    const AxisVector gain = integral - corrections.sent.before(ago - 1);
+    error += dt_s * (rate + 0.5 * dt_s * gain);
+    rate += dt_s * gain;
+  }
+  const AxisVector wanted = commanded.acceleration + gains.position_1_s2 * error + gains.speed_1_s * rate + integral;
+  corrections.sent.push(wanted - commanded.acceleration);
+  model.inverse_dynamics(commanded.position, commanded.speed, wanted, arm.payload, torque_nm);
+}
+
+void feed_forward(model::RobotModel& model, const AxisState& commanded, const model::Payload& payload,
+                  Corrections& corrections, AxisVector& torque_nm) PONS_NONBLOCKING {
+  const AxisVector wanted = commanded.acceleration + corrections.integral;
+  corrections.sent.push(corrections.integral);
+  model.inverse_dynamics(commanded.position, commanded.speed, wanted, payload, torque_nm);
+}
+
+void give_way(model::RobotModel& model, const Gains& gains, const ArmNow& arm, Corrections& corrections,
+              AxisVector& torque_nm) PONS_NONBLOCKING {
+  const AxisVector& most = model.robot().limits.acceleration_rad_s2;
+  const AxisVector wanted = (-gains.brake_1_s * arm.speed).cwiseMin(most).cwiseMax(-most);
+  corrections.sent.push(corrections.integral);
+  model.inverse_dynamics(arm.position, arm.speed, wanted, arm.payload, torque_nm);
+}
+
+}  // namespace pons::cerebellum
