@@ -1,5 +1,7 @@
 #include "pons/skills/cell.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -21,7 +23,10 @@ constexpr double kLoadedSpeedShare = 0.92;
 // thrice, what it would take were it rigid.
 constexpr double kGripShare = 0.40;
 constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
+// Of the acceleration limits. So slowly hardly anything swings, and weight alone, or a motion that is under way, may
+// use up more.
 constexpr double kSlowestShare = 0.10;
+constexpr double kSlowGripShare = 0.70;
 // Of one correction: a few are fine, but what no speed helps must come to an end.
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr int kFineCorrections = 5;
@@ -39,6 +44,14 @@ double view_end_m(const world::World& world) {
     if (const auto seen = world::seen_of_belt(camera, world.belt)) end_m = std::max(end_m, seen->to_m);
   }
   return end_m;
+}
+
+std::unexpected<Error> too_heavy(double mass_kg, double cups, double motors) {
+  return fail(
+      fmt::format("{:.2f} kg are too heavy: as slowly as can be they ask for {:.0f} % of what the cups hold (at "
+                  "most {:.0f} %) and {:.0f} % of what the motors give (at most {:.0f} %)",
+                  mass_kg, 100 * cups, 100 * kGripShare, 100 * motors, 100 * kTorqueShare),
+      "carry", "lower rules.max_mass_kg, or take a stronger tool or arm");
 }
 
 }  // namespace
@@ -186,9 +199,14 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     auto way = router.route(state, from, end, &held->load, objects_, limits, &search.known);
     if (!way) return way;
     const double mass_kg = held->mass_kg + kUnsure_kg;
-    const double grip = grip_use(model, world.robot.tool, held->load, mass_kg, *way) / kGripShare;
-    const double use = std::max(grip, torque_use(model, world.robot, held->load, mass_kg, *way) / kTorqueShare);
-    if (use <= 1 || search.share <= kSlowestShare) return way;
+    const double cups = grip_use(model, world.robot.tool, held->load, mass_kg, *way);
+    const double motors = torque_use(model, world.robot, held->load, mass_kg, *way);
+    const double use = std::max(cups / kGripShare, motors / kTorqueShare);
+    if (use <= 1) return way;
+    if (search.share <= kSlowestShare) {
+      if (cups <= kSlowGripShare && motors <= 1) return way;
+      return too_heavy(held->mass_kg, cups, motors);
+    }
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;
     search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, timid));
   }

@@ -78,8 +78,9 @@ class Cell {
   // Where a carry shall end, joints, given those it starts from.
   using Goal = std::function<Expected<AxisVector>(const AxisVector& from)>;
   // The fastest way for what is held, from the present motion to standstill at `goal`, that leaves the cups and the
-  // motors a reserve; where no speed does, the slowest. Something must be held. Errors: those of the goal and of the
-  // router; while that is spent, whoever asks with the same `search` in the next tick goes on from there.
+  // motors a reserve; where no speed does, the slowest. Something must be held. Errors: too heavy, where even that
+  // would take it off the cups or ask the motors for more than they give; those of the goal and of the router; while
+  // that is spent, whoever asks with the same `search` in the next tick goes on from there.
   [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal, Search& search);
 
   // For an arm that waits: up, with what it holds, before anything that rides along the belt meets it. Does nothing

@@ -1,5 +1,6 @@
 #include "pons/skills/cell.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -127,6 +128,27 @@ TEST_F(CarryTest, AsksNoMoreOfTheMotorsThanTheyGive) {
   const motion::Trajectory light = carry(size_m, 0.1);
   EXPECT_GT(torque(light), give) << "the light one's haste would be too much for them";
   EXPECT_LE(torque(carry(size_m, mass_kg)), give);
+}
+
+// As slowly as can be it would still come off the cups, or stall the arm far out: not even tried.
+TEST_F(CarryTest, WhatNoSpeedCanCarryIsRefused) {
+  const auto refused = [this](const Vector3& size_m, double mass_kg) {
+    cell_.held = Held{"P000001", {.size_m = size_m}, mass_kg};
+    Cell::Search search;
+    Expected<motion::Trajectory> way;
+    do {  // a tick each
+      cell_.refresh(now_, {});
+      way = cell_.carry(now_, [this](const AxisVector& from) { return goal(from); }, search);
+    } while (!way && cell_.router.spent());
+    EXPECT_EQ(search.share, 1) << "the next carry begins anew";
+    return way ? std::string("carried") : way.error().line();
+  };
+  EXPECT_TRUE(refused({0.2, 0.2, 0.2}, 10).starts_with("carry: 10.00 kg are too heavy"))
+      << refused({0.2, 0.2, 0.2}, 10);
+  goal_ = {-0.8, -0.46, 1.06};
+  const Vector3 flat(0.2, 0.2, 0.02);
+  EXPECT_EQ(refused(flat, 5), "carried");
+  EXPECT_TRUE(refused(flat, 9).starts_with("carry: 9.00 kg are too heavy")) << refused(flat, 9);  // for the motors
 }
 
 TEST_F(CarryTest, EndsAtRestAtTheGoalWithinTheLimits) {
