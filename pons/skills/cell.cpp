@@ -48,9 +48,9 @@ double view_end_m(const world::World& world) {
 
 std::unexpected<Error> too_heavy(double mass_kg, double cups, double motors) {
   return fail(
-      fmt::format("{:.2f} kg are too heavy: as slowly as can be they ask for {:.0f} % of what the cups hold (at "
-                  "most {:.0f} %) and {:.0f} % of what the motors give (at most {:.0f} %)",
-                  mass_kg, 100 * cups, 100 * kGripShare, 100 * motors, 100 * kTorqueShare),
+      fmt::format("{:.2f} kg are too heavy: as slowly as can be they ask for {:.0f} % of what the cups hold, of "
+                  "which {:.0f} % may be used, and {:.0f} % of what the motors give",
+                  mass_kg, 100 * cups, 100 * kSlowGripShare, 100 * motors),
       "carry", "lower rules.max_mass_kg, or take a stronger tool or arm");
 }
 
