@@ -345,7 +345,8 @@ void Cerebellum::judge_stop(Time now) {
   }
   if (!at_end || state_.stop_result == StopResult::kPending) return;
   const StopResult result = state_.stop_result;
-  log_.write(now, "standstill {} {:.0f} ms after the stop began", name(result), 1e3 * to_s(now - stop_began_));
+  log_.write(now, "standstill {} {:.0f} ms after the stop began, {:.0f} of them braking", name(result),
+             1e3 * to_s(now - stop_began_), 1e3 * to_s(stop_ends_ - stop_began_));
   if (!standing) {
     stop(StopCause::kNoStandstill, now);
     state_.stop_result = result;
