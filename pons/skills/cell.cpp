@@ -68,8 +68,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
-    held.reset();
-    arm.payload(0, Vector3::Zero());
+    holds_nothing();
   }
   const double passed_s = to_s(now - now_);
   const double speed = belt_speed_m_s();
@@ -88,6 +87,16 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   now_ = now;
   objects_ = std::move(objects);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
+}
+
+void Cell::weighs(double mass_kg) {
+  held->mass_kg = mass_kg;
+  arm.payload(mass_kg, world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * held->load.size_m.z()));
+}
+
+void Cell::holds_nothing() {
+  held.reset();
+  arm.payload(0, Vector3::Zero());
 }
 
 void Cell::left_on_belt(const Load& load, const Vector3& position) {

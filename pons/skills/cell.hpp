@@ -53,6 +53,12 @@ class Cell {
   // Whether a camera could see it on the belt there.
   [[nodiscard]] bool in_view(double x_m) const { return x_m < view_end_m_; }
 
+  // What is held weighs so much: the loop is told. It must know of every load before the arm moves with it, for it
+  // takes what it does not know for a collision, or throws the arm up.
+  void weighs(double mass_kg);
+  // Nothing is held any longer: likewise.
+  void holds_nothing();
+
   // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
   // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);

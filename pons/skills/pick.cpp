@@ -120,7 +120,7 @@ class Pick final : public task::Skill {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
       // A stop came before the scale had decided; the arm has stood since.
-      if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
+      if (cell_.held->mass_kg <= 0) cell_.weighs(std::max(kLightest_kg, weigh_now(cell_)));
       const double mass = cell_.held->mass_kg;
       const bool wanted = cell_.held->code == code_;
       if (wanted && mass <= cell_.world.rules.max_mass_kg) return success(now);
@@ -373,7 +373,7 @@ class Pick final : public task::Skill {
   Progress lift(Time now) {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
-      cell_.held.reset();
+      cell_.holds_nothing();
       cell_.arm.vacuum(false);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
@@ -390,9 +390,7 @@ class Pick final : public task::Skill {
     if (target_.crowded && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
-    cell_.held->mass_kg = std::max(0.0, mass);
-    const Pose& flange_from_tip = cell_.world.robot.tool.flange_from_tip;
-    cell_.arm.payload(cell_.held->mass_kg, flange_from_tip * Vector3(0, 0, 0.5 * cell_.held->load.size_m.z()));
+    cell_.weighs(std::max(0.0, mass));
     cell_.arm.expect_contact(0);
     if (mass > limit) {
       return begin_put_back(now, overweight(mass));

@@ -191,8 +191,7 @@ class Place final : public task::Skill {
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost) {
       const std::string code = cell_.held->code;
       cell_.arm.vacuum(false);
-      cell_.held.reset();
-      cell_.arm.payload(0, Vector3::Zero());
+      cell_.holds_nothing();
       const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
       const task::Json detail{{"place", name_}, {"object", code}, {"at_m", {tip.x(), tip.y(), tip.z()}}};
       // Over the middle of its mouth it only fell a little early.
@@ -239,8 +238,7 @@ class Place final : public task::Skill {
     const double felt_kg = weigh_now(cell_);
     if (felt_kg > std::max(kGoneLeast_kg, kGoneShare * cell_.held->mass_kg)) return late(now);
     const std::string code = cell_.held->code;
-    cell_.held.reset();
-    cell_.arm.payload(0, Vector3::Zero());
+    cell_.holds_nothing();
     cell_.arm.expect_contact(0);
     return {Status::kSucceeded, {}, {{"place", name_}, {"object", code}, {"seconds", to_s(now - started_)}}};
   }

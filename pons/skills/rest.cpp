@@ -32,7 +32,7 @@ void Rest::tick(Time now) {
   cell_.keep_clear(now);
   if (!cell_.held || now < since_ + kLeftAlone) return;
   since_ = now;
-  if (cell_.held->mass_kg <= 0) cell_.held->mass_kg = std::max(kLightest_kg, weigh_now(cell_));
+  if (cell_.held->mass_kg <= 0) cell_.weighs(std::max(kLightest_kg, weigh_now(cell_)));
   laying_ = set_down_.begin(now).has_value();
 }
 

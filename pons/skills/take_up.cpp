@@ -32,7 +32,7 @@ void TakeUp::restore(const Json& carried) {
   if (!carried.is_object()) return;
   carried_ = carried.value("code", std::string{});
   if (cell_.arm.cups().open) {
-    cell_.arm.payload(0, Vector3::Zero());
+    cell_.holds_nothing();
     return;
   }
   cell_.held = Held{.code = carried_,
