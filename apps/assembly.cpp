@@ -187,7 +187,7 @@ runner::SkillPort BridgeHalf::skill_port() {
           .carries = [this] { return take_up->carries(); },
           .restore = [this](const task::Json& carried) { take_up->restore(carried); },
           .resume = [this](const task::Task& task, std::size_t done) { return resumption(take_up->fate(task, done)); },
-          .settle = [this] { take_up->settle(); }};
+          .settle = [this](Time now) { return take_up->settle(now); }};
 }
 
 // ---- both ----

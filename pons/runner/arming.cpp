@@ -49,11 +49,8 @@ Expected<void> Arming::tick(Time now) {
   yielding_ = yielding_ && state.safety == SafetyState::kOperational;
   needs_person_ = needs_person_ || (is_stopped(state) && resumes(state) == cerebellum::Resumes::kPerson);
   const bool operational = state.safety == SafetyState::kOperational && !yielding_ && !needs_person_;
-  if (operational && took_over_) {
-    skills_.settle();
-    took_over_ = false;
-  }
-  bridge_.hold(operational ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
+  if (operational && took_over_) took_over_ = !skills_.settle(now);
+  bridge_.hold(operational && !took_over_ ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
   note_changes(state, now);
   if (operational) {
     stopped_since_.reset();

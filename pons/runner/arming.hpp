@@ -43,6 +43,8 @@ class Arming {
   // {"state", "cause", "standstill", "epoch", "needs"}: the last is what the arm waits for, empty when it works.
   [[nodiscard]] bridge::Json describe() const;
 
+  // The arm is still being brought out of where a bridge that is no more has left it; nothing else may move it.
+  [[nodiscard]] bool settles() const { return took_over_; }
   [[nodiscard]] std::int64_t stops() const { return stops_; }
 
  private:
@@ -64,7 +66,7 @@ class Arming {
   std::int64_t stops_ = 0;
   bool needs_person_ = false;  // to reset and to arm
   bool was_operational_ = false, recovering_ = false;
-  bool took_over_ = false;  // and the arm has not been armed since
+  bool took_over_ = false;  // and the arm has not settled since
   bool yielding_ = false;   // it still moves as it was told before
 };
 

@@ -59,7 +59,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
-  if (bridge_.running().empty()) skills_.rest(now);
+  if (bridge_.running().empty() && !arming_.settles()) skills_.rest(now);
   note_carried(now);
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;

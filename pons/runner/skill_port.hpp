@@ -27,10 +27,10 @@ struct SkillPort {
   std::function<void()> raise_emergency, release_emergency;    // the link's emergency word
   std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is
   // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
-  // begun; and, once the arm is armed, lets go of what nobody knows.
+  // begun; and, each tick once the arm is armed, brings it to where others may move it from: true when that is done.
   std::function<void(const bridge::Json&)> restore;
   bridge::Resume resume;
-  std::function<void()> settle;
+  std::function<bool(Time)> settle;
 };
 
 }  // namespace pons::runner

@@ -78,15 +78,24 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
     belt_acceleration_m_s2_ += share * (slope - belt_acceleration_m_s2_);
   }
   last_belt_speed_m_s_ = speed;
-  for (ObjectBelief& object : left_) {
+  const auto ride = [&](ObjectBelief& object) {
     object.world_from_top.translation().x() += speed * passed_s;
     object.velocity_m_s.x() = speed;
     object.stamp = now;
-  }
+  };
+  std::ranges::for_each(left_, ride);
+  if (hidden_) ride(*hidden_);
   std::erase_if(left_, [&](const ObjectBelief& o) { return o.world_from_top.translation().x() > world.belt.x_end_m; });
   now_ = now;
   objects_ = std::move(objects);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
+  if (!hidden_) return;
+  const Vector3 tip = model.world_from_tip(arm.state().position).translation();
+  const Vector3 off = (tip - hidden_->world_from_top.translation()).cwiseAbs();
+  if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * hidden_->size_m.y())
+    hidden_.reset();
+  else
+    objects_.push_back(*hidden_);
 }
 
 void Cell::weighs(double mass_kg) {
@@ -107,6 +116,16 @@ void Cell::left_on_belt(const Load& load, const Vector3& position) {
   object.size_m = load.size_m;
   left_.push_back(object);
   objects_.push_back(object);
+}
+
+void Cell::hides(double reach_m, double height_m) {
+  const double tip_x = model.world_from_tip(arm.state().position).translation().x();
+  hidden_ = ObjectBelief{};
+  hidden_->stamp = now_;
+  hidden_->world_from_top.translation() = Vector3(tip_x, world.belt.y_center_m, world.belt.surface_z_m + height_m);
+  hidden_->velocity_m_s.x() = belt_speed_m_s();
+  hidden_->size_m = {2 * reach_m, world.belt.width_m, height_m};
+  objects_.push_back(*hidden_);
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {

@@ -62,6 +62,11 @@ class Cell {
   // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
   // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);
+  // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
+  // counts as so high an obstacle, until the tip has left it.
+  void hides(double reach_m, double height_m);
+  // Nothing is hidden any longer.
+  void hides_nothing() { hidden_.reset(); }
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
@@ -114,6 +119,7 @@ class Cell {
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;
   std::vector<ObjectBelief> left_;  // unlabelled, as of now_
+  std::optional<ObjectBelief> hidden_;
   std::vector<std::uint32_t> forgotten_;
 };
 

@@ -2,12 +2,23 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+
+#include "pons/skills/grasp.hpp"
 
 namespace pons::skills {
 namespace {
 
 using task::Json;
+
+constexpr double kTall_m = 0.30;    // as what stands on the belt mostly is at most
+constexpr double kOver_m = 0.03;    // over that, the load
+constexpr double kBeyond_m = 0.01;  // so that a rise is enough
+constexpr double kHidden_m = 0.45;  // along the belt: how far arm and load hide what stands there
+constexpr double kRise_m_s2 = 3.0;
+constexpr int kRises = 3;  // after stops, too
+constexpr Duration kLook = std::chrono::milliseconds(700);
 
 Json of(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -62,8 +73,40 @@ bool TakeUp::is_over(const std::string& name) const {
   return off.x() < 0.5 * place->size_m.x() && off.y() < 0.5 * place->size_m.y();
 }
 
-void TakeUp::settle() {
+bool TakeUp::settle(Time now) {
   if (!cell_.held && cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
+  if (!armed_at_) armed_at_ = now;
+  if (now < cell_.arm.motion_end()) return false;
+  const double low_m = too_low_m();
+  if (low_m > 0 && rises_++ < kRises) {
+    // As far as the arm gets.
+    if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
+  }
+  if (now < *armed_at_ + kLook) return false;
+  cell_.arm.expect_contact(0);
+  if (!cell_.held) cell_.hides_nothing();
+  return true;
+}
+
+// By how much the load, or else the tip, stands below what may stand on the belt beside it.
+double TakeUp::too_low_m() const {
+  const world::Belt& belt = cell_.world.belt;
+  const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+  const bool over_belt =
+      std::abs(tip.y() - belt.y_center_m) < 0.5 * belt.width_m && tip.x() > belt.x_start_m && tip.x() < belt.x_end_m;
+  const double underside_m = tip.z() - (cell_.held ? cell_.held->load.size_m.z() : 0);
+  return over_belt ? belt.surface_z_m + kTall_m + kOver_m - underside_m : 0;
+}
+
+bool TakeUp::rise(Time now, double by_m) {
+  const Time from = cell_.arm.splice_time(now);
+  const AxisState state = cell_.arm.planned(from);
+  const Eigen::Matrix3d orientation = cell_.model.world_from_tip(state.position).linear();
+  const auto up = lift(cell_, state, from, orientation, {0, 0, by_m + kBeyond_m}, kRise_m_s2);
+  if (!up || !cell_.arm.stream(up->trajectory)) return false;
+  cell_.arm.expect_contact(kHandling_n);
+  cell_.hides(kHidden_m, kTall_m);
+  return true;
 }
 
 }  // namespace pons::skills

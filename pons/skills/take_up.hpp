@@ -2,6 +2,7 @@
 // that was begun can go on.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "pons/skills/cell.hpp"
@@ -30,14 +31,20 @@ class TakeUp {
   // Of a task whose first `done` steps have succeeded, after restore().
   [[nodiscard]] Fate fate(const task::Task& task, std::size_t done) const;
 
-  // The arm is armed again: lets go of what the cups hold and nobody knows.
-  void settle();
+  // Each tick once the arm is armed again, until it is true: only then may anything else move it. Lets go of what the
+  // cups hold and nobody knows. An arm that stands low over the belt goes straight up first, for this bridge has not
+  // seen yet what stands beside the load, and under the arm no camera does; and the cameras get a moment for the rest.
+  [[nodiscard]] bool settle(Time now);
 
  private:
   [[nodiscard]] bool is_over(const std::string& place) const;
+  [[nodiscard]] double too_low_m() const;
+  [[nodiscard]] bool rise(Time now, double by_m);
 
   Cell& cell_;
   std::string carried_;  // the code that was written down, whether still held or not
+  std::optional<Time> armed_at_;
+  int rises_ = 0;
 };
 
 }  // namespace pons::skills

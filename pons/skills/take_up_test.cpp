@@ -97,10 +97,88 @@ TEST_F(TakeUpTest, WhatNobodyKnowsIsLetGoOnceArmed) {
   link::Command command;
   while (loop.receive(command)) {
   }
-  take_up_.settle();
+  EXPECT_FALSE(take_up_.settle(now_));
   ASSERT_TRUE(loop.receive(command));
   EXPECT_EQ(command.kind, link::CommandKind::kVacuum);
   EXPECT_EQ(command.vacuum_on, 0U);
+}
+
+// The arm does at once what it is told, with the cups sealed, until it has settled; how high the tip was then.
+class SettleTest : public TakeUpTest {
+ protected:
+  void stands(const Vector3& tip) {
+    const auto at = cell_.model.inverse(Cell::tip_down(tip, 0), world_.robot.home);
+    ASSERT_TRUE(at) << at.error().line();
+    const AxisVector still = AxisVector::Zero(at->size());
+    publish({*at, still, still});
+    cell_.refresh(now_, {});
+  }
+  void publish(const AxisState& at) {
+    link::State state;
+    state.safety = link::SafetyState::kOperational;
+    state.epoch = 1;
+    state.stamp = now_;
+    state.commanded = at;
+    state.position = at.position, state.speed = at.speed;
+    state.vacuum_on = 15;
+    state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
+    state.cup_vacuum_kpa.fill(kSealed_kpa);
+    link::CerebellumEnd(*link_).publish(state);
+  }
+  bool tick() {
+    const bool settled = take_up_.settle(now_);
+    now_ += from_s(0.01);
+    publish(cell_.arm.planned(now_));
+    cell_.refresh(now_, {});
+    const Vector3 tip = tip_now();
+    aside_m_ = std::max(aside_m_, (tip - began_).head<2>().norm());
+    return settled;
+  }
+  Vector3 tip_now() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
+
+  Vector3 began_{0.1, 0.05, 1.02};
+  double aside_m_ = 0;
+};
+
+TEST_F(SettleTest, WhatHangsLowRisesStraightBeforeAnythingElseMovesTheArm) {
+  stands(began_);
+  cell_.held = held_;
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_GE(ticks, 69) << "the cameras need a moment";
+  EXPECT_LT(ticks, 300);
+  EXPECT_LT(aside_m_, 0.002);
+  EXPECT_GT(tip_now().z() - held_.load.size_m.z(), world_.belt.surface_z_m + 0.32);
+  // Nobody has seen yet what stood below: no way leads down into that.
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  const ObjectBelief& hidden = cell_.objects().front();
+  EXPECT_NEAR(hidden.world_from_top.translation().z(), world_.belt.surface_z_m + 0.30, 1e-9);
+  EXPECT_GT(hidden.size_m.x(), 0.8);
+  EXPECT_NEAR(hidden.world_from_top.translation().x(), began_.x(), 0.01);
+  // The tip has left it: the cameras see.
+  stands({0.1, world_.belt.y_center_m + 0.5 * world_.belt.width_m + 0.05, 1.3});
+  EXPECT_TRUE(cell_.objects().empty());
+}
+
+TEST_F(SettleTest, WhatStandsHighOnlyLooksAround) {
+  began_.z() = 1.5;
+  stands(began_);
+  cell_.held = held_;
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_NEAR(ticks, 70, 1);
+  EXPECT_LT((tip_now() - began_).norm(), 1e-6);
+  EXPECT_TRUE(cell_.objects().empty());
+}
+
+TEST_F(SettleTest, WithNothingHeldNothingIsHiddenAfterwards) {
+  stands(began_);
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_LT(aside_m_, 0.002);
+  EXPECT_GT(tip_now().z(), world_.belt.surface_z_m + 0.32);
+  cell_.refresh(now_, {});
+  EXPECT_TRUE(cell_.objects().empty());
 }
 
 }  // namespace
