@@ -74,15 +74,19 @@ bool TakeUp::is_over(const std::string& name) const {
 }
 
 bool TakeUp::settle(Time now) {
-  if (!cell_.held && cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
   if (!armed_at_) armed_at_ = now;
+  const bool looks = now < *armed_at_ + kLook;
+  if (!cell_.held) {
+    if (cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
+    if (!cell_.arm.cups().open && looks) return false;
+  }
   if (now < cell_.arm.motion_end()) return false;
   const double low_m = too_low_m();
   if (low_m > 0 && rises_++ < kRises) {
     // As far as the arm gets.
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
   }
-  if (now < *armed_at_ + kLook) return false;
+  if (looks) return false;
   cell_.arm.expect_contact(0);
   if (!cell_.held) cell_.hides_nothing();
   return true;
