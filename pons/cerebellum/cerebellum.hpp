@@ -51,7 +51,8 @@ struct Settings {
   Duration following_time = std::chrono::milliseconds(20);      // for so long
   double standstill_rad_s = 0.02;                               // every axis below it,
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
-  Duration confirm_within = std::chrono::milliseconds(1000);    // after the commanded stop ended
+  // After the commanded stop ended: what swings on the cups, or is dragged from under them, moves the arm for a second.
+  Duration confirm_within = std::chrono::milliseconds(2000);
   Duration stall_timeout = std::chrono::milliseconds(20);       // between two steps, while powered
   RateBounds rate;                                              // of a motion that is slowed for a zone
   Duration slow_within = std::chrono::milliseconds(500);        // from somebody's coming to the speed that is allowed

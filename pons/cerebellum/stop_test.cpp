@@ -286,12 +286,15 @@ TEST(BodySilence, MeasurementsThatRepeatOrAreNotFiniteAreNone) {
   EXPECT_EQ(bench.state().cause, StopCause::kBodySilent);
 }
 
+// In ticks: braking, and then whatever may be waited for standstill.
+constexpr int kLongestStop = 200 + static_cast<int>(Settings{}.confirm_within / 1ms);
+
 TEST(StopResultTest, IsUncertainWhenTheArmWillNotStandStill) {
   Bench bench;
   get_moving(bench);
   bench.link->raise_emergency_stop();
   // Somebody shakes it.
-  for (int i = 0; i < 1200; ++i) {
+  for (int i = 0; i < kLongestStop; ++i) {
     bench.plant.extra_torque_nm[5] = (i / 10) % 2 == 0 ? 25 : -25;
     bench.tick();
     if (bench.state().safety == SafetyState::kEmergencyStop) break;
@@ -307,7 +310,7 @@ TEST(StopResultTest, AProtectiveStopWithoutStandstillFallsBackToCategoryZero) {
   Bench bench;
   get_moving(bench);
   bench.send(plain_command(CommandKind::kProtectiveStop));
-  for (int i = 0; i < 1200 && bench.plant.set_points.power; ++i) {
+  for (int i = 0; i < kLongestStop && bench.plant.set_points.power; ++i) {
     bench.plant.extra_torque_nm[5] = (i / 10) % 2 == 0 ? 25 : -25;
     bench.tick();
   }
