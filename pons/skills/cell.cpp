@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "pons/skills/grasp.hpp"
 #include "pons/skills/grip.hpp"
 #include "pons/world/view.hpp"
 
@@ -33,6 +34,7 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
+constexpr double kAside_m = 0.30;  // over the belt
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
@@ -187,6 +189,19 @@ void Cell::keep_clear(Time now) {
     if (way) (void)arm.stream(*way);
     return;
   }
+}
+
+bool Cell::step_aside(Time now) {
+  const Time from = arm.splice_time(now);
+  const AxisState state = arm.planned(from);
+  const Pose tip = model.world_from_tip(state.position);
+  const Vector3 point(world.belt.pick_x_max_m, world.belt.y_center_m,
+                      std::max(tip.translation().z(), world.belt.surface_z_m + kAside_m));
+  const auto q = model.inverse(tip_down(point, yaw_of(tip.linear())), state.position);
+  if (!q) return false;
+  const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
+  const auto way = router.route(state, from, end, nullptr, objects_, limits_empty());
+  return way && arm.stream(*way);
 }
 
 AxisLimits Cell::limits_planned() const {

@@ -98,6 +98,9 @@ class Cell {
   // while it moves or where it is clear.
   void keep_clear(Time now);
 
+  // With the cups empty: out of the cameras' view, downstream. False: no way there now.
+  bool step_aside(Time now);
+
   const world::World& world;
   Arm arm;
   model::RobotModel model;

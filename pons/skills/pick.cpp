@@ -50,7 +50,6 @@ constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a li
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
-constexpr double kAside_m = 0.30;      // over the belt
 constexpr double kWaitOver_m = 0.06;   // the others, which pass below
 constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
 
@@ -191,21 +190,7 @@ class Pick final : public task::Skill {
     return false;
   }
 
-  // Out of the cameras' view, downstream.
-  void step_aside(Time now) {
-    if (aside_) return;
-    const world::Belt& belt = cell_.world.belt;
-    const Time from = cell_.arm.splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    const Pose tip = cell_.model.world_from_tip(state.position);
-    const Vector3 point(belt.pick_x_max_m, belt.y_center_m,
-                        std::max(tip.translation().z(), belt.surface_z_m + kAside_m));
-    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of(tip.linear())), state.position);
-    if (!q) return;
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                                        cell_.limits_empty());
-    if (way && cell_.arm.stream(*way)) aside_ = true;
-  }
+  void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
 
   // What cannot be sorted goes back beside its neighbours, to where it was lifted from, which has moved on with the
   // belt, and rides on into the exception chute.

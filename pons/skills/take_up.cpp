@@ -74,11 +74,10 @@ bool TakeUp::is_over(const std::string& name) const {
 }
 
 bool TakeUp::settle(Time now) {
-  if (!armed_at_) armed_at_ = now;
-  const bool looks = now < *armed_at_ + kLook;
+  if (!looks_until_) looks_until_ = now + kLook;
   if (!cell_.held) {
     if (cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
-    if (!cell_.arm.cups().open && looks) return false;
+    if (!cell_.arm.cups().open && now < *looks_until_) return false;
   }
   if (now < cell_.arm.motion_end()) return false;
   const double low_m = too_low_m();
@@ -86,7 +85,11 @@ bool TakeUp::settle(Time now) {
     // As far as the arm gets.
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
   }
-  if (looks) return false;
+  if (rises_ > 0 && !cell_.held && !aside_) {
+    aside_ = true;
+    if (cell_.step_aside(now)) looks_until_ = cell_.arm.motion_end() + kLook;
+  }
+  if (now < *looks_until_) return false;
   cell_.arm.expect_contact(0);
   if (!cell_.held) cell_.hides_nothing();
   return true;

@@ -33,7 +33,8 @@ class TakeUp {
 
   // Each tick once the arm is armed again, until it is true: only then may anything else move it. Lets go of what the
   // cups hold and nobody knows. An arm that stands low over the belt goes straight up first, for this bridge has not
-  // seen yet what stands beside the load, and under the arm no camera does; and the cameras get a moment for the rest.
+  // seen yet what stands beside the load, and under the arm no camera does; with the cups empty it then steps aside.
+  // The cameras get a moment.
   [[nodiscard]] bool settle(Time now);
 
  private:
@@ -43,8 +44,9 @@ class TakeUp {
 
   Cell& cell_;
   std::string carried_;  // the code that was written down, whether still held or not
-  std::optional<Time> armed_at_;
+  std::optional<Time> looks_until_;
   int rises_ = 0;
+  bool aside_ = false;
 };
 
 }  // namespace pons::skills
