@@ -125,6 +125,9 @@ TEST_P(Stop, FromFullMotionAlongTheLimitsInTheShortestTime) {
   ASSERT_EQ(bench.state().safety, braking);
   EXPECT_EQ(bench.state().cause, GetParam().cause);
   EXPECT_EQ(bench.state().stop_result, StopResult::kPending);
+  if (GetParam().cause == StopCause::kEmergencyWord || GetParam().cause == StopCause::kCommanded) {
+    EXPECT_EQ(ticks, 1);
+  }
   const Time began = bench.now - 1ms;
   // The very tick in which it stopped decelerates, or lets go of acceleration, along the fastest axis, unless that one
   // decelerates as it can already.

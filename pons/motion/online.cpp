@@ -12,6 +12,7 @@ namespace {
 // Durations that differ less, relatively, count as one.
 constexpr double kSameDuration = 1e-14;
 // Directions that differ less, relatively, count as one: what dividing and multiplying again leaves, and more.
+constexpr double kSameSpeed = 1 + 1e-9;
 constexpr double kSameDirection = 1e-12;
 
 using Planned = std::expected<double, OnlineError>;
@@ -63,7 +64,8 @@ void tighten(AxisBounds& bounds, const AxisBounds& other, double share) {
   bounds.jerk = std::min(bounds.jerk, other.jerk / std::abs(share));
 }
 
-// None if a speed, an acceleration or the way has another direction than the rest.
+// None if a speed, an acceleration or the way has another direction than the rest, or if the jerk that suits all axes
+// would let one get faster than it may before its acceleration is taken back.
 std::optional<Line> find_line(std::span<const AxisTask> tasks, Target target) {
   std::array<std::array<double, kMostTasks>, 4> vectors{};
   std::array<double, 4> lengths{};
@@ -91,6 +93,11 @@ std::optional<Line> find_line(std::span<const AxisTask> tasks, Target target) {
     }
     tighten(line.task.bounds, tasks[i].bounds, line.shares[i]);
   }
+  const AxisBounds& bounds = line.task.bounds;
+  const double coasting = coasting_speed(line.task.start, bounds.jerk);
+  if (target == Target::kPosition &&
+      (coasting > bounds.speed_max * kSameSpeed || coasting < bounds.speed_min * kSameSpeed))
+    return {};
   line.task.end_speed = std::clamp(line.task.end_speed, line.task.bounds.speed_min, line.task.bounds.speed_max);
   return line;
 }

@@ -33,7 +33,8 @@ enum class OnlineError : std::uint8_t {
 // What the axes have to do with one another.
 enum class Synchronization : std::uint8_t {
   kTime,   // all end at the same time, the slowest as fast as it can
-  kPhase,  // on one straight line if start and target allow (all speeds and accelerations along it), else as kTime
+  kPhase,  // on one straight line if start and target allow (all speeds and accelerations along it, and none that the
+           // jerk of the slowest axis takes back too late), else as kTime
   kNone,   // each as fast as it can
 };
 

@@ -13,7 +13,7 @@ namespace {
 using task::Json;
 
 constexpr double kTall_m = 0.30;    // as what stands on the belt mostly is at most
-constexpr double kOver_m = 0.03;    // over that, the load
+constexpr double kOver_m = 0.06;    // over that, the load, which swings
 constexpr double kBeyond_m = 0.01;  // so that a rise is enough
 constexpr double kHidden_m = 0.45;  // along the belt: how far arm and load hide what stands there
 constexpr double kRise_m_s2 = 3.0;
