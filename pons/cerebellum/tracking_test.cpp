@@ -1,13 +1,10 @@
-// How well the arm follows, and how long a step takes.
+// How well the arm follows.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdio>
-#include <vector>
 
 #include "pons/cerebellum/test_bench.hpp"
 #include "pons/core/random.hpp"
-#include "pons/rt/clock.hpp"
 
 namespace pons::cerebellum {
 namespace {
@@ -87,35 +84,6 @@ TEST(Payload, IsCarriedToTheMilliradianWhenItWasTold) {
   std::printf("payload of 1.5 kg: worst error %.2f mrad when told, %.2f mrad when not\n", 1e3 * told, 1e3 * untold);
   EXPECT_LT(told, 1e-3);
   EXPECT_GT(untold, 10 * told);  // so it is worth telling
-}
-
-TEST(Step, TakesMicroseconds) {
-  const rt::MonotonicClock clock;
-  Bench bench;
-  bench.arm();
-  AxisVector to = bench_robot().home;
-  std::vector<double> microseconds;
-  for (int i = 0; i < 6; ++i) {
-    to.array() += i % 2 == 0 ? 1.0 : -1.0;
-    bench.move(to);
-    for (int tick = 0; tick < 1200; ++tick) {
-      bench.now += 1ms;
-      bench.plant.advance_to(bench.now);
-      bench.send(plain_command(link::CommandKind::kHeartbeat));
-      const Time begin = clock.now();
-      bench.cerebellum.step(bench.now, bench.plant.sensors, bench.end, bench.plant.set_points);
-      const Time end = clock.now();
-      microseconds.push_back(1e6 * to_s(end - begin));
-    }
-  }
-  std::sort(microseconds.begin(), microseconds.end());
-  const auto at = [&](double share) {
-    return microseconds[static_cast<std::size_t>(share * static_cast<double>(microseconds.size() - 1))];
-  };
-  std::printf("step: median %.2f us, 99 %% %.2f us, worst %.2f us\n", at(0.5), at(0.99), at(1));
-#ifdef NDEBUG
-  EXPECT_LT(at(0.5), 20);
-#endif
 }
 
 }  // namespace

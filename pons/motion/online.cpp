@@ -12,8 +12,8 @@ namespace {
 // Durations that differ less, relatively, count as one.
 constexpr double kSameDuration = 1e-14;
 // Directions that differ less, relatively, count as one: what dividing and multiplying again leaves, and more.
-constexpr double kSameSpeed = 1 + 1e-9;
 constexpr double kSameDirection = 1e-12;
+constexpr double kSameSpeed = 1 + 1e-9;
 
 using Planned = std::expected<double, OnlineError>;
 

@@ -36,8 +36,8 @@ Arming::Arming(bridge::Bridge& bridge, const SkillPort& skills, const std::vecto
                Recovery recovery)
     : bridge_(bridge), skills_(skills), zones_(zones), recovery_(recovery) {}
 
-void Arming::take_over(Time now) {
-  took_over_ = true;
+void Arming::take_over(Time now, bool armed_before) {
+  took_over_ = armed_before || skills_.state().safety != SafetyState::kDisarmed;
   yielding_ = skills_.state().safety == SafetyState::kOperational;
   if (yielding_) skills_.halt();
   look_around(now);

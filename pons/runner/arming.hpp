@@ -24,8 +24,9 @@ class Arming {
   // All must outlive it. `zones` are the world's.
   Arming(bridge::Bridge& bridge, const SkillPort& skills, const std::vector<world::Zone>& zones, Recovery recovery);
 
-  // After a bridge that is no more: stops an arm that still moves as that one told it to.
-  void take_over(Time now);
+  // After a bridge that is no more: stops an arm that still moves as that one told it to. An arm that was armed before
+  // settles before it is used.
+  void take_over(Time now, bool armed_before);
   // Likewise, before that: a word that the journal has, in the order in which they stand there.
   void recall(std::string_view word);
   // Once a period: one step on the way out of a stop, if it may be left; the bridge is held meanwhile. What the arm and

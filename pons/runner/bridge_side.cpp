@@ -31,13 +31,15 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   }
   const auto events = journal.events("");
   if (!events) return std::unexpected(events.error());
+  bool armed_before = false;
   for (const bridge::Event& event : *events) {
+    armed_before = armed_before || event.kind == "armed";
     if (event.kind == "ride") dispatcher_.recall_ride(event.detail.value("code", std::string{}));
     if (event.kind == "person") arming_.recall(event.detail.value("asks", std::string{}));
     if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
   skills_.refresh(now, {});
-  arming_.take_over(now);
+  arming_.take_over(now, armed_before);
   skills_.restore(carried_);
   return bridge_.recover(skills_.resume, now);
 }
@@ -105,7 +107,8 @@ void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
-  skills_.belt(decisions.belt_waits ? link::Belt::kWaits : link::Belt::kRuns);
+  // What stands beside an arm that is being brought out must not be pushed against it.
+  skills_.belt(decisions.belt_waits || arming_.settles() ? link::Belt::kWaits : link::Belt::kRuns);
   for (const brain::Ride& ride : decisions.rides) {
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now);

@@ -34,7 +34,8 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
-constexpr double kAside_m = 0.30;  // over the belt
+constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
+constexpr double kAside_m = 0.30;     // over the belt
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
@@ -126,7 +127,7 @@ void Cell::hides(double reach_m, double height_m) {
   hidden_->stamp = now_;
   hidden_->world_from_top.translation() = Vector3(tip_x, world.belt.y_center_m, world.belt.surface_z_m + height_m);
   hidden_->velocity_m_s.x() = belt_speed_m_s();
-  hidden_->size_m = {2 * reach_m, world.belt.width_m, height_m};
+  hidden_->size_m = {2 * reach_m, kHiddenShare * world.belt.width_m, height_m};
   objects_.push_back(*hidden_);
 }
 
@@ -182,7 +183,7 @@ void Cell::keep_clear(Time now) {
     if (!q) return;
     if (step + 1 < kRises && !clear(*q)) continue;
     const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
-    Search search;
+    Search search{.must = true};
     const auto way = held ? carry(
                                 now, [&](const AxisVector&) -> Expected<AxisVector> { return *q; }, search)
                           : motion::move(arm.planned(from), from, end, limits_empty());
@@ -227,7 +228,7 @@ AxisLimits Cell::limits_loaded(double share) const {
 
 Expected<motion::Trajectory> Cell::carry(Time now, const Goal& goal, Search& search) {
   auto way = carry_on(now, goal, search);
-  if (way || !router.spent()) search = {};
+  if (way || !router.spent()) search = {.must = search.must};
   return way;
 }
 
@@ -247,7 +248,7 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     const double use = std::max(cups / kGripShare, motors / kTorqueShare);
     if (use <= 1) return way;
     if (search.share <= kSlowestShare) {
-      if (cups <= kSlowGripShare && motors <= 1) return way;
+      if (search.must || (cups <= kSlowGripShare && motors <= 1)) return way;
       return too_heavy(held->mass_kg, cups, motors);
     }
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;

@@ -65,8 +65,8 @@ class Cell {
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
   // counts as so high an obstacle, until the tip has left it.
   void hides(double reach_m, double height_m);
-  // Nothing is hidden any longer.
-  void hides_nothing() { hidden_.reset(); }
+  // Nothing counts as hidden any longer; whether something did.
+  bool hides_nothing() { return std::exchange(hidden_, std::nullopt).has_value(); }
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
@@ -82,7 +82,8 @@ class Cell {
   [[nodiscard]] AxisLimits limits_empty() const;
   // How a carry is being found, while a tick is too short to find it; empty again when it has ended.
   struct Search {
-    double share = 1;  // of the acceleration limits
+    double share = 1;   // of the acceleration limits
+    bool must = false;  // what is too heavy goes as slowly as can be, too: it has to be put down
     int corrections = 0;
     std::optional<Passage> known;
   };

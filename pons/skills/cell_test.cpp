@@ -145,6 +145,8 @@ TEST_F(CarryTest, WhatNoSpeedCanCarryIsRefused) {
   };
   EXPECT_TRUE(refused({0.2, 0.2, 0.2}, 10).starts_with("carry: 10.00 kg are too heavy"))
       << refused({0.2, 0.2, 0.2}, 10);
+  Cell::Search must{.must = true};
+  EXPECT_TRUE(cell_.carry(now_, [this](const AxisVector& from) { return goal(from); }, must)) << "to put it down";
   goal_ = {-0.8, -0.46, 1.06};
   const Vector3 flat(0.2, 0.2, 0.02);
   EXPECT_EQ(refused(flat, 5), "carried");

@@ -27,7 +27,7 @@ class SetDown {
 
   Cell& cell_;
   Delay delay_;
-  Cell::Search search_;
+  Cell::Search search_{.must = true};
   std::size_t height_ = 0;  // over the belt, that is being searched
   Time released_at_;
 };

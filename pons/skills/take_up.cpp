@@ -17,7 +17,9 @@ constexpr double kOver_m = 0.06;    // over that, the load, which swings
 constexpr double kBeyond_m = 0.01;  // so that a rise is enough
 constexpr double kHidden_m = 0.45;  // along the belt: how far arm and load hide what stands there
 constexpr double kRise_m_s2 = 3.0;
-constexpr int kRises = 3;  // after stops, too
+constexpr int kRises = 3;                                      // after stops, too
+constexpr Duration kStopped = std::chrono::milliseconds(100);  // between two calls: the arm was stopped
+constexpr Duration kInstant = std::chrono::milliseconds(1);
 constexpr Duration kLook = std::chrono::milliseconds(700);
 
 Json of(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
@@ -74,10 +76,12 @@ bool TakeUp::is_over(const std::string& name) const {
 }
 
 bool TakeUp::settle(Time now) {
-  if (!looks_until_) looks_until_ = now + kLook;
+  if (!called_ || now - *called_ > kStopped) looks_until_ = now + kLook, aside_ = false;
+  called_ = now;
   if (!cell_.held) {
     if (cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
-    if (!cell_.arm.cups().open && now < *looks_until_) return false;
+    if (!cell_.arm.cups().open && now < looks_until_) return false;
+    if (rises_ == 0 && !aside_) cell_.holds_nothing();
   }
   if (now < cell_.arm.motion_end()) return false;
   const double low_m = too_low_m();
@@ -86,10 +90,10 @@ bool TakeUp::settle(Time now) {
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
   }
   if (rises_ > 0 && !cell_.held && !aside_) {
-    aside_ = true;
-    if (cell_.step_aside(now)) looks_until_ = cell_.arm.motion_end() + kLook;
+    aside_ = cell_.step_aside(now);
+    if (aside_) looks_until_ = cell_.arm.motion_end() + kLook;
   }
-  if (now < *looks_until_) return false;
+  if (now < looks_until_) return false;
   cell_.arm.expect_contact(0);
   if (!cell_.held) cell_.hides_nothing();
   return true;
@@ -101,19 +105,27 @@ double TakeUp::too_low_m() const {
   const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
   const bool over_belt =
       std::abs(tip.y() - belt.y_center_m) < 0.5 * belt.width_m && tip.x() > belt.x_start_m && tip.x() < belt.x_end_m;
-  const double underside_m = tip.z() - (cell_.held ? cell_.held->load.size_m.z() : 0);
-  return over_belt ? belt.surface_z_m + kTall_m + kOver_m - underside_m : 0;
+  return over_belt ? belt.surface_z_m + kTall_m + kOver_m + load_height_m() - tip.z() : 0;
 }
 
 bool TakeUp::rise(Time now, double by_m) {
   const Time from = cell_.arm.splice_time(now);
   const AxisState state = cell_.arm.planned(from);
-  const Eigen::Matrix3d orientation = cell_.model.world_from_tip(state.position).linear();
+  Pose tip = cell_.model.world_from_tip(state.position);
+  const Eigen::Matrix3d orientation = tip.linear();
+  tip.translation().z() += by_m + kBeyond_m;
+  // A wide load that is lifted to the height of the base meets the arm itself.
+  const auto top = cell_.model.inverse(tip, state.position);
+  if (!top || !cell_.router.clear_at(*top, from, from + kInstant, cell_.held ? &cell_.held->load : nullptr, {}))
+    return false;
   const auto up = lift(cell_, state, from, orientation, {0, 0, by_m + kBeyond_m}, kRise_m_s2);
   if (!up || !cell_.arm.stream(up->trajectory)) return false;
   cell_.arm.expect_contact(kHandling_n);
-  cell_.hides(kHidden_m, kTall_m);
+  const double passes_m = tip.translation().z() - load_height_m() - kOver_m - cell_.world.belt.surface_z_m;
+  if (passes_m > 0) cell_.hides(kHidden_m, std::min(kTall_m, passes_m));
   return true;
 }
+
+double TakeUp::load_height_m() const { return cell_.held ? cell_.held->load.size_m.z() : 0; }
 
 }  // namespace pons::skills

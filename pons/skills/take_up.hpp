@@ -40,11 +40,13 @@ class TakeUp {
  private:
   [[nodiscard]] bool is_over(const std::string& place) const;
   [[nodiscard]] double too_low_m() const;
+  [[nodiscard]] double load_height_m() const;
   [[nodiscard]] bool rise(Time now, double by_m);
 
   Cell& cell_;
   std::string carried_;  // the code that was written down, whether still held or not
-  std::optional<Time> looks_until_;
+  std::optional<Time> called_;
+  Time looks_until_;
   int rises_ = 0;
   bool aside_ = false;
 };

@@ -58,7 +58,7 @@ class ArmingTest : public testing::Test {
 TEST_F(ArmingTest, NoTaskMovesAnArmBeforeItHasSettled) {
   Arming arming(bridge_, port_, world_.zones, Recovery::kRefused);
   state_.safety = SafetyState::kDisarmed;
-  arming.take_over(now_);
+  arming.take_over(now_, true);
   tick(arming);
   EXPECT_EQ(settles_, 0) << "it cannot move yet";
   state_.safety = SafetyState::kOperational;
@@ -85,6 +85,8 @@ TEST_F(ArmingTest, NoTaskMovesAnArmBeforeItHasSettled) {
 
 TEST_F(ArmingTest, WithoutAPredecessorNothingNeedsToSettle) {
   Arming arming(bridge_, port_, world_.zones, Recovery::kRefused);
+  state_.safety = SafetyState::kDisarmed;
+  arming.take_over(now_, false);
   state_.safety = SafetyState::kOperational;
   tick(arming);
   EXPECT_EQ(settles_, 0);
