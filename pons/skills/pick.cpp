@@ -118,7 +118,7 @@ class Pick final : public task::Skill {
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
-      // A stop came before the scale had decided; the arm has stood since.
+      // A stop came before the scale had decided.
       if (cell_.held->mass_kg <= 0) cell_.weighs(std::max(kLightest_kg, weigh_now(cell_)));
       const double mass = cell_.held->mass_kg;
       const bool wanted = cell_.held->code == code_;
