@@ -88,10 +88,14 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   };
   std::ranges::for_each(left_, ride);
   if (hidden_) ride(*hidden_);
+  if (unseen_) unseen_->from_m += speed * passed_s;
   std::erase_if(left_, [&](const ObjectBelief& o) { return o.world_from_top.translation().x() > world.belt.x_end_m; });
+  if (unseen_ && unseen_->from_m >= world.belt.x_end_m) unseen_.reset();
   now_ = now;
   objects_ = std::move(objects);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
+  if (unseen_)
+    objects_.push_back(across_belt(unseen_->from_m, world.belt.x_end_m, world.belt.width_m, unseen_->height_m));
   if (!hidden_) return;
   const Vector3 tip = model.world_from_tip(arm.state().position).translation();
   const Vector3 off = (tip - hidden_->world_from_top.translation()).cwiseAbs();
@@ -123,12 +127,22 @@ void Cell::left_on_belt(const Load& load, const Vector3& position) {
 
 void Cell::hides(double reach_m, double height_m) {
   const double tip_x = model.world_from_tip(arm.state().position).translation().x();
-  hidden_ = ObjectBelief{};
-  hidden_->stamp = now_;
-  hidden_->world_from_top.translation() = Vector3(tip_x, world.belt.y_center_m, world.belt.surface_z_m + height_m);
-  hidden_->velocity_m_s.x() = belt_speed_m_s();
-  hidden_->size_m = {2 * reach_m, kHiddenShare * world.belt.width_m, height_m};
+  hidden_ = across_belt(tip_x - reach_m, tip_x + reach_m, kHiddenShare * world.belt.width_m, height_m);
   objects_.push_back(*hidden_);
+  if (unseen_) unseen_->height_m = std::min(unseen_->height_m, height_m);
+}
+
+void Cell::unseen_end(double height_m) { unseen_ = {view_end_m_, height_m}; }
+
+// Of the middle of the belt, riding with it.
+ObjectBelief Cell::across_belt(double from_m, double to_m, double width_m, double height_m) const {
+  ObjectBelief object;
+  object.stamp = now_;
+  object.world_from_top.translation() =
+      Vector3(0.5 * (from_m + to_m), world.belt.y_center_m, world.belt.surface_z_m + height_m);
+  object.velocity_m_s.x() = belt_speed_m_s();
+  object.size_m = {to_m - from_m, width_m, height_m};
+  return object;
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {

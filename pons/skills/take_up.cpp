@@ -42,6 +42,7 @@ Json TakeUp::carries() const {
 }
 
 void TakeUp::restore(const Json& carried) {
+  cell_.unseen_end(kTall_m);
   if (!carried.is_object()) return;
   carried_ = carried.value("code", std::string{});
   if (cell_.arm.cups().open) {
