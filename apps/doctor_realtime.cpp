@@ -53,52 +53,10 @@ std::string line_of(const std::filesystem::path& file) {
 }
 
 // The kernel's list has a headline and a line for each swap.
-bool has_swap() {
-  std::ifstream in("/proc/swaps");
+bool has_swap(const std::filesystem::path& root) {
+  std::ifstream in(root / "proc/swaps");
   std::string line;
   return std::getline(in, line) && std::getline(in, line);
-}
-
-// What no trial of a moment shows, but a long run does.
-Finding read_settings() {
-  Finding worst = Finding::kGood;
-  const auto check = [&](bool good, const char* what, const std::string& how) {
-    worst = std::max(worst, say(good ? Finding::kGood : Finding::kDegraded, what, how));
-  };
-  check(line_of("/sys/kernel/realtime") == "1", "kernel",
-        line_of("/sys/kernel/realtime") == "1" ? "PREEMPT_RT"
-                                               : "not PREEMPT_RT: expect single ticks late by milliseconds");
-  const std::string clock = line_of("/sys/devices/system/clocksource/clocksource0/current_clocksource");
-  check(clock == "tsc" || clock == "arch_sys_counter", "clock source", clock.empty() ? "unknown" : clock);
-  const auto [cpu, governor] = loop_governor();
-  check(governor.empty() || governor == "performance", "CPU governor",
-        governor.empty() ? "none: the clock rate is not this system's to choose"
-                         : fmt::format("{}, of CPU {}", governor, cpu));
-  const std::string pages = line_of("/sys/kernel/mm/transparent_hugepage/enabled");
-  check(pages.find("[always]") == std::string::npos, "huge pages", pages.empty() ? "none" : pages);
-  const std::string swappiness = line_of("/proc/sys/vm/swappiness");
-  const bool swaps = has_swap();
-  check(!swaps || (!swappiness.empty() && std::atoi(swappiness.c_str()) <= 10), "swappiness",
-        swaps ? swappiness : "of no matter: there is no swap");
-  const std::string budget = line_of("/proc/sys/kernel/sched_rt_runtime_us");
-  check(budget == "-1" || std::atoi(budget.c_str()) >= 900'000, "real-time budget",
-        budget + " of every 1000000 µs; -1 is no limit");
-  if (worst != Finding::kGood) say(worst, "what helps", kAdvice);
-  return worst;
-}
-
-Finding judge(const rt::Jitter& jitter) {
-  const auto us = [](Duration d) { return 1e6 * to_s(d); };
-  const rt::Histogram& late = jitter.lateness;
-  const std::uint64_t all = jitter.ticks + jitter.missed, bad = late.count_above(kBound) + jitter.missed;
-  const std::string figures =
-      fmt::format("ticks begin late by {:.0f} µs (median), {:.0f} (99 %), {:.0f} (99.9 %), {:.0f} (worst)",
-                  us(late.percentile(50)), us(late.percentile(99)), us(late.percentile(99.9)), us(late.max()));
-  say(bad == 0 ? Finding::kGood : Finding::kDegraded, "jitter", figures);
-  if (bad == 0) return say(Finding::kGood, "1 kHz", fmt::format("held: each of {} ticks within 100 µs", all));
-  return say(Finding::kDegraded, "1 kHz",
-             fmt::format("not held within 100 µs: {} of {} ticks ({:.2g} %) later than that, {} of them missed", bad,
-                         all, 100.0 * static_cast<double>(bad) / static_cast<double>(all), jitter.missed));
 }
 
 Finding measure(Duration how_long) {
@@ -117,7 +75,7 @@ Finding measure(Duration how_long) {
   if (shown) say(stderr, "\r                                \r");
   loop.join();
   munlockall();
-  return judge(jitter);
+  return judge_jitter(jitter);
 }
 
 }  // namespace
@@ -126,6 +84,46 @@ Governor loop_governor(const std::filesystem::path& sys) {
   const int pinned = rt::loop_cpu();
   const int cpu = pinned >= 0 ? pinned : sched_getcpu();
   return {cpu, line_of(sys / fmt::format("devices/system/cpu/cpu{}/cpufreq/scaling_governor", cpu))};
+}
+
+Finding read_settings(const std::filesystem::path& root) {
+  Finding worst = Finding::kGood;
+  const auto check = [&](bool good, const char* what, const std::string& how) {
+    worst = std::max(worst, say(good ? Finding::kGood : Finding::kDegraded, what, how));
+  };
+  const bool preempts = line_of(root / "sys/kernel/realtime") == "1";
+  check(preempts, "kernel", preempts ? "PREEMPT_RT" : "not PREEMPT_RT: expect single ticks late by milliseconds");
+  const std::string clock = line_of(root / "sys/devices/system/clocksource/clocksource0/current_clocksource");
+  check(clock == "tsc" || clock == "arch_sys_counter", "clock source", clock.empty() ? "unknown" : clock);
+  const auto [cpu, governor] = loop_governor(root / "sys");
+  check(governor.empty() || governor == "performance", "CPU governor",
+        governor.empty() ? "none: the clock rate is not this system's to choose"
+                         : fmt::format("{}, of CPU {}", governor, cpu));
+  const std::string pages = line_of(root / "sys/kernel/mm/transparent_hugepage/enabled");
+  check(pages.find("[always]") == std::string::npos, "huge pages", pages.empty() ? "none" : pages);
+  const std::string swappiness = line_of(root / "proc/sys/vm/swappiness");
+  const bool swaps = has_swap(root);
+  check(!swaps || (!swappiness.empty() && std::atoi(swappiness.c_str()) <= 10), "swappiness",
+        swaps ? swappiness : "of no matter: there is no swap");
+  const std::string budget = line_of(root / "proc/sys/kernel/sched_rt_runtime_us");
+  check(budget == "-1" || std::atoi(budget.c_str()) >= 900'000, "real-time budget",
+        budget + " of every 1000000 µs; -1 is no limit");
+  if (worst != Finding::kGood) say(worst, "what helps", kAdvice);
+  return worst;
+}
+
+Finding judge_jitter(const rt::Jitter& jitter) {
+  const auto us = [](Duration d) { return 1e6 * to_s(d); };
+  const rt::Histogram& late = jitter.lateness;
+  const std::uint64_t all = jitter.ticks + jitter.missed, bad = late.count_above(kBound) + jitter.missed;
+  const std::string figures =
+      fmt::format("ticks begin late by {:.0f} µs (median), {:.0f} (99 %), {:.0f} (99.9 %), {:.0f} (worst)",
+                  us(late.percentile(50)), us(late.percentile(99)), us(late.percentile(99.9)), us(late.max()));
+  say(bad == 0 ? Finding::kGood : Finding::kDegraded, "jitter", figures);
+  if (bad == 0) return say(Finding::kGood, "1 kHz", fmt::format("held: each of {} ticks within 100 µs", all));
+  return say(Finding::kDegraded, "1 kHz",
+             fmt::format("not held within 100 µs: {} of {} ticks ({:.2g} %) later than that, {} of them missed", bad,
+                         all, 100.0 * static_cast<double>(bad) / static_cast<double>(all), jitter.missed));
 }
 
 Finding try_realtime(Duration jitter) {

@@ -1,10 +1,11 @@
-// What pons doctor reads of the CPU that the control loop would have.
+// What pons doctor makes of what it reads and measures.
 
 #include "apps/doctor.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -78,6 +79,67 @@ TEST_F(LoopGovernor, IsThatOfTheOnlyCpuThatThereIs) {
 
 TEST_F(LoopGovernor, IsNobodyWhereTheKernelNamesNone) {
   EXPECT_EQ(loop_governor(sys_ / "of another computer").name, "");
+}
+
+// A computer as packaging/ makes it.
+class Settings : public testing::Test {
+ protected:
+  Settings() {
+    write("sys/kernel/realtime", "1");
+    write("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc");
+    for (const int cpu : allowed_cpus()) write(governor(cpu), "performance");
+    write("sys/kernel/mm/transparent_hugepage/enabled", "always [madvise] never");
+    write("proc/swaps", "Filename Type Size Used Priority\n/swap file 1 0 -2");
+    write("proc/sys/vm/swappiness", "10");
+    write("proc/sys/kernel/sched_rt_runtime_us", "-1");
+  }
+  static std::string governor(int cpu) {
+    return "sys/devices/system/cpu/cpu" + std::to_string(cpu) + "/cpufreq/scaling_governor";
+  }
+  void write(const std::string& file, const std::string& text) const {
+    std::filesystem::create_directories((root_ / file).parent_path());
+    tests::write_text(root_ / file, text + "\n");
+  }
+  // With one of them otherwise.
+  Finding with(const std::string& file, const std::string& text) const {
+    const std::string before = tests::read_text(root_ / file);
+    write(file, text);
+    const Finding found = read_settings(root_.path());
+    tests::write_text(root_ / file, before);
+    return found;
+  }
+
+  const tests::Folder root_;
+};
+
+TEST_F(Settings, AreGoodAsThePackageSetsThem) { EXPECT_EQ(read_settings(root_.path()), Finding::kGood); }
+
+TEST_F(Settings, AreEachMissed) {
+  EXPECT_EQ(with("sys/kernel/realtime", ""), Finding::kDegraded);
+  EXPECT_EQ(with("sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet"), Finding::kDegraded);
+  const int cpu = rt::loop_cpu() >= 0 ? rt::loop_cpu() : allowed_cpus().front();
+  EXPECT_EQ(with(governor(cpu), "powersave"), Finding::kDegraded);
+  EXPECT_EQ(with("sys/kernel/mm/transparent_hugepage/enabled", "[always] madvise never"), Finding::kDegraded);
+  EXPECT_EQ(with("proc/sys/vm/swappiness", "60"), Finding::kDegraded);
+  EXPECT_EQ(with("proc/sys/kernel/sched_rt_runtime_us", "500000"), Finding::kDegraded);
+  EXPECT_EQ(read_settings(root_.path()), Finding::kGood);
+}
+
+TEST_F(Settings, WithoutSwapSwappinessIsOfNoMatter) {
+  write("proc/swaps", "Filename Type Size Used Priority");
+  EXPECT_EQ(with("proc/sys/vm/swappiness", "60"), Finding::kGood);
+}
+
+TEST(OneKilohertz, IsHeldWhereNoTickIsMissedOrLate) {
+  using std::chrono::microseconds;
+  rt::Jitter jitter{.ticks = 1000};
+  for (int i = 0; i < 1000; ++i) jitter.lateness.record(microseconds(99));
+  EXPECT_EQ(judge_jitter(jitter), Finding::kGood);
+  jitter.missed = 1;
+  EXPECT_EQ(judge_jitter(jitter), Finding::kDegraded);
+  jitter.missed = 0;
+  jitter.lateness.record(microseconds(110));
+  EXPECT_EQ(judge_jitter(jitter), Finding::kDegraded);
 }
 
 }  // namespace

@@ -50,6 +50,15 @@ said=$(systemd-tmpfiles --root="$work/root" --create pons.conf 2>&1) || die "$sa
 grep -Ev '^ *(#|$)' sysctl.d/90-pons.conf | while IFS='= ' read -r key _; do
   [ -e "/proc/sys/${key//.//}" ] || die "no kernel setting $key"
 done
+for setting in 'vm.swappiness = 10' 'kernel.sched_rt_runtime_us = -1'; do
+  grep -qxF "$setting" sysctl.d/90-pons.conf || die "sysctl.d/90-pons.conf lacks $setting"
+done
+for setting in rtprio\ 95 memlock\ unlimited; do
+  sed -E 's/ +/ /g' limits.d/90-pons.conf | grep -qxF "@realtime - $setting" || die "limits.d/90-pons.conf lacks $setting"
+done
+for setting in enabled\ -\ -\ -\ -\ madvise scaling_governor\ -\ -\ -\ -\ performance; do
+  grep -qE "^w!? /sys/.*/$setting\$" tmpfiles.d/pons.conf || die "tmpfiles.d/pons.conf lacks $setting"
+done
 for file in $(find . -mindepth 2 -type f -printf '%P\n'); do
   grep -qF "\`$file\`" README.md || die "$file is not in the table of README.md"
 done

@@ -63,15 +63,14 @@ class Cell {
   // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
-  // counts as so high an obstacle, until the tip has left it. What unseen_end() takes for higher counts as so high, too.
+  // counts as so high an obstacle, until the tip has left it. What unseen_end() takes for higher counts as so high,
+  // too.
   void hides(double reach_m, double height_m);
-  // Nothing counts as hidden any longer; whether something did.
-  bool hides_nothing() { return std::exchange(hidden_, std::nullopt).has_value(); }
+  // Nothing counts as hidden any longer.
+  void hides_nothing() { hidden_.reset(); }
   // What rides beyond the cameras' view now, nobody has seen: it counts as so high an obstacle until it has ridden off
   // the end.
   void unseen_end(double height_m);
-  // Whether something there stands in the way that will have ridden off.
-  [[nodiscard]] bool end_clears() const { return unseen_ && belt_speed_m_s() > 0; }
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }

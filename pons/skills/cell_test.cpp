@@ -97,6 +97,44 @@ TEST_F(RestTest, WhatItHoldsRisesToo) {
   EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.32 + 0.15 + 0.01);
 }
 
+class UnseenEndTest : public ObedientArmTest {
+ protected:
+  [[nodiscard]] double hindmost_m() const {
+    const ObjectBelief& object = cell_.objects().front();
+    return object.world_from_top.translation().x() - 0.5 * object.size_m.x();
+  }
+  [[nodiscard]] double foremost_m() const { return hindmost_m() + cell_.objects().front().size_m.x(); }
+};
+
+TEST_F(UnseenEndTest, RidesOffTheEnd) {
+  stands({0, 0, 1.4});
+  cell_.unseen_end(0.3);
+  belt_m_s_ = 0.2;
+  pass();
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  const double began_m = hindmost_m();
+  EXPECT_FALSE(cell_.in_view(began_m));
+  EXPECT_TRUE(cell_.in_view(began_m - 0.003));
+  EXPECT_EQ(cell_.objects().front().size_m.y(), world_.belt.width_m);
+  EXPECT_NEAR(cell_.objects().front().world_from_top.translation().z(), world_.belt.surface_z_m + 0.3, 1e-9);
+  for (int i = 0; i < 100; ++i) pass();
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  EXPECT_NEAR(hindmost_m(), began_m + 0.2, 1e-9);
+  EXPECT_NEAR(foremost_m(), world_.belt.x_end_m, 1e-9);
+  for (double x_m = hindmost_m(); x_m < world_.belt.x_end_m; x_m += 0.002) pass();
+  pass();
+  EXPECT_TRUE(cell_.objects().empty());
+}
+
+TEST_F(UnseenEndTest, IsNoHigherThanWhereTheArmPassed) {
+  stands({0.3, 0, 1.1});
+  cell_.unseen_end(0.3);
+  cell_.hides(0.4, 0.12);
+  pass();
+  ASSERT_EQ(cell_.objects().size(), 2U);
+  for (const ObjectBelief& object : cell_.objects()) EXPECT_EQ(object.size_m.z(), 0.12);
+}
+
 TEST_F(CarryTest, WhatIsHeavyAndTallGoesSlowerThanWhatIsLightAndFlat) {
   const motion::Trajectory light = carry({0.2, 0.15, 0.02}, 0.2);
   EXPECT_LE(use(light), kReserve);

@@ -95,10 +95,8 @@ class Place final : public task::Skill {
       if (cell_.router.spent()) return {};
       tried_ = now;
       // Others may be in the way, and ride on.
-      if (!blocked_since_ || cell_.end_clears()) blocked_since_ = now;
+      if (!blocked_since_) blocked_since_ = now;
       cell_.keep_clear(now);
-      // What nobody has seen is not worth keeping the load for.
-      if (now >= *blocked_since_ + kBlockedFor && cell_.hides_nothing()) blocked_since_ = now;
       return now < *blocked_since_ + kBlockedFor ? Progress{}
                                                  : Progress{Status::kFailed, name_ + ": " + set_out.error().line(), {}};
     }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "pons/skills/test_kit.hpp"
@@ -71,6 +72,16 @@ TEST_F(TakeUpTest, WhatHangsThereIsRestoredAsItWasWrittenDown) {
   EXPECT_EQ(take_up_.fate(task(), 1), Fate::kGoesOn);
 }
 
+// Its predecessor had tracks of it.
+TEST_F(TakeUpTest, WhatRidesBeyondTheViewMayBeAnything) {
+  cups(0, 0, world_.robot.home);
+  EXPECT_TRUE(cell_.objects().empty());
+  take_up_.restore({});
+  cups(0, 0, world_.robot.home);
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  EXPECT_NEAR(cell_.objects().front().world_from_top.translation().z(), world_.belt.surface_z_m + 0.30, 1e-9);
+}
+
 TEST_F(TakeUpTest, WhatTheCupsNoLongerHoldWasLetGoOrLost) {
   cell_.held = held_;
   const task::Json written = take_up_.carries();
@@ -103,44 +114,18 @@ TEST_F(TakeUpTest, WhatNobodyKnowsIsLetGoOnceArmed) {
   EXPECT_EQ(command.vacuum_on, 0U);
 }
 
-// The arm does at once what it is told, with the cups sealed until they are opened_.
-class SettleTest : public TakeUpTest {
+class SettleTest : public ObedientArmTest {
  protected:
-  void stands(const Vector3& tip) {
-    const auto at = cell_.model.inverse(Cell::tip_down(tip, 0), world_.robot.home);
-    ASSERT_TRUE(at) << at.error().line();
-    const AxisVector still = AxisVector::Zero(at->size());
-    publish({*at, still, still});
-    cell_.refresh(now_, {});
-  }
-  void publish(const AxisState& at) {
-    link::State state;
-    state.safety = link::SafetyState::kOperational;
-    state.epoch = 1;
-    state.stamp = now_;
-    state.commanded = at;
-    state.position = at.position, state.speed = at.speed;
-    if (!opened_) {
-      state.vacuum_on = 15;
-      state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
-      state.cup_vacuum_kpa.fill(kSealed_kpa);
-    }
-    link::CerebellumEnd(*link_).publish(state);
-  }
   bool tick() {
     const bool settled = take_up_.settle(now_);
-    now_ += from_s(0.01);
-    publish(cell_.arm.planned(now_));
-    cell_.refresh(now_, {});
-    const Vector3 tip = tip_now();
-    aside_m_ = std::max(aside_m_, (tip - began_).head<2>().norm());
+    pass();
+    aside_m_ = std::max(aside_m_, (tip_now() - began_).head<2>().norm());
     return settled;
   }
-  Vector3 tip_now() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
 
+  TakeUp take_up_{cell_};
   Vector3 began_{0.1, 0.05, 1.02};
   double aside_m_ = 0;
-  bool opened_ = false;
 };
 
 TEST_F(SettleTest, WhatHangsLowRisesStraightBeforeAnythingElseMovesTheArm) {

@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <utility>
+#include <vector>
 
+#include "pons/skills/cell.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::skills {
@@ -15,5 +18,52 @@ inline world::World parcel_cell() {
   EXPECT_TRUE(world) << world.error().line();
   return std::move(*world);
 }
+
+// An armed arm that does at once what it is told, and holds something until its cups are opened_.
+class ObedientArmTest : public testing::Test {
+ protected:
+  static constexpr double kSealed_kpa = 60;
+
+  void stands(const Vector3& tip) {
+    const auto at = cell_.model.inverse(Cell::tip_down(tip, 0), world_.robot.home);
+    ASSERT_TRUE(at) << at.error().line();
+    const AxisVector still = AxisVector::Zero(at->size());
+    publish({*at, still, still});
+    cell_.refresh(now_, {});
+  }
+  // A bridge tick later.
+  void pass() {
+    now_ += from_s(0.01);
+    publish(cell_.arm.planned(now_));
+    cell_.refresh(now_, {});
+  }
+  [[nodiscard]] Vector3 tip_now() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
+
+  world::World world_ = parcel_cell();
+  std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
+  link::BridgeEnd end_{*link_};
+  Cell cell_{end_, world_, model::RobotModel::load(world_.robot).value()};
+  Time now_ = Time(from_s(5));
+  const Held held_{"P1", {{0.3, 0.2, 0.1}, 0.7, {0.01, -0.02, 0}}, 1.25};
+  bool opened_ = false;
+  double belt_m_s_ = 0;
+
+ private:
+  void publish(const AxisState& at) {
+    link::State state;
+    state.safety = link::SafetyState::kOperational;
+    state.epoch = 1;
+    state.stamp = now_;
+    state.commanded = at;
+    state.position = at.position, state.speed = at.speed;
+    state.belt_speed_m_s = belt_m_s_;
+    if (!opened_) {
+      state.vacuum_on = 15;
+      state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
+      state.cup_vacuum_kpa.fill(kSealed_kpa);
+    }
+    link::CerebellumEnd(*link_).publish(state);
+  }
+};
 
 }  // namespace pons::skills

@@ -1,13 +1,24 @@
 // By the computer's clock instead of a virtual one.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <unistd.h>
 
 #include <array>
+#include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
+#include <vector>
 
+#include "pons/rt/clock.hpp"
+#include "pons/rt/periodic_loop.hpp"
 #include "tests/end_to_end/outcomes.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -60,6 +71,52 @@ TEST_F(RealTime, AgreesWithLockstepOnEachOfThirtyParcels) {
   EXPECT_GT(realtime.report["bridge"]["max_ms"], 0);
   EXPECT_TRUE(lockstep.report["loop"]["late_p50_us"].is_null());
   EXPECT_TRUE(lockstep.report["bridge"]["max_ms"].is_null());
+}
+
+// What the kernel grants a thread, or one that runs, 0 being the calling one.
+struct Scheduled {
+  int policy = -1, cpus = 0;
+  bool operator==(const Scheduled&) const = default;
+};
+Scheduled scheduled(pid_t thread) {
+  cpu_set_t allowed;
+  if (sched_getaffinity(thread, sizeof allowed, &allowed) != 0) return {};
+  return {sched_getscheduler(thread), CPU_COUNT(&allowed)};
+}
+
+std::optional<pid_t> thread_named(const std::string& name, pid_t process) {
+  std::error_code gone;
+  for (const auto& task : std::filesystem::directory_iterator(fmt::format("/proc/{}/task", process), gone)) {
+    std::ifstream file(task.path() / "comm");
+    std::string comm;
+    if (std::getline(file, comm) && comm == name) return std::stoi(task.path().filename().string());
+  }
+  return {};
+}
+
+TEST_F(RealTime, TheLoopsThreadHasThePriorityAndTheCpuThatTheKernelGrants) {
+  Scheduled granted = scheduled(0);
+  std::thread([&] {
+    const sched_param wanted{.sched_priority = 1};
+    if (sched_setscheduler(0, SCHED_FIFO, &wanted) == 0) granted.policy = SCHED_FIFO;
+  }).join();
+  if (granted.cpus > 1) granted.cpus = 1;
+  const std::vector<std::string> both{"parcel_cell", "--parcels", "1",
+                                      "--quiet",     "--link",    "test.scheduled." + std::to_string(getpid())};
+  std::vector<std::string> one{"body"},
+      other{"bridge", "--journal", folder_ / "j.db", "--socket", folder_ / "s", "--wait", "60"};
+  one.insert(one.end(), both.begin(), both.end());
+  other.insert(other.begin() + 1, both.begin(), both.end());
+  const Running body(folder_.path(), "body", one), bridge(folder_.path(), "bridge", other);
+  const rt::MonotonicClock clock;
+  rt::PeriodicLoop polls(clock, std::chrono::milliseconds(20));
+  Scheduled loop;
+  polls.run([&](Time now) {
+    if (const auto thread = thread_named("pons_loop", body.pid())) loop = scheduled(*thread);
+    return loop != granted && now < Time(std::chrono::seconds(60));
+  });
+  EXPECT_EQ(loop.policy, granted.policy);
+  EXPECT_EQ(loop.cpus, granted.cpus);
 }
 
 }  // namespace

@@ -41,6 +41,7 @@ class Running {
   // How it ended; code is the signal's number, negated, where one killed it.
   [[nodiscard]] Finished wait();
   [[nodiscard]] std::string err() const;  // so far
+  [[nodiscard]] pid_t pid() const { return child_; }
 
  private:
   std::filesystem::path out_, err_;

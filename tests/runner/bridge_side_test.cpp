@@ -1,0 +1,92 @@
+// What the bridge asks of the belt.
+#include "pons/runner/bridge_side.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <optional>
+
+#include "pons/bridge/test_kit.hpp"
+#include "pons/runner/darkroom.hpp"
+
+namespace pons::runner {
+namespace {
+
+using bridge::at;
+
+world::World load() {
+  auto world = world::load("worlds", "small_cell");
+  EXPECT_TRUE(world) << world.error().line();
+  return std::move(*world);
+}
+
+// A bridge on the journal of one that had armed the arm; no camera shows anything.
+class TakeOverTest : public testing::Test {
+ protected:
+  SkillPort port() {
+    return {.refresh = [](Time, const std::vector<ObjectBelief>&) {},
+            .state = [this]() -> const link::State& { return state_; },
+            .take_forgotten = [] { return std::vector<std::uint32_t>{}; },
+            .arm = [](Time) {},
+            .outside_rad = [] { return 0.0; },
+            .recover = [](Time) { return Expected<void>{}; },
+            .rest = [this](Time) { ++rests_; },
+            .belt = [this](link::Belt belt) { belt_ = belt; },
+            .halt = [] {},
+            .raise_emergency = [] {},
+            .release_emergency = [] {},
+            .carries = [] { return bridge::Json{}; },
+            .restore = [this](const bridge::Json&) { ++restores_; },
+            .resume = {},
+            .settle = [this](Time) { return settled_; }};
+  }
+  void SetUp() override {
+    ASSERT_TRUE(journal_->event("", at(0), "armed", {{"epoch", 1}}));
+    ASSERT_TRUE(journal_->commit());
+  }
+  void tick() {
+    now_ += kBridgePeriod;
+    ASSERT_TRUE(side_.tick(now_, observer_));
+  }
+
+  world::World world_ = load();
+  bridge::TemporaryFolder folder_;
+  std::unique_ptr<bridge::Journal> journal_ = bridge::Journal::open(folder_ / "j.db").value();
+  task::SkillRegistry registry_;
+  bridge::Bridge bridge_{*journal_, registry_, world_};
+  brain::Dispatcher dispatcher_{{}, world_};
+  Darkroom darkroom_{world_};
+  perception::Perception perception_{world_, model::RobotModel::load(world_.robot).value()};
+  Observer observer_{world_, perception_, darkroom_.frames, darkroom_.pages, darkroom_.memory(), Pace::kRealTime};
+  BridgeSide side_{bridge_, dispatcher_, port(), world_.zones, Recovery::kRefused, {}};
+  link::State state_;
+  std::optional<link::Belt> belt_;
+  int rests_ = 0, restores_ = 0;
+  bool settled_ = false;
+  Time now_;
+};
+
+// What stands beside an arm that is brought out must not be pushed against it.
+TEST_F(TakeOverTest, TheBeltWaitsUntilTheArmHasSettled) {
+  ASSERT_TRUE(side_.take_over(*journal_, now_));
+  EXPECT_EQ(restores_, 1);
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kWaits) << "nothing was armed yet";
+  state_.safety = link::SafetyState::kOperational;
+  for (int i = 0; i < 3; ++i) tick();
+  EXPECT_EQ(belt_, link::Belt::kWaits);
+  EXPECT_EQ(rests_, 0) << "nor may it go to its rest";
+  settled_ = true;
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kRuns);
+  EXPECT_EQ(rests_, 1);
+}
+
+TEST_F(TakeOverTest, WithoutAPredecessorTheBeltRuns) {
+  state_.safety = link::SafetyState::kOperational;
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kRuns);
+}
+
+}  // namespace
+}  // namespace pons::runner
