@@ -89,6 +89,7 @@ bool TakeUp::settle(Time now) {
   if (low_m > 0 && rises_++ < kRises) {
     // As far as the arm gets.
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
+    hide_below(0);
   }
   if (rises_ > 0 && !cell_.held && !aside_) {
     aside_ = cell_.step_aside(now);
@@ -122,9 +123,15 @@ bool TakeUp::rise(Time now, double by_m) {
   const auto up = lift(cell_, state, from, orientation, {0, 0, by_m + kBeyond_m}, kRise_m_s2);
   if (!up || !cell_.arm.stream(up->trajectory)) return false;
   cell_.arm.expect_contact(kHandling_n);
-  const double passes_m = tip.translation().z() - load_height_m() - kOver_m - cell_.world.belt.surface_z_m;
-  if (passes_m > 0) cell_.hides(kHidden_m, std::min(kTall_m, passes_m));
+  hide_below(by_m + kBeyond_m);
   return true;
+}
+
+// What an arm that is so much higher by then passes over.
+void TakeUp::hide_below(double higher_m) {
+  const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() + higher_m;
+  const double passes_m = tip_z - load_height_m() - kOver_m - cell_.world.belt.surface_z_m;
+  if (passes_m > 0) cell_.hides(kHidden_m, std::min(kTall_m, passes_m));
 }
 
 double TakeUp::load_height_m() const { return cell_.held ? cell_.held->load.size_m.z() : 0; }

@@ -42,6 +42,7 @@ class TakeUp {
   [[nodiscard]] double too_low_m() const;
   [[nodiscard]] double load_height_m() const;
   [[nodiscard]] bool rise(Time now, double by_m);
+  void hide_below(double higher_m);
 
   Cell& cell_;
   std::string carried_;  // the code that was written down, whether still held or not

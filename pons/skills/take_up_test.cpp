@@ -158,6 +158,19 @@ TEST_F(SettleTest, WhatStandsHighOnlyLooksAround) {
   EXPECT_TRUE(cell_.objects().empty());
 }
 
+// As wide and high as it is, the load would meet the arm itself.
+TEST_F(SettleTest, WhatCannotRiseHidesWhatItPassesOver) {
+  began_ = {0.1, -0.1, 1.5};
+  stands(began_);
+  cell_.held = Held{"P1", {.size_m = {0.4, 0.4, 0.3}}, 1.25};
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_LT(ticks, 500);
+  EXPECT_LT((tip_now() - began_).norm(), 1e-6);
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  EXPECT_NEAR(cell_.objects().front().size_m.z(), 1.5 - 0.3 - 0.06 - world_.belt.surface_z_m, 1e-6);
+}
+
 TEST_F(SettleTest, WithNothingHeldNothingIsHiddenAfterwards) {
   stands(began_);
   for (int i = 0; i < 20; ++i) EXPECT_FALSE(tick());
