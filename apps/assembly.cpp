@@ -173,7 +173,8 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
 }
 
 runner::SkillPort BridgeHalf::skill_port() {
-  return {.refresh = [this](Time now, std::vector<ObjectBelief> objects) { cell->refresh(now, std::move(objects)); },
+  return {.refresh = [this](Time now, std::vector<ObjectBelief> objects,
+                            Time seen) { cell->refresh(now, std::move(objects), seen); },
           .state = [this]() -> const link::State& { return cell->arm.state(); },
           .take_forgotten = [this] { return cell->take_forgotten(); },
           .arm = [this](Time now) { cell->arm.arm(now); },

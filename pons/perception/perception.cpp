@@ -34,7 +34,7 @@ struct Perception::Impl {
   std::map<std::string, TopViewer, std::less<>> viewers;  // by camera
   std::map<std::string, TrayWatch, std::less<>> watches;  // by place
   std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
-  std::vector<ObjectBelief> coming;                       // relative to the belt
+  std::vector<ObjectBelief> cut;                          // relative to the belt
 
   Impl(const world::World& the_world, model::RobotModel model, Both the_both)
       : world(the_world), both(std::move(the_both)), self_filter(std::move(model)), tracker(the_world) {
@@ -46,7 +46,8 @@ struct Perception::Impl {
 
   [[nodiscard]] std::vector<LabelMark> marks(const TopView& view, double belt_travel_m);
   [[nodiscard]] std::vector<cv::RotatedRect> known(const TopView& view, Time now, double belt_travel_m) const;
-  [[nodiscard]] ObjectBelief half_seen(const Sighting& sighting, double belt_travel_m) const;
+  enum class Seen : std::uint8_t { kFront, kBack };
+  [[nodiscard]] ObjectBelief half_seen(const Sighting& sighting, Seen seen, double belt_travel_m) const;
   void see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment);
   void read_labels(const RgbdFrame& frame, const TopView& view, const Segments& segments,
                    const std::vector<Sighting>& sightings, const std::vector<std::uint32_t>& tracks,
@@ -90,26 +91,26 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
       segmenter.segment(view, marks(view, moment.belt_travel_m), known(view, frame.stamp, moment.belt_travel_m));
   const std::vector<Sighting> sightings = measure(view, segments);
   const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
-  coming.clear();
+  cut.clear();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (!sightings[i].at_border || tracks[i] != 0) continue;
-    if (sightings[i].world_from_top.translation().x() < view.camera_m.x()) {
-      coming.push_back(half_seen(sightings[i], moment.belt_travel_m));
-    }
+    const bool comes = sightings[i].world_from_top.translation().x() < view.camera_m.x();
+    cut.push_back(half_seen(sightings[i], comes ? Seen::kFront : Seen::kBack, moment.belt_travel_m));
   }
   if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks, moment.belt_travel_m);
 }
 
-ObjectBelief Perception::Impl::half_seen(const Sighting& sighting, double belt_travel_m) const {
+ObjectBelief Perception::Impl::half_seen(const Sighting& sighting, Seen seen, double belt_travel_m) const {
   const double c = std::abs(std::cos(sighting.yaw_rad)), s = std::abs(std::sin(sighting.yaw_rad));
   const Vector3& size = sighting.size_m;
   const double along_m = c * size.x() + s * size.y(), across_m = s * size.x() + c * size.y();
   ObjectBelief belief;
   belief.size_m = {world.rules.max_size_m, across_m, size.z() + 0.5 * along_m * std::sin(sighting.tilt_rad)};
   const Vector3 middle = sighting.world_from_top.translation();
-  const double front_m = middle.x() + 0.5 * along_m;
-  belief.world_from_top.translation() = Vector3(front_m - 0.5 * belief.size_m.x() - belt_travel_m, middle.y(),
-                                                world.belt.surface_z_m + belief.size_m.z());
+  const double longer_m = 0.5 * (belief.size_m.x() - along_m);  // than what shows, and beyond the border
+  const double x_m = middle.x() + (seen == Seen::kFront ? -longer_m : longer_m);
+  belief.world_from_top.translation() =
+      Vector3(x_m - belt_travel_m, middle.y(), world.belt.surface_z_m + belief.size_m.z());
   belief.velocity_m_s.x() = world.belt.speed_m_s;
   return belief;
 }
@@ -160,8 +161,8 @@ std::vector<ObjectBelief> Perception::beliefs(Time now, double belt_travel_m) co
   return impl_->tracker.beliefs(now, belt_travel_m);
 }
 
-std::vector<ObjectBelief> Perception::coming(Time now, double belt_travel_m) const {
-  std::vector<ObjectBelief> beliefs = impl_->coming;
+std::vector<ObjectBelief> Perception::cut(Time now, double belt_travel_m) const {
+  std::vector<ObjectBelief> beliefs = impl_->cut;
   for (ObjectBelief& belief : beliefs) {
     belief.stamp = belief.last_seen = now;
     belief.world_from_top.translation().x() += belt_travel_m;

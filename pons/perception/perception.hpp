@@ -35,9 +35,9 @@ class Perception {
   // most 0.3 while the object is partly hidden or something lies or leans on it: take what hides it first.
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
 
-  // What the newest frame of the belt cut at its upstream border and no track knows: how long it is cannot be told, so
-  // it is as long as any parcel, along x. Only an obstacle: no track, no label.
-  [[nodiscard]] std::vector<ObjectBelief> coming(Time now, double belt_travel_m) const;
+  // What the newest frame of the belt cut at its border, upstream or downstream, and no track knows: how long it is
+  // cannot be told, so it is as long as any parcel, along x. Only an obstacle: no track, no label.
+  [[nodiscard]] std::vector<ObjectBelief> cut(Time now, double belt_travel_m) const;
 
   // Whether a frame of a camera that reads labels could teach anything: the newest frame showed something whole and
   // bare whose code was read less than twice, in fewer than ten attempts, or that seems too large for one parcel.

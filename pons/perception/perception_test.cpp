@@ -182,7 +182,7 @@ TEST(PerceptionTest, WhatComesIntoViewIsAnObstacleBeforeItIsAnObject) {
     eyes.belt.wait(0.06);
     eyes.belt.show(eyes.perception, "overhead");
     const double front_m = eyes.belt.things[0].top(eyes.belt.travel_m).x() + 0.5 * size_m.x();
-    const auto coming = eyes.perception.coming(eyes.belt.now, eyes.belt.travel_m);
+    const auto coming = eyes.perception.cut(eyes.belt.now, eyes.belt.travel_m);
     if (!eyes.beliefs().empty()) {
       EXPECT_TRUE(coming.empty()) << "it is an object now";
       ++whole;
@@ -200,6 +200,29 @@ TEST(PerceptionTest, WhatComesIntoViewIsAnObstacleBeforeItIsAnObject) {
   }
   EXPECT_GE(half, 5);
   EXPECT_GE(whole, 5);
+}
+
+// Of what no track knows: its back, and as far on as it may reach.
+TEST(PerceptionTest, WhatLeavesTheViewAndWasNeverSeenWholeIsAnObstacle) {
+  const Vector3 size_m(0.30, 0.24, 0.20);
+  int cut_off = 0;
+  for (double x_m = 0.0; x_m < 0.3; x_m += 0.02) {
+    Eyes eyes;
+    eyes.belt.things = {{.x_m = x_m, .y_m = 0.02, .size_m = size_m}};
+    eyes.belt.wait(0.06);
+    eyes.belt.show(eyes.perception, "overhead");
+    const double back_m = eyes.belt.things[0].top(eyes.belt.travel_m).x() - 0.5 * size_m.x();
+    const auto cut = eyes.perception.cut(eyes.belt.now, eyes.belt.travel_m);
+    if (cut.empty()) continue;
+    ++cut_off;
+    EXPECT_TRUE(eyes.beliefs().empty());
+    ASSERT_EQ(cut.size(), 1U);
+    const Vector3 top = cut[0].world_from_top.translation();
+    EXPECT_NEAR(top.z(), eyes.belt.world.belt.surface_z_m + size_m.z(), 0.01);
+    EXPECT_NEAR(top.x() - 0.5 * cut[0].size_m.x(), back_m, 0.02);
+    EXPECT_GT(top.x() + 0.5 * cut[0].size_m.x(), back_m + size_m.x() - 0.01) << "all of it";
+  }
+  EXPECT_GE(cut_off, 5);
 }
 
 TEST(PerceptionTest, MeasuresATubeOnItsRidge) {

@@ -124,11 +124,13 @@ TEST(MakeRealtime, SaysWhatWouldHelpWhoAsks) {
   munlockall();
 }
 
-// Runs it on a stack that nobody has touched. ThreadSanitizer keeps the better part of a MiB of its own on each thread's.
+// Runs it on a stack that nobody has touched. ThreadSanitizer keeps the better part of a MiB of its own on each
+// thread's.
 void on_a_fresh_stack(std::function<void()> run) {
   constexpr std::size_t kBytes = 8UL * 1024 * 1024;
   void* const stack = mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   ASSERT_NE(stack, MAP_FAILED);
+  madvise(stack, kBytes, MADV_NOHUGEPAGE);  // one touch would bring in all of it
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   pthread_attr_setstack(&attributes, stack, kBytes);

@@ -38,7 +38,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
     if (event.kind == "person") arming_.recall(event.detail.value("asks", std::string{}));
     if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
-  skills_.refresh(now, {});
+  skills_.refresh(now, {}, seen_.stamp);
   arming_.take_over(now, armed_before);
   skills_.restore(carried_);
   return bridge_.recover(skills_.resume, now);
@@ -50,13 +50,12 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   const double belt_travel_m = skills_.state().belt_travel_m;
   const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
   std::vector<ObjectBelief> obstacles = objects;
-  std::ranges::copy(predicted(seen_.coming, now, belt_travel_m), std::back_inserter(obstacles));
-  skills_.refresh(now, std::move(obstacles));
+  std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
+  skills_.refresh(now, std::move(obstacles), seen_.stamp);
   if (auto good = arming_.tick(now); !good) return good;
-  if (stopping_)
-    skills_.belt(link::Belt::kRuns);
-  else
-    ask_brain(objects, now);
+  const bool belt_waits = !stopping_ && ask_brain(objects, now);
+  // What stands beside an arm that is being brought out must not be pushed against it.
+  skills_.belt(belt_waits || arming_.settles() ? link::Belt::kWaits : link::Belt::kRuns);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
@@ -97,7 +96,7 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
   return objects;
 }
 
-void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
+bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   const brain::Decisions decisions = dispatcher_.observe(objects, now);
   for (const Json& task : decisions.tasks) {
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
@@ -107,12 +106,11 @@ void BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
-  // What stands beside an arm that is being brought out must not be pushed against it.
-  skills_.belt(decisions.belt_waits || arming_.settles() ? link::Belt::kWaits : link::Belt::kRuns);
   for (const brain::Ride& ride : decisions.rides) {
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now);
   }
+  return decisions.belt_waits;
 }
 
 // Durable at once: a bridge that comes after this one must know what hangs there.

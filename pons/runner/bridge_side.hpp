@@ -48,7 +48,8 @@ class BridgeSide {
   void take_in(const Snapshot& snapshot, Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                     double belt_travel_m) const;
-  void ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  // Whether the belt shall wait for what was asked for.
+  bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
   void note_carried(Time now);
 
   bridge::Bridge& bridge_;

@@ -63,7 +63,7 @@ Snapshot Observer::take_in(std::size_t camera) {
                     shot.stamp + latency(camera),
                     shot.belt_travel_m,
                     perception_.beliefs(shot.stamp, shot.belt_travel_m),
-                    perception_.coming(shot.stamp, shot.belt_travel_m),
+                    perception_.cut(shot.stamp, shot.belt_travel_m),
                     {},
                     perception_.wants_labels()};
   for (const world::CameraSpec& watching : world_.cameras) {

@@ -23,12 +23,12 @@ namespace pons::runner {
 
 // What perception believed once a frame was taken in.
 struct Snapshot {
-  Time stamp;                                 // of the frame
-  Time due;                                   // stamp plus the camera's latency
-  double belt_travel_m = 0;                   // at the stamp
-  std::vector<ObjectBelief> objects, coming;  // Perception::beliefs(), coming()
-  std::map<std::string, int> occupancy;       // of watched places
-  bool wants_labels = false;                  // Perception::wants_labels()
+  Time stamp;                              // of the frame
+  Time due;                                // stamp plus the camera's latency
+  double belt_travel_m = 0;                // at the stamp
+  std::vector<ObjectBelief> objects, cut;  // Perception::beliefs(), cut()
+  std::map<std::string, int> occupancy;    // of watched places
+  bool wants_labels = false;               // Perception::wants_labels()
 };
 
 class Observer {

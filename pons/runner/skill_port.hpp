@@ -14,8 +14,9 @@
 namespace pons::runner {
 
 struct SkillPort {
-  // Before any skill is ticked: the beliefs, and after them what is only an obstacle.
-  std::function<void(Time, std::vector<ObjectBelief>)> refresh;
+  // Before any skill is ticked: the beliefs, and after them what is only an obstacle; and when the last frame was taken
+  // that they come from.
+  std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
   std::function<void(Time)> arm;                               // one step out of a stop, towards operational
@@ -28,6 +29,7 @@ struct SkillPort {
   std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is
   // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
   // begun; and, each tick once the arm is armed, brings it to where others may move it from: true when that is done.
+  // What that bridge alone had seen counts as an obstacle from restore() on.
   std::function<void(const bridge::Json&)> restore;
   bridge::Resume resume;
   std::function<bool(Time)> settle;

@@ -41,10 +41,13 @@ constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
 constexpr double kBeltSmoothing_s = 0.15;
 
-double view_end_m(const world::World& world) {
-  double end_m = world.belt.x_start_m;
+// Of what stands so high on the belt; none where no camera watches it.
+std::optional<double> view_end_m(const world::World& world, double height_m) {
+  world::Belt raised = world.belt;
+  raised.surface_z_m += height_m;
+  std::optional<double> end_m;
   for (const world::CameraSpec& camera : world.cameras) {
-    if (const auto seen = world::seen_of_belt(camera, world.belt)) end_m = std::max(end_m, seen->to_m);
+    if (const auto seen = world::seen_of_belt(camera, raised)) end_m = std::max(end_m.value_or(seen->to_m), seen->to_m);
   }
   return end_m;
 }
@@ -64,9 +67,9 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
       arm(link, cell_world, splice_lead),
       model(robot.copy()),
       router(cell_world, std::move(robot)),
-      view_end_m_(view_end_m(cell_world)) {}
+      view_end_m_(view_end_m(cell_world, 0)) {}
 
-void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
+void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen) {
   arm.refresh(now);
   router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
@@ -92,17 +95,29 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects) {
   std::erase_if(left_, [&](const ObjectBelief& o) { return o.world_from_top.translation().x() > world.belt.x_end_m; });
   if (unseen_ && unseen_->from_m >= world.belt.x_end_m) unseen_.reset();
   now_ = now;
+  seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
+  add_unseen();
+}
+
+// What no camera shows, to what is believed.
+void Cell::add_unseen() {
+  if (hidden_) {
+    const Vector3 tip = model.world_from_tip(arm.state().position).translation();
+    const Vector3 off = (tip - hidden_->world_from_top.translation()).cwiseAbs();
+    if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * hidden_->size_m.y()) hidden_.reset();
+  }
+  if (unseen_) {
+    for (const ObjectBelief& object : objects_) {
+      const double middle_m = object.world_from_top.translation().x(), half_m = 0.5 * object.size_m.x();
+      const bool is_cut = object.track == 0 && !in_view(middle_m + half_m);
+      if (is_cut) unseen_->from_m = std::min(unseen_->from_m, middle_m - half_m);
+    }
+    const double height_m = hidden_ ? std::min(unseen_->height_m, hidden_->size_m.z()) : unseen_->height_m;
+    objects_.push_back(across_belt(unseen_->from_m, world.belt.x_end_m, world.belt.width_m, height_m));
+  }
+  if (hidden_) objects_.push_back(*hidden_);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
-  if (unseen_)
-    objects_.push_back(across_belt(unseen_->from_m, world.belt.x_end_m, world.belt.width_m, unseen_->height_m));
-  if (!hidden_) return;
-  const Vector3 tip = model.world_from_tip(arm.state().position).translation();
-  const Vector3 off = (tip - hidden_->world_from_top.translation()).cwiseAbs();
-  if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * hidden_->size_m.y())
-    hidden_.reset();
-  else
-    objects_.push_back(*hidden_);
 }
 
 void Cell::weighs(double mass_kg) {
@@ -129,10 +144,11 @@ void Cell::hides(double reach_m, double height_m) {
   const double tip_x = model.world_from_tip(arm.state().position).translation().x();
   hidden_ = across_belt(tip_x - reach_m, tip_x + reach_m, kHiddenShare * world.belt.width_m, height_m);
   objects_.push_back(*hidden_);
-  if (unseen_) unseen_->height_m = std::min(unseen_->height_m, height_m);
 }
 
-void Cell::unseen_end(double height_m) { unseen_ = {view_end_m_, height_m}; }
+void Cell::unseen_end(double height_m) {
+  if (const auto end_m = view_end_m(world, height_m)) unseen_ = {*end_m, height_m};
+}
 
 // Of the middle of the belt, riding with it.
 ObjectBelief Cell::across_belt(double from_m, double to_m, double width_m, double height_m) const {

@@ -39,8 +39,12 @@ class Cell {
   // `link` and `world` must outlive it. `splice_lead`: see Arm.
   Cell(link::BridgeEnd& link, const world::World& world, model::RobotModel model, Duration splice_lead = kSpliceLead);
 
-  // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`.
-  void refresh(Time now, std::vector<ObjectBelief> objects);
+  // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`, and when the last frame was
+  // taken that they come from; none: now.
+  void refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen = {});
+
+  // When that frame was taken; where no camera watches the belt, the last tick.
+  [[nodiscard]] Time seen() const { return seen_; }
 
   // The belief with this label, or nullptr.
   [[nodiscard]] const ObjectBelief* find(std::string_view code) const;
@@ -51,7 +55,7 @@ class Cell {
   [[nodiscard]] double belt_acceleration_m_s2() const { return belt_acceleration_m_s2_; }
 
   // Whether a camera could see it on the belt there.
-  [[nodiscard]] bool in_view(double x_m) const { return x_m < view_end_m_; }
+  [[nodiscard]] bool in_view(double x_m) const { return view_end_m_ && x_m < *view_end_m_; }
 
   // What is held weighs so much: the loop is told. It must know of every load before the arm moves with it, for it
   // takes what it does not know for a collision, or throws the arm up.
@@ -63,13 +67,13 @@ class Cell {
   // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
-  // counts as so high an obstacle, until the tip has left it. What unseen_end() takes for higher counts as so high,
-  // too.
+  // counts as so high an obstacle, until the tip has left it; so long unseen_end() counts as no higher, either, or it
+  // would hold the arm.
   void hides(double reach_m, double height_m);
   // Nothing counts as hidden any longer.
   void hides_nothing() { hidden_.reset(); }
-  // What rides beyond the cameras' view now, nobody has seen: it counts as so high an obstacle until it has ridden off
-  // the end.
+  // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
+  // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
@@ -118,10 +122,11 @@ class Cell {
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
+  void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
 
-  double view_end_m_;
-  Time now_, looked_at_;
+  std::optional<double> view_end_m_;  // on the belt; none: no camera watches it
+  Time now_, seen_, looked_at_;
   [[nodiscard]] double gain_m(double ahead_s) const;
 
   double belt_acceleration_m_s2_ = 0;

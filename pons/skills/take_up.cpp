@@ -20,7 +20,7 @@ constexpr double kRise_m_s2 = 3.0;
 constexpr int kRises = 3;                                      // after stops, too
 constexpr Duration kStopped = std::chrono::milliseconds(100);  // between two calls: the arm was stopped
 constexpr Duration kInstant = std::chrono::milliseconds(1);
-constexpr Duration kLook = std::chrono::milliseconds(700);
+constexpr Duration kLook = std::chrono::milliseconds(500);  // two frames
 
 Json of(const Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -84,30 +84,36 @@ bool TakeUp::settle(Time now) {
     if (!cell_.arm.cups().open && now < looks_until_) return false;
     if (rises_ == 0 && !aside_) cell_.holds_nothing();
   }
+  hide_below();
   if (now < cell_.arm.motion_end()) return false;
   const double low_m = too_low_m();
   if (low_m > 0 && rises_++ < kRises) {
     // As far as the arm gets.
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
-    hide_below(0);
   }
-  if (rises_ > 0 && !cell_.held && !aside_) {
+  if (!cell_.held && !aside_) {
     aside_ = cell_.step_aside(now);
     if (aside_) looks_until_ = cell_.arm.motion_end() + kLook;
   }
-  if (now < looks_until_) return false;
+  if (cell_.seen() < looks_until_) return false;
   cell_.arm.expect_contact(0);
-  if (!cell_.held) cell_.hides_nothing();
+  if (!cell_.held && aside_) cell_.hides_nothing();
   return true;
+}
+
+// Arm or load are over it, or overhang it.
+bool TakeUp::is_over_belt() const {
+  const world::Belt& belt = cell_.world.belt;
+  const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+  const double reach_m = cell_.held ? 0.5 * cell_.held->load.size_m.head<2>().norm() : 0;
+  return std::abs(tip.y() - belt.y_center_m) < 0.5 * belt.width_m + reach_m && tip.x() > belt.x_start_m - reach_m &&
+         tip.x() < belt.x_end_m + reach_m;
 }
 
 // By how much the load, or else the tip, stands below what may stand on the belt beside it.
 double TakeUp::too_low_m() const {
-  const world::Belt& belt = cell_.world.belt;
-  const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-  const bool over_belt =
-      std::abs(tip.y() - belt.y_center_m) < 0.5 * belt.width_m && tip.x() > belt.x_start_m && tip.x() < belt.x_end_m;
-  return over_belt ? belt.surface_z_m + kTall_m + kOver_m + load_height_m() - tip.z() : 0;
+  const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
+  return is_over_belt() ? cell_.world.belt.surface_z_m + kTall_m + kOver_m + load_height_m() - tip_z : 0;
 }
 
 bool TakeUp::rise(Time now, double by_m) {
@@ -123,15 +129,14 @@ bool TakeUp::rise(Time now, double by_m) {
   const auto up = lift(cell_, state, from, orientation, {0, 0, by_m + kBeyond_m}, kRise_m_s2);
   if (!up || !cell_.arm.stream(up->trajectory)) return false;
   cell_.arm.expect_contact(kHandling_n);
-  hide_below(by_m + kBeyond_m);
   return true;
 }
 
-// What an arm that is so much higher by then passes over.
-void TakeUp::hide_below(double higher_m) {
-  const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() + higher_m;
+// What arm and load pass over. Lower, it would hold them.
+void TakeUp::hide_below() {
+  const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
   const double passes_m = tip_z - load_height_m() - kOver_m - cell_.world.belt.surface_z_m;
-  if (passes_m > 0) cell_.hides(kHidden_m, std::min(kTall_m, passes_m));
+  if (is_over_belt() && passes_m > 0) cell_.hides(kHidden_m, std::min(kTall_m, passes_m));
 }
 
 double TakeUp::load_height_m() const { return cell_.held ? cell_.held->load.size_m.z() : 0; }

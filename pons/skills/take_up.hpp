@@ -19,7 +19,8 @@ class TakeUp {
   // "offset_m":[…]}, as in Held; null when nothing is.
   [[nodiscard]] task::Json carries() const;
 
-  // After refresh(): believes what was written last, as far as the cups still hold something.
+  // After refresh(): believes what was written last, as far as the cups still hold something. What only the bridge that
+  // wrote it had seen, beyond the cameras' view, is an obstacle from now on.
   void restore(const task::Json& carried);
 
   enum class Fate : std::uint8_t {
@@ -34,15 +35,16 @@ class TakeUp {
   // Each tick once the arm is armed again, until it is true: only then may anything else move it. Lets go of what the
   // cups hold and nobody knows. An arm that stands low over the belt goes straight up first, for this bridge has not
   // seen yet what stands beside the load, and under the arm no camera does; with the cups empty it then steps aside.
-  // The cameras get a moment.
+  // Then the cameras have looked.
   [[nodiscard]] bool settle(Time now);
 
  private:
   [[nodiscard]] bool is_over(const std::string& place) const;
+  [[nodiscard]] bool is_over_belt() const;
   [[nodiscard]] double too_low_m() const;
   [[nodiscard]] double load_height_m() const;
   [[nodiscard]] bool rise(Time now, double by_m);
-  void hide_below(double higher_m);
+  void hide_below();
 
   Cell& cell_;
   std::string carried_;  // the code that was written down, whether still held or not

@@ -153,9 +153,41 @@ TEST_F(SettleTest, WhatStandsHighOnlyLooksAround) {
   cell_.held = held_;
   int ticks = 0;
   while (!tick() && ticks < 500) ++ticks;
-  EXPECT_NEAR(ticks, 70, 1);
+  EXPECT_NEAR(ticks, 50, 1);
   EXPECT_LT((tip_now() - began_).norm(), 1e-6);
+  ASSERT_EQ(cell_.objects().size(), 1U) << "what the arm hides";
+  EXPECT_EQ(cell_.objects().front().size_m.z(), 0.30);
+}
+
+TEST_F(SettleTest, AWideLoadThatOverhangsTheBeltRisesToo) {
+  began_ = {0.1, 0.5 * world_.belt.width_m + 0.1, 1.05};
+  stands(began_);
+  cell_.held = held_;
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_GT(tip_now().z() - held_.load.size_m.z(), world_.belt.surface_z_m + 0.32);
+}
+
+// It takes the cameras' view of the belt from beside it, too.
+TEST_F(SettleTest, AnEmptyArmStepsAsideWhereverItStands) {
+  began_ = {-0.2, 0.46, 1.2};
+  opened_ = true;
+  stands(began_);
+  int ticks = 0;
+  while (!tick() && ticks < 500) ++ticks;
+  EXPECT_LT(ticks, 300);
+  EXPECT_NEAR(tip_now().x(), world_.belt.pick_x_max_m, 0.01);
   EXPECT_TRUE(cell_.objects().empty());
+}
+
+TEST_F(SettleTest, WaitsForFramesThatWereTakenMeanwhile) {
+  stands({0.1, 0.05, 1.5});
+  cell_.held = held_;
+  blind_since_ = now_ + from_s(0.3);
+  for (int i = 0; i < 500; ++i) ASSERT_FALSE(tick());
+  blind_since_.reset();
+  tick();
+  EXPECT_TRUE(tick());
 }
 
 // As wide and high as it is, the load would meet the arm itself.

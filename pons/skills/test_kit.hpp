@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -35,7 +36,7 @@ class ObedientArmTest : public testing::Test {
   void pass() {
     now_ += from_s(0.01);
     publish(cell_.arm.planned(now_));
-    cell_.refresh(now_, {});
+    cell_.refresh(now_, seen_, blind_since_);
   }
   [[nodiscard]] Vector3 tip_now() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
 
@@ -47,6 +48,8 @@ class ObedientArmTest : public testing::Test {
   const Held held_{"P1", {{0.3, 0.2, 0.1}, 0.7, {0.01, -0.02, 0}}, 1.25};
   bool opened_ = false;
   double belt_m_s_ = 0;
+  std::vector<ObjectBelief> seen_;
+  std::optional<Time> blind_since_;
 
  private:
   void publish(const AxisState& at) {

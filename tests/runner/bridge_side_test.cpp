@@ -24,7 +24,7 @@ world::World load() {
 class TakeOverTest : public testing::Test {
  protected:
   SkillPort port() {
-    return {.refresh = [](Time, const std::vector<ObjectBelief>&) {},
+    return {.refresh = [](Time, const std::vector<ObjectBelief>&, Time) {},
             .state = [this]() -> const link::State& { return state_; },
             .take_forgotten = [] { return std::vector<std::uint32_t>{}; },
             .arm = [](Time) {},
@@ -80,6 +80,17 @@ TEST_F(TakeOverTest, TheBeltWaitsUntilTheArmHasSettled) {
   tick();
   EXPECT_EQ(belt_, link::Belt::kRuns);
   EXPECT_EQ(rests_, 1);
+}
+
+TEST_F(TakeOverTest, NorDoesABridgeThatIsToldToStopLetItRun) {
+  ASSERT_TRUE(side_.take_over(*journal_, now_));
+  side_.stop(now_, "asked to");
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kWaits);
+  state_.safety = link::SafetyState::kOperational;
+  settled_ = true;
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kRuns);
 }
 
 TEST_F(TakeOverTest, WithoutAPredecessorTheBeltRuns) {
