@@ -95,6 +95,7 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (!sightings[i].at_border || tracks[i] != 0) continue;
     const bool comes = sightings[i].world_from_top.translation().x() < view.camera_m.x();
+    if (!comes && sightings[i].near_robot) continue;  // that may be what it carries
     cut.push_back(half_seen(sightings[i], comes ? Seen::kFront : Seen::kBack, moment.belt_travel_m));
   }
   if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks, moment.belt_travel_m);
