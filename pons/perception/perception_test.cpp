@@ -402,13 +402,16 @@ TEST(PerceptionTest, DoesNotBringBackWhatWasTakenFromFramesStillUnderWay) {
 // The arm's capsules in front of a parcel, and a parcel in its hand.
 class WithArm : public ::testing::Test {
  protected:
-  WithArm() : arm_(model::RobotModel::load(eyes_.belt.world.robot).value()) {
+  WithArm() : arm_(model::RobotModel::load(eyes_.belt.world.robot).value()) { reach(-0.3); }
+  // Over the belt at `x_m`.
+  void reach(double x_m) {
     Pose tip = Pose::Identity();
     tip.linear() = Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()).toRotationMatrix();
-    tip.translation() = Vector3(-0.3, 0.05, 1.2);
+    tip.translation() = Vector3(x_m, 0.05, 1.2);
     joints_ = arm_.inverse(tip, eyes_.belt.world.robot.home).value();
     std::vector<model::PlacedCapsule> capsules;
     arm_.place_capsules(joints_, capsules);
+    robot_.clear();
     for (const auto& capsule : capsules) {
       // Balls along each capsule stand for what the camera sees of the arm.
       for (int i = 0; i <= 16; ++i) {
@@ -455,6 +458,16 @@ TEST_F(WithArm, DoesNotTakeAHeldParcelForOneOnTheBelt) {
   const Thing held{.x_m = -0.3, .y_m = 0.05, .size_m = {0.3, 0.25, 0.1}, .base_m = 0.2, .fixed = true};
   show({held}, 5);
   EXPECT_TRUE(eyes_.beliefs().empty());
+}
+
+TEST_F(WithArm, WhatItCarriesOutOfTheViewIsNoObstacle) {
+  const Thing held{.x_m = 0.08, .y_m = 0.05, .size_m = {0.3, 0.25, 0.1}, .base_m = 0.2, .fixed = true};
+  const auto cut = [&] { return eyes_.perception.cut(eyes_.belt.now, eyes_.belt.travel_m); };
+  show({held}, 3);
+  EXPECT_FALSE(cut().empty()) << "the border cuts it, and the arm is elsewhere";
+  reach(0.08);
+  show({held}, 3);
+  EXPECT_TRUE(cut().empty());
 }
 
 TEST(PerceptionTest, StandsFiveTimesTheDropouts) {
