@@ -215,10 +215,8 @@ TEST(PerceptionTest, WhatLeavesTheViewAndWasNeverSeenWholeIsAnObstacle) {
     const auto cut = eyes.perception.cut(eyes.belt.now, eyes.belt.travel_m);
     if (cut.empty()) continue;
     ++cut_off;
-    EXPECT_TRUE(eyes.beliefs().empty());
     ASSERT_EQ(cut.size(), 1U);
     const Vector3 top = cut[0].world_from_top.translation();
-    EXPECT_NEAR(top.z(), eyes.belt.world.belt.surface_z_m + size_m.z(), 0.01);
     EXPECT_NEAR(top.x() - 0.5 * cut[0].size_m.x(), back_m, 0.02);
     EXPECT_GT(top.x() + 0.5 * cut[0].size_m.x(), back_m + size_m.x() - 0.01) << "all of it";
   }
@@ -462,7 +460,8 @@ TEST_F(WithArm, DoesNotTakeAHeldParcelForOneOnTheBelt) {
 
 TEST_F(WithArm, WhatItCarriesOutOfTheViewIsNoObstacle) {
   const Thing held{.x_m = 0.08, .y_m = 0.05, .size_m = {0.3, 0.25, 0.1}, .base_m = 0.2, .fixed = true};
-  const auto cut = [&] { return eyes_.perception.cut(eyes_.belt.now, eyes_.belt.travel_m); };
+  const auto cut = [this] { return eyes_.perception.cut(eyes_.belt.now, eyes_.belt.travel_m); };
+  reach(-0.5);
   show({held}, 3);
   EXPECT_FALSE(cut().empty()) << "the border cuts it, and the arm is elsewhere";
   reach(0.08);
