@@ -16,11 +16,18 @@
 #include "pons/perception/top_view.hpp"
 #include "pons/perception/tracker.hpp"
 #include "pons/perception/tray_watch.hpp"
+#include "pons/world/view.hpp"
 
 namespace pons::perception {
 namespace {
 
 constexpr double kSeenWell = 0.8;  // confidence: three frames that agree
+constexpr double kAtEnd_m = 0.03;  // from the view's end, or nearer
+
+double along_belt_m(const Sighting& sighting) {
+  return std::abs(std::cos(sighting.yaw_rad)) * sighting.size_m.x() +
+         std::abs(std::sin(sighting.yaw_rad)) * sighting.size_m.y();
+}
 
 }  // namespace
 
@@ -46,6 +53,7 @@ struct Perception::Impl {
 
   [[nodiscard]] std::vector<LabelMark> marks(const TopView& view, double belt_travel_m);
   [[nodiscard]] std::vector<cv::RotatedRect> known(const TopView& view, Time now, double belt_travel_m) const;
+  [[nodiscard]] bool reaches_end(const world::CameraSpec& camera, const Sighting& sighting) const;
   enum class Seen : std::uint8_t { kFront, kBack };
   [[nodiscard]] ObjectBelief half_seen(const Sighting& sighting, Seen seen, double belt_travel_m) const;
   void see_belt(const world::CameraSpec& camera, const RgbdFrame& frame, const Moment& moment);
@@ -95,16 +103,25 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (!sightings[i].at_border || tracks[i] != 0) continue;
     const bool comes = sightings[i].world_from_top.translation().x() < view.camera_m.x();
-    if (!comes && sightings[i].near_robot) continue;  // that may be what it carries
+    // What is near the robot may be what it carries.
+    if (!comes && (sightings[i].near_robot || !reaches_end(camera, sightings[i]))) continue;
     cut.push_back(half_seen(sightings[i], comes ? Seen::kFront : Seen::kBack, moment.belt_travel_m));
   }
   if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks, moment.belt_travel_m);
 }
 
+// Whether it is the view's downstream border that cuts it.
+bool Perception::Impl::reaches_end(const world::CameraSpec& camera, const Sighting& sighting) const {
+  world::Belt raised = world.belt;
+  raised.surface_z_m += sighting.size_m.z();
+  const auto seen = world::seen_of_belt(camera, raised);
+  return seen && sighting.world_from_top.translation().x() + 0.5 * along_belt_m(sighting) > seen->to_m - kAtEnd_m;
+}
+
 ObjectBelief Perception::Impl::half_seen(const Sighting& sighting, Seen seen, double belt_travel_m) const {
   const double c = std::abs(std::cos(sighting.yaw_rad)), s = std::abs(std::sin(sighting.yaw_rad));
   const Vector3& size = sighting.size_m;
-  const double along_m = c * size.x() + s * size.y(), across_m = s * size.x() + c * size.y();
+  const double along_m = along_belt_m(sighting), across_m = s * size.x() + c * size.y();
   ObjectBelief belief;
   belief.size_m = {world.rules.max_size_m, across_m, size.z() + 0.5 * along_m * std::sin(sighting.tilt_rad)};
   const Vector3 middle = sighting.world_from_top.translation();

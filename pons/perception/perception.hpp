@@ -36,7 +36,8 @@ class Perception {
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now, double belt_travel_m) const;
 
   // What the newest frame of the belt cut at its border, upstream or downstream, and no track knows: how long it is
-  // cannot be told, so it is as long as any parcel, along x. Only an obstacle: no track, no label.
+  // cannot be told, so it is as long as any parcel, along x. Only an obstacle: no track, no label. Downstream not what
+  // the robot touches in the picture, for that may be what it carries.
   [[nodiscard]] std::vector<ObjectBelief> cut(Time now, double belt_travel_m) const;
 
   // Whether a frame of a camera that reads labels could teach anything: the newest frame showed something whole and

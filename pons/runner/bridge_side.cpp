@@ -38,7 +38,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
     if (event.kind == "person") arming_.recall(event.detail.value("asks", std::string{}));
     if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
-  skills_.refresh(now, {}, seen_.stamp);
+  skills_.refresh(now, {}, seen_.belt_seen);
   arming_.take_over(now, armed_before);
   skills_.restore(carried_);
   return bridge_.recover(skills_.resume, now);
@@ -51,7 +51,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
   std::vector<ObjectBelief> obstacles = objects;
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
-  skills_.refresh(now, std::move(obstacles), seen_.stamp);
+  skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
   if (auto good = arming_.tick(now); !good) return good;
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What stands beside an arm that is being brought out must not be pushed against it.

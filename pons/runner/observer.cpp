@@ -59,7 +59,9 @@ Snapshot Observer::take_in(std::size_t camera) {
   RgbdFrame& frame = frames_[camera];
   frame.stamp = shot.stamp;
   perception_.process(frame, {shot.joint_position, shot.belt_travel_m});
+  if (world_.cameras[camera].watches == "belt") belt_seen_ = shot.stamp;
   Snapshot snapshot{shot.stamp,
+                    belt_seen_,
                     shot.stamp + latency(camera),
                     shot.belt_travel_m,
                     perception_.beliefs(shot.stamp, shot.belt_travel_m),

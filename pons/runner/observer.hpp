@@ -24,6 +24,7 @@ namespace pons::runner {
 // What perception believed once a frame was taken in.
 struct Snapshot {
   Time stamp;                              // of the frame
+  Time belt_seen;                          // stamp of the newest frame of the belt so far
   Time due;                                // stamp plus the camera's latency
   double belt_travel_m = 0;                // at the stamp
   std::vector<ObjectBelief> objects, cut;  // Perception::beliefs(), cut()
@@ -55,7 +56,8 @@ class Observer {
   perception::Perception& perception_;
   link::Frames& places_;
   Pace pace_;
-  std::vector<RgbdFrame> frames_;  // a camera; the perceiver's only
+  std::vector<RgbdFrame> frames_;  // a camera; the perceiver's only,
+  Time belt_seen_;                 // and so is this
 
   std::mutex mutex_;
   std::deque<Snapshot> snapshots_;                        // taken in, by stamp

@@ -14,8 +14,8 @@
 namespace pons::runner {
 
 struct SkillPort {
-  // Before any skill is ticked: the beliefs, and after them what is only an obstacle; and when the last frame was taken
-  // that they come from.
+  // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
+  // the belt was taken that they come from.
   std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt

@@ -35,7 +35,7 @@ constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
-constexpr double kAside_m = 0.30;     // over the belt
+constexpr double kAside_m = 0.36;     // over the belt, and over what may stand on it
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
@@ -91,13 +91,26 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   };
   std::ranges::for_each(left_, ride);
   if (hidden_) ride(*hidden_);
-  if (unseen_) unseen_->from_m += speed * passed_s;
+  if (unseen_) unseen_->from_m += speed * passed_s, unseen_->rode_m += speed * passed_s;
   std::erase_if(left_, [&](const ObjectBelief& o) { return o.world_from_top.translation().x() > world.belt.x_end_m; });
   if (unseen_ && unseen_->from_m >= world.belt.x_end_m) unseen_.reset();
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
+  take_in_cut();
   add_unseen();
+}
+
+// What the view's downstream border cuts: its track knows more, unless it was never in view as a whole.
+void Cell::take_in_cut() {
+  const auto is_cut = [&](const ObjectBelief& o) {
+    return o.track == 0 && o.world_from_top.translation().x() + 0.5 * o.size_m.x() > view_end_m(world, o.size_m.z());
+  };
+  for (const ObjectBelief& object : objects_) {
+    if (!unseen_ || unseen_->rode_m >= world.rules.max_size_m || !is_cut(object)) continue;
+    unseen_->from_m = std::min(unseen_->from_m, object.world_from_top.translation().x() - 0.5 * object.size_m.x());
+  }
+  std::erase_if(objects_, is_cut);
 }
 
 // What no camera shows, to what is believed.
@@ -108,11 +121,6 @@ void Cell::add_unseen() {
     if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * hidden_->size_m.y()) hidden_.reset();
   }
   if (unseen_) {
-    for (const ObjectBelief& object : objects_) {
-      const double middle_m = object.world_from_top.translation().x(), half_m = 0.5 * object.size_m.x();
-      const bool is_cut = object.track == 0 && !in_view(middle_m + half_m);
-      if (is_cut) unseen_->from_m = std::min(unseen_->from_m, middle_m - half_m);
-    }
     const double height_m = hidden_ ? std::min(unseen_->height_m, hidden_->size_m.z()) : unseen_->height_m;
     objects_.push_back(across_belt(unseen_->from_m, world.belt.x_end_m, world.belt.width_m, height_m));
   }
@@ -147,7 +155,7 @@ void Cell::hides(double reach_m, double height_m) {
 }
 
 void Cell::unseen_end(double height_m) {
-  if (const auto end_m = view_end_m(world, height_m)) unseen_ = {*end_m, height_m};
+  if (const auto end_m = view_end_m(world, height_m)) unseen_ = {.from_m = *end_m, .height_m = height_m};
 }
 
 // Of the middle of the belt, riding with it.

@@ -39,8 +39,8 @@ class Cell {
   // `link` and `world` must outlive it. `splice_lead`: see Arm.
   Cell(link::BridgeEnd& link, const world::World& world, model::RobotModel model, Duration splice_lead = kSpliceLead);
 
-  // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`, and when the last frame was
-  // taken that they come from; none: now.
+  // Once a bridge tick, before any skill: the newest beliefs, already predicted to `now`, and when the newest frame of
+  // the belt was taken that they come from; none: now.
   void refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen = {});
 
   // When that frame was taken; where no camera watches the belt, the last tick.
@@ -122,6 +122,7 @@ class Cell {
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
+  void take_in_cut();
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
 
@@ -136,6 +137,7 @@ class Cell {
   std::optional<ObjectBelief> hidden_;
   struct Unseen {
     double from_m, height_m;  // its hindmost, and over the belt
+    double rode_m = 0;        // since
   };
   std::optional<Unseen> unseen_;
   std::vector<std::uint32_t> forgotten_;

@@ -148,6 +148,12 @@ TEST_F(UnseenEndTest, BeginsWithWhatTheBorderCuts) {
   seen_.clear();
   pass();
   EXPECT_NEAR(unseen_from_m(), -0.1, 1e-9);
+  // What the border cuts after so long a ride was whole in view before.
+  belt_m_s_ = 0.2;
+  for (int i = 0; i < 205; ++i) pass();
+  seen_ = {cut};
+  pass();
+  EXPECT_GT(unseen_from_m(), 0.3);
 }
 
 TEST_F(UnseenEndTest, IsNoHigherThanWhereTheArmPasses) {

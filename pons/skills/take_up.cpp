@@ -17,7 +17,7 @@ constexpr double kOver_m = 0.06;    // over that, the load, which swings
 constexpr double kBeyond_m = 0.01;  // so that a rise is enough
 constexpr double kHidden_m = 0.45;  // along the belt: how far arm and load hide what stands there
 constexpr double kRise_m_s2 = 3.0;
-constexpr int kRises = 3;                                      // after stops, too
+constexpr int kTries = 3;  // to rise, and to step aside: what stops the arm each time may stay there
 constexpr Duration kStopped = std::chrono::milliseconds(100);  // between two calls: the arm was stopped
 constexpr Duration kInstant = std::chrono::milliseconds(1);
 constexpr Duration kLook = std::chrono::milliseconds(500);  // two frames
@@ -82,18 +82,21 @@ bool TakeUp::settle(Time now) {
   if (!cell_.held) {
     if (cell_.arm.state().vacuum_on != 0) cell_.arm.vacuum(false);
     if (!cell_.arm.cups().open && now < looks_until_) return false;
-    if (rises_ == 0 && !aside_) cell_.holds_nothing();
+    if (rises_ == 0 && steps_ == 0) cell_.holds_nothing();
   }
   hide_below();
-  if (now < cell_.arm.motion_end()) return false;
+  if (now < cell_.arm.motion_end()) {
+    looks_until_ = cell_.arm.motion_end() + kLook;
+    return false;
+  }
   const double low_m = too_low_m();
-  if (low_m > 0 && rises_++ < kRises) {
+  if (low_m > 0 && rises_++ < kTries) {
     // As far as the arm gets.
     if (rise(now, low_m) || rise(now, 0.5 * low_m) || rise(now, 0.25 * low_m)) return false;
   }
-  if (!cell_.held && !aside_) {
+  if (!cell_.held && !aside_ && steps_ < kTries) {
     aside_ = cell_.step_aside(now);
-    if (aside_) looks_until_ = cell_.arm.motion_end() + kLook;
+    if (aside_) return ++steps_, false;
   }
   if (cell_.seen() < looks_until_) return false;
   cell_.arm.expect_contact(0);

@@ -50,7 +50,7 @@ class TakeUp {
   std::string carried_;  // the code that was written down, whether still held or not
   std::optional<Time> called_;
   Time looks_until_;
-  int rises_ = 0;
+  int rises_ = 0, steps_ = 0;
   bool aside_ = false;
 };
 

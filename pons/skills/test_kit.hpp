@@ -32,6 +32,14 @@ class ObedientArmTest : public testing::Test {
     publish({*at, still, still});
     cell_.refresh(now_, {});
   }
+  // What it was told is forgotten.
+  void is_stopped_at(const Vector3& tip) {
+    now_ += from_s(1);
+    safety_ = link::SafetyState::kProtectiveStop;
+    stands(tip);
+    safety_ = link::SafetyState::kOperational;
+    stands(tip);
+  }
   // A bridge tick later.
   void pass() {
     now_ += from_s(0.01);
@@ -54,7 +62,7 @@ class ObedientArmTest : public testing::Test {
  private:
   void publish(const AxisState& at) {
     link::State state;
-    state.safety = link::SafetyState::kOperational;
+    state.safety = safety_;
     state.epoch = 1;
     state.stamp = now_;
     state.commanded = at;
@@ -67,6 +75,8 @@ class ObedientArmTest : public testing::Test {
     }
     link::CerebellumEnd(*link_).publish(state);
   }
+
+  link::SafetyState safety_ = link::SafetyState::kOperational;
 };
 
 }  // namespace pons::skills
