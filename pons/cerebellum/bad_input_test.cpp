@@ -238,6 +238,33 @@ TEST(BadTime, AGapInTheTicksStopsTheArmWithoutALeap) {
   EXPECT_TRUE(bench.state().safety == SafetyState::kProtectiveStop || bench.state().cause == StopCause::kNoStandstill);
 }
 
+// Whatever lies between two ticks is seen at the next: a motion that is smooth, and too fast for anybody to see it
+// move.
+TEST(BadCommands, WhatLeapsBetweenTwoTicksIsRefusedAtItsTick) {
+  for (const Duration within : {Duration(1ms), Duration(100us), Duration(3ms)}) {
+    for (const double by : {0.3, 0.002, -0.0005}) {
+      Bench bench;
+      bench.arm();
+      bench.run(10ms);
+      const AxisState before = bench.state().commanded;
+      Segment leap;
+      leap.start = bench.now + 20ms;
+      leap.duration = within;
+      for (Eigen::Index i = 0; i < 6; ++i) leap.coefficients[static_cast<std::size_t>(i)] = {before.position[i]};
+      const double s = to_s(within);
+      leap.coefficients[2] = {before.position[2],     0, 0, 10 * by / (s * s * s), -15 * by / std::pow(s, 4),
+                              6 * by / std::pow(s, 5)};
+      bench.send(motion_command(leap, false));
+      bench.tick();
+      ASSERT_TRUE(bench.operational());
+      run_unharmed(bench, 500ms);
+      EXPECT_EQ(bench.state().cause, StopCause::kLimit) << by << " rad in " << s << " s";
+      EXPECT_LT((bench.state().commanded.position - before.position).cwiseAbs().maxCoeff(), 1e-9);
+      EXPECT_LT((bench.plant.sensors.position - before.position).cwiseAbs().maxCoeff(), 1e-3);
+    }
+  }
+}
+
 // The arm has gone on, and that is no leap: what stopped was the loop.
 TEST(BadTime, AGapOfAnArmThatGoesOnIsNoSilence) {
   Bench bench;
@@ -262,6 +289,31 @@ TEST(BodyWatchdog, WhatTheBodySwitchedOffIsNotFollowedFurther) {
   bench.run(100ms);
   EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
   EXPECT_FALSE(bench.plant.set_points.power) << "power is asked for anew by a person's reset and an arming alone";
+}
+
+// It may trip while an emergency stop brakes, or waits for standstill: that stop is harder then, and can be left.
+TEST(BodyWatchdog, AnEmergencyStopThatItOvertakesIsConfirmedAndLeft) {
+  Bench bench;
+  get_moving(bench);
+  bench.link->raise_emergency_stop();
+  bench.run(20ms);
+  ASSERT_EQ(bench.state().safety, SafetyState::kEmergencyStopping);
+  bench.plant.sensors.watchdog_tripped = true;
+  bench.tick();
+  EXPECT_EQ(bench.state().safety, SafetyState::kEmergencyStop);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kUncertain);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  bench.plant.sensors.watchdog_tripped = false;
+  bench.link->clear_emergency_stop();
+  bench.run(100ms);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  bench.send(plain_command(CommandKind::kReset));
+  bench.run(10ms);
+  bench.arm();
+  std::string told;
+  bench.cerebellum.log().drain([&](Time, std::string_view text) { told += std::string(text) + "\n"; });
+  EXPECT_THAT(told, testing::HasSubstr("power off: body watchdog"));
+  EXPECT_THAT(told, testing::HasSubstr("standstill CONFIRMED, at last"));
 }
 
 struct BadSetting {

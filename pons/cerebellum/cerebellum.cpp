@@ -22,6 +22,13 @@ constexpr double kTooFast = 1.01;
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
 
+// No axis takes longer to brake from that speed.
+double longest_stop_s(const AxisVector& speed, const AxisLimits& limits) {
+  return (speed.cwiseAbs().cwiseQuotient(limits.acceleration_rad_s2) +
+          limits.acceleration_rad_s2.cwiseQuotient(limits.jerk_rad_s3))
+      .maxCoeff();
+}
+
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
   settings.compliance = with_delay(settings.compliance, delay_s);
   return settings;
@@ -171,6 +178,7 @@ void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   if (powered_ && watchdog_tripped_) stop(StopCause::kBodyWatchdog, now);
   watch_zones(now);
   watch_contact(now);
+  watch_springs(now);
   watch_following(now);
 }
 
@@ -186,11 +194,22 @@ void Cerebellum::watch_zones(Time now) {
       continue;
     }
     zone_stops_ = true;
+    state_.zones_entered |= 1U << i;
     if (stop(StopCause::kZone, now)) log_.write(now, "somebody is in zone {}", i + 1);
   }
   if (share < state_.speed_share) slow_since_ = now;
   if (share == 1) slow_since_.reset();
   state_.speed_share = share;
+}
+
+// How fast an arm goes that is held by a spring, what pushes it decides.
+void Cerebellum::watch_springs(Time now) {
+  if (laws_.controller() != Controller::kImpedance || !moves(state_.safety)) return;
+  const double share = measured_speed_.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
+  const bool slowed = slow_since_ && now - *slow_since_ >= settings_.slow_within;
+  const double allowed = slowed ? state_.speed_share : 1;
+  if (share > allowed * kTooFast && stop(slowed ? StopCause::kNotSlowed : StopCause::kLimit, now))
+    log_.write(now, "pushed to {:.1f} % of a speed limit where {:.1f} % are allowed", 100 * share, 100 * allowed);
 }
 
 // The share of a speed limit that `next` takes when a zone allows it no longer; nothing where it does.
@@ -253,7 +272,11 @@ bool Cerebellum::stop(StopCause cause, Time now) {
   const SafetyState before = state_.safety;
   const std::uint32_t epoch = state_.epoch;
   if (!enter(event)) return false;
-  if (is_emergency(before) && state_.epoch == epoch) return true;  // the same stop, only harder
+  if (is_emergency(before) && state_.epoch == epoch) {  // the same stop, only harder
+    state_.stop_result = StopResult::kUncertain;
+    log_.write(now, "power off: {}", name(cause));
+    return true;
+  }
   ++statistics_.stops;
   state_.cause = cause;
   state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
@@ -264,6 +287,11 @@ bool Cerebellum::stop(StopCause cause, Time now) {
     for (Eigen::Index i = 0; i < commanded_.position.size(); ++i)
       longest = std::max(longest, stop_profiles_[static_cast<std::size_t>(i)].duration_s());
     stop_began_ = stepped_;
+    if (laws_.controller() == Controller::kImpedance) {
+      // Where a spring has let it be pushed to, and how fast, no commanded motion says.
+      gives_way_ = true;
+      longest = std::max(longest, longest_stop_s(speed_now_, limits()));
+    }
     stop_ends_ = std::max(now, stop_began_ + from_s(longest));
     queue_.rest(commanded_.position, stop_ends_);
   }
@@ -288,9 +316,9 @@ void Cerebellum::advance(Time now) {
 void Cerebellum::follow(Time now) {
   AxisState next = commanded_;
   double wanted = 1;
-  if (state_.speed_share < 1) {
+  if (const double share = state_.speed_share * laws_.motion_share(); share < 1) {
     const double fastest = queue_.fastest(motion_time_.time(), robot_limits().speed_rad_s);
-    wanted = fastest > state_.speed_share ? state_.speed_share / fastest : 1;
+    wanted = fastest > share ? share / fastest : 1;
   }
   const auto [phase, possible] = motion_time_.step(queue_, limits(), wanted, from_s(dt_s_), next);
   if (!possible) {
@@ -306,7 +334,7 @@ void Cerebellum::follow(Time now) {
       log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * *share, 100 * state_.speed_share);
   } else {
     commanded_ = next;
-    if (state_.safety == SafetyState::kRecovery) narrow();
+    narrow();
   }
 }
 
@@ -315,6 +343,7 @@ void Cerebellum::hold_measured(Time now) {
   laws_.forget();
   laws_.reset();
   commanded_ = before_ = at_rest(measured_position_);
+  widen();
   laws_.rest(commanded_);
   motion::plan_stop(commanded_, limits(),
                     std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
@@ -343,8 +372,9 @@ void Cerebellum::judge_stop(Time now) {
   } else if (at_end && now - stop_ends_ >= settings_.confirm_within) {
     state_.stop_result = StopResult::kUncertain;
   }
-  if (!at_end || state_.stop_result == StopResult::kPending) return;
   const StopResult result = state_.stop_result;
+  if (!at_end && standing) log_.write(now, "standstill {}, at last", name(result));
+  if (!at_end || result == StopResult::kPending) return;
   log_.write(now, "standstill {} {:.0f} ms after the stop began, {:.0f} of them braking", name(result),
              1e3 * to_s(now - stop_began_), 1e3 * to_s(stop_ends_ - stop_began_));
   if (!standing) {
@@ -356,6 +386,7 @@ void Cerebellum::judge_stop(Time now) {
   if (state_.cause == StopCause::kFollowingError) {
     // Something holds the arm off: holding the commanded place would go on pressing.
     commanded_ = at_rest(measured_position_);
+    widen();
     laws_.forget();
     laws_.reset();
     laws_.rest(commanded_);
@@ -377,6 +408,8 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
                               .commanded = commanded_,
                               .felt = wrist_.at_tip(),
                               .dt_s = dt_s_,
+                              .limits = limits(),
+                              .speed_share = state_.speed_share,
                               .presses = state_.safety == SafetyState::kOperational};
   if (is_silent(now))
     laws_.blind(does, torque);
@@ -384,6 +417,7 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
     laws_.yield(does, torque);
   else
     laws_.torques(does, driven_nm_, torque);
+  if (laws_.controller() == Controller::kAdmittance && limit_watch_.beyond(laws_.asked())) ++statistics_.violations;
   const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
   const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
   statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));

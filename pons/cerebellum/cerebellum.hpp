@@ -35,8 +35,8 @@ namespace pons::cerebellum {
   return shares;
 }
 
-// Armed a little outside its limits (by sagging or by hand), the arm is taken to stand on the limit; further out only
-// recovery is possible.
+// So little outside its limits (by sagging or by hand) the arm is armed where it is, and may only come in; further out
+// only recovery is possible.
 inline constexpr double kArmTolerance_rad = 0.01;
 
 struct Settings {
@@ -53,10 +53,10 @@ struct Settings {
   Duration standstill_time = std::chrono::milliseconds(20);     // for so long: standstill
   // After the commanded stop ended: what swings on the cups, or is dragged from under them, moves the arm for a second.
   Duration confirm_within = std::chrono::milliseconds(2000);
-  Duration stall_timeout = std::chrono::milliseconds(20);       // between two steps, while powered
-  RateBounds rate;                                              // of a motion that is slowed for a zone
-  Duration slow_within = std::chrono::milliseconds(500);        // from somebody's coming to the speed that is allowed
-  double recovery_share = 0.1;                                  // of each speed limit, in recovery
+  Duration stall_timeout = std::chrono::milliseconds(20);  // between two steps, while powered
+  RateBounds rate;                                         // of a motion that is slowed for a zone
+  Duration slow_within = std::chrono::milliseconds(500);   // from somebody's coming to the speed that is allowed
+  double recovery_share = 0.1;                             // of each speed limit, in recovery
   // What is allowed of each axis' speed limit while somebody is in zone i: 1 all, 0 a protective stop.
   std::array<double, kMaxZones> zone_speed_share = all_of_it();
   double max_payload_kg = 20;  // a kPayload above is a bad command
@@ -97,8 +97,8 @@ class Cerebellum {
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
   //                    nobody in a zone that stops
-  //   kArm             disarmed, at measured standstill, inside the position limits, word and stop input released; the
-  //                    commanded position becomes the measured one
+  //   kArm             disarmed, at measured standstill, at most kArmTolerance_rad outside the position limits, word
+  //                    and stop input released; the commanded position becomes the measured one
   //   kRecover         likewise, wherever the arm is. Until kReset every axis keeps recovery_share of its speed limit,
   //                    and one outside its position limits goes no further outside than it is
   void step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
@@ -120,6 +120,7 @@ class Cerebellum {
   void watch_zones(Time now);
   [[nodiscard]] std::optional<double> too_fast(const AxisState& next, Time now) const;
   void watch_contact(Time now);
+  void watch_springs(Time now);
   void watch_cups(Time now);
   void take_commands(Time now, link::CerebellumEnd& link);
   [[nodiscard]] bool take(const link::Command& command, Time now);
@@ -131,7 +132,8 @@ class Cerebellum {
   [[nodiscard]] bool reset(Time now);
   [[nodiscard]] bool arm(Time now);
   [[nodiscard]] bool recover(Time now);
-  [[nodiscard]] bool begin(SafetyEvent event, const AxisVector& position, Time now);
+  [[nodiscard]] bool begin(SafetyEvent event, Time now);
+  void widen();
   void narrow();
   // False where the machine has no such transition.
   bool enter(SafetyEvent event);
@@ -157,7 +159,7 @@ class Cerebellum {
   const Duration delay_;  // of the drives
   model::RobotModel model_;
   model::Payload payload_;  // told
-  AxisLimits limits_;       // in force: the robot's, or what recovery makes of them
+  AxisLimits limits_;       // in force: the robot's, or what recovery and an arm outside make of them
   LimitWatch limit_watch_;
   CollisionWatch collision_;
   ControlLaws laws_;

@@ -85,7 +85,7 @@ bool Cerebellum::take_motion(const link::Command& command, Time now) {
 
 bool Cerebellum::take_vacuum(const link::Command& command, Time now) {
   const std::size_t cups = model_.robot().tool.cups_m.size();
-  if (cups < kMaxCups && (command.vacuum_on >> cups) != 0) {
+  if ((command.vacuum_on >> cups) != 0) {
     if (stop(StopCause::kBadCommand, now))
       log_.write(now, "command {}: cups {:#x} where there are {}", command.sequence, command.vacuum_on, cups);
     return false;
@@ -128,7 +128,7 @@ bool Cerebellum::take_control(const link::Command& command, Time now) {
     if (stop(StopCause::kBadCommand, now)) log_.write(now, "command {}, control: {}", command.sequence, wrong);
     return false;
   }
-  if (queue_.end() > stepped_ || !is_at_rest(commanded_)) {
+  if (queue_.end() > motion_time_.time() || !is_at_rest(commanded_)) {
     log_.write(now, "command {}: the law of a moving arm is not changed", command.sequence);
     return false;
   }
@@ -147,7 +147,9 @@ bool Cerebellum::reset(Time now) {
   if (!is_released() || !enter(SafetyEvent::kReset)) return false;
   state_.cause = StopCause::kNone;
   state_.stop_result = StopResult::kNone;
+  state_.zones_entered = 0;
   limits_ = robot_limits();
+  widen();
   queue_.rest(commanded_.position, stepped_);
   log_.write(now, "reset: disarmed");
   return true;
@@ -158,22 +160,19 @@ bool Cerebellum::arm(Time now) {
   const AxisVector inside =
       measured_position_.cwiseMax(robot_limits().position_min).cwiseMin(robot_limits().position_max);
   if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance_rad) return false;
-  if (!begin(SafetyEvent::kArm, inside, now)) return false;
+  if (!begin(SafetyEvent::kArm, now)) return false;
   log_.write(now, "armed in epoch {}", state_.epoch);
   return true;
 }
 
-// Outside its limits the arm may be where it is, and come in from there; narrow() then takes back what it has left.
 bool Cerebellum::recover(Time now) {
-  if (!is_released() || !begin(SafetyEvent::kRecover, measured_position_, now)) return false;
-  limits_.position_min = limits_.position_min.cwiseMin(measured_position_);
-  limits_.position_max = limits_.position_max.cwiseMax(measured_position_);
+  if (!is_released() || !begin(SafetyEvent::kRecover, now)) return false;
   limits_.speed_rad_s *= settings_.recovery_share;
   log_.write(now, "recovery in epoch {}", state_.epoch);
   return true;
 }
 
-bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) {
+bool Cerebellum::begin(SafetyEvent event, Time now) {
   const bool had_power = powered_;
   if (!enter(event)) return false;
   if (!had_power) laws_.forget();
@@ -182,17 +181,25 @@ bool Cerebellum::begin(SafetyEvent event, const AxisVector& position, Time now) 
   laws_.reset();
   state_.belt = link::Belt::kRuns;
   gives_way_ = false;
-  commanded_ = before_ = at_rest(position);
+  commanded_ = before_ = at_rest(measured_position_);
+  widen();
   laws_.rest(commanded_);
-  queue_.rest(position, stepped_);
+  queue_.rest(commanded_.position, stepped_);
   motion_time_.restart(stepped_ + delay_);
   heard_at_ = now;
   return true;
 }
 
-void Cerebellum::narrow() {
+// Outside its limits the arm may be where it is, and come in from there.
+void Cerebellum::widen() {
   limits_.position_min = robot_limits().position_min.cwiseMin(commanded_.position);
   limits_.position_max = robot_limits().position_max.cwiseMax(commanded_.position);
+}
+
+// What it has left is taken back.
+void Cerebellum::narrow() {
+  limits_.position_min = robot_limits().position_min.cwiseMin(commanded_.position.cwiseMax(limits_.position_min));
+  limits_.position_max = robot_limits().position_max.cwiseMax(commanded_.position.cwiseMin(limits_.position_max));
 }
 
 }  // namespace pons::cerebellum

@@ -10,12 +10,11 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double kSingular = 1e-4;        // squared damping of an inverse near singular poses
-constexpr double kFastest_1_s = 200;      // a damper faster than that, over the tip's inertia, the loop cannot hold
-constexpr double kDamperPhase = 0.7;      // rad, that a drive's delay may take from the dampers
-constexpr double kPosture_1_s = 15;       // of the null space, critically damped
-constexpr double kCloses_1_s = 30;        // the gap between what the tip should have given way and what it has
-constexpr double kAxisSpeedShare = 0.25;  // of each axis's speed limit, for giving way
+constexpr double kSingular = 1e-4;    // squared damping of an inverse near singular poses
+constexpr double kFastest_1_s = 200;  // a damper faster than that, over the tip's inertia, the loop cannot hold
+constexpr double kDamperPhase = 0.7;  // rad, that a drive's delay may take from the dampers
+constexpr double kPosture_1_s = 15;   // of the null space, critically damped
+constexpr double kCloses_1_s = 30;    // the gap between what the tip should have given way and what it has
 
 Vector6 vector6(const std::array<double, 6>& values) { return Eigen::Map<const Vector6>(values.data()); }
 
@@ -47,6 +46,28 @@ Vector6 slowed(const Vector6& damping, const Matrix6& mobility, double fastest_1
 void bound(Vector6& wrench, double force_n, double lever_m) {
   const double most = std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / lever_m);
   if (most > force_n) wrench *= force_n / most;
+}
+
+// By how much the largest of `values` is beyond what is left for it.
+double share_of(const AxisVector& values, const AxisVector& left) {
+  constexpr double kLeast = 1e-9;  // of what should be left: then nothing is
+  return values.cwiseAbs().cwiseQuotient(left.cwiseMax(kLeast)).maxCoeff();
+}
+
+// The tip's speed after a tick, by Newton; backward Euler in damper and spring.
+Vector6 given(const link::Compliance& compliance, const ComplianceLimits& limits, const Vector6& felt, double dt_s,
+              const Admittance& state) {
+  Vector6 mass;
+  mass << Vector3::Constant(kAdmittanceMass_kg), Vector3::Constant(kAdmittanceInertia_kg_m2);
+  const Vector6 stiffness = vector6(compliance.stiffness);
+  Vector6 push = felt + vector6(compliance.wrench) - stiffness.cwiseProduct(state.way);
+  bound(push, compliance.force_max_n, limits.lever_m);
+  const Vector6 resists = mass + dt_s * vector6(compliance.damping) + dt_s * dt_s * stiffness;
+  Vector6 speed = (mass.cwiseProduct(state.speed) + dt_s * push).cwiseQuotient(resists);
+  const double haste =
+      std::max(speed.head<3>().norm() / kAdmittanceSpeed_m_s, speed.tail<3>().norm() / kAdmittanceSpeed_rad_s);
+  if (haste > 1) speed /= haste;
+  return speed;
 }
 
 }  // namespace
@@ -104,45 +125,44 @@ void impedance(model::RobotModel& model, const link::Compliance& compliance, con
 }
 
 void admittance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
-                const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
+                const Room& room, const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
                 AxisState& reference) PONS_NONBLOCKING {
-  Vector6 mass;
-  mass << Vector3::Constant(kAdmittanceMass_kg), Vector3::Constant(kAdmittanceInertia_kg_m2);
-  const Vector6 stiffness = vector6(compliance.stiffness);
-  Vector6 push = felt + vector6(compliance.wrench) - stiffness.cwiseProduct(state.way);
-  bound(push, compliance.force_max_n, limits.lever_m);
   const Vector6 before = state.speed;
-  // Backward Euler in damper and spring.
-  const Vector6 resists = mass + dt_s * vector6(compliance.damping) + dt_s * dt_s * stiffness;
-  state.speed = (mass.cwiseProduct(before) + dt_s * push).cwiseQuotient(resists);
-  const double haste = std::max(state.speed.head<3>().norm() / kAdmittanceSpeed_m_s,
-                                state.speed.tail<3>().norm() / kAdmittanceSpeed_rad_s);
-  if (haste > 1) state.speed /= haste;
+  state.speed = given(compliance, limits, felt, dt_s, state);
 
   const Pose tip = model.world_from_tip(commanded.position);
   const AxisVector at = commanded.position + state.axis_way;
   const model::Jacobian jacobian = in_tip_axes(model.tip_jacobian(at), tip.linear());
   const Matrix6 square = jacobian * jacobian.transpose() + kSingular * Matrix6::Identity();
-  const auto solver = square.llt();
   // The axes' way must not drift from the tip's by rounding, or by the damping of the inverse.
   const Pose there = model.world_from_tip(at);
   Vector6 gone;
   gone.head<3>() = tip.linear().transpose() * (there.translation() - tip.translation());
   gone.tail<3>() = tip.linear().transpose() * turn_between(tip.linear(), there.linear());
-  AxisVector axis_speed = jacobian.transpose() * solver.solve(Vector6(state.speed + kCloses_1_s * (state.way - gone)));
-  const AxisLimits& axes = model.robot().limits;
-  const double share = axis_speed.cwiseAbs().cwiseQuotient(kAxisSpeedShare * axes.speed_rad_s).maxCoeff();
-  if (share > 1) {
-    axis_speed /= share;
-    state.speed /= share;
+  AxisVector speed = jacobian.transpose() * square.llt().solve(Vector6(state.speed + kCloses_1_s * (state.way - gone)));
+
+  // The tip is slowed with its axes, so that it does not believe to have gone where they have not.
+  const AxisLimits& axes = room.limits;
+  const AxisVector change = speed - state.axis_speed;
+  const double harsh = share_of(change / dt_s, axes.acceleration_rad_s2 - commanded.acceleration.cwiseAbs());
+  if (harsh > 1) {
+    speed = state.axis_speed + change / harsh;
+    state.speed = before + (state.speed - before) / harsh;
   }
-  const AxisVector next = (at + dt_s * axis_speed).cwiseMax(axes.position_min).cwiseMin(axes.position_max);
-  state.axis_way = next - commanded.position;
-  state.way += dt_s * state.speed;
+  const AxisVector left = room.speed_share * axes.speed_rad_s - commanded.speed.cwiseAbs();
+  const double hasty = share_of(speed, left.cwiseMin(kGivingShare * axes.speed_rad_s));
+  if (hasty > 1) {
+    speed /= hasty;
+    state.speed /= hasty;
+  }
+  const AxisVector next = (at + dt_s * speed).cwiseMax(axes.position_min).cwiseMin(axes.position_max);
+  const AxisVector& most = axes.acceleration_rad_s2;
   reference.position = next;
-  reference.speed = commanded.speed + axis_speed;
-  reference.acceleration =
-      commanded.acceleration + jacobian.transpose() * solver.solve(Vector6((state.speed - before) / dt_s));
+  reference.speed = commanded.speed + speed;
+  reference.acceleration = (commanded.acceleration + (speed - state.axis_speed) / dt_s).cwiseMax(-most).cwiseMin(most);
+  state.axis_way = next - commanded.position;
+  state.axis_speed = speed;
+  state.way += dt_s * state.speed;
 }
 
 }  // namespace pons::cerebellum

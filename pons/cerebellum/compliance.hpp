@@ -41,16 +41,24 @@ void impedance(model::RobotModel& model, const link::Compliance& compliance, con
 struct Admittance {
   Vector6 speed = Vector6::Zero();  // m/s, rad/s, the commanded tip's axes
   Vector6 way = Vector6::Zero();    // m, rad: likewise
-  AxisVector axis_way;              // rad, of each axis
+  AxisVector axis_way, axis_speed;  // rad and rad/s, of each axis
+};
+
+// What giving way may use up.
+struct Room {
+  const AxisLimits& limits;
+  double speed_share = 1;  // that is allowed of each speed limit, commanded motion included
 };
 
 // One tick of M ẍ = w_felt + w - D ẋ - K x (Hogan 1985), semi-implicitly, so that any damping is stable: `felt` is what
 // the surroundings exert on the tip (tip axes). `reference` becomes the commanded state and the way of the axes that
-// gives the tip that way, no faster than kAdmittanceSpeed; position limits hold.
+// gives the tip that way, no faster than kAdmittanceSpeed, kGivingShare of each axis' speed, and what the commanded
+// motion leaves of speed and acceleration limits; position limits hold. Jerk is not bounded: a push comes as it comes.
 void admittance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
-                const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
+                const Room& room, const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
                 AxisState& reference) PONS_NONBLOCKING;
 
+inline constexpr double kGivingShare = 0.25;
 inline constexpr double kAdmittanceSpeed_m_s = 0.10, kAdmittanceSpeed_rad_s = 0.5;
 inline constexpr double kAdmittanceMass_kg = 4, kAdmittanceInertia_kg_m2 = 0.1;
 

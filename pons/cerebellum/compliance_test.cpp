@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <functional>
 #include <limits>
+#include <numbers>
 
 #include "pons/cerebellum/test_bench.hpp"
 #include "pons/cerebellum/wrist.hpp"
@@ -207,6 +208,72 @@ TEST(Compliance, AStopEndsThePush) {
   hand.hold(Vector6::Zero(), 1000);
   EXPECT_LT((stopped.inverse() * hand.tip()).translation().norm(), 1e-4);
   EXPECT_EQ(bench.state().safety, link::SafetyState::kProtectiveStop);
+}
+
+// An arm without stiffness that is thrown: a stop does not rely on the damper that was asked for.
+TEST(Compliance, AStopBrakesAnArmOnASoftSpring) {
+  for (const bool thrown_too_fast : {false, true}) {
+    Bench bench({.step = 1ms});
+    bench.arm();
+    link::Command contact = plain_command(CommandKind::kContact);
+    contact.contact_n = 200;
+    bench.send(contact);
+    Hand hand(bench);
+    hand.hold(Vector6::Zero(), 20);
+    link::Compliance soft = springs(0, 0);
+    soft.damping = {0.1, 0.1, 0.1, 0.1, 0.1, 0.1};
+    soft.wrench[0] = 60;
+    bench.send(control_command(Controller::kImpedance, soft));
+    for (int tick = 0; tick < (thrown_too_fast ? 1000 : 25) && bench.operational(); ++tick)
+      hand.hold(Vector6::Zero(), 1);
+    const AxisVector& limit = bench_robot().limits.speed_rad_s;
+    EXPECT_GT(bench.plant.sensors.speed.cwiseAbs().cwiseQuotient(limit).maxCoeff(), 0.2);
+    if (!thrown_too_fast) bench.send(plain_command(CommandKind::kProtectiveStop));
+    hand.hold(Vector6::Zero(), 500);
+    EXPECT_EQ(bench.state().cause, thrown_too_fast ? StopCause::kLimit : StopCause::kCommanded);
+    EXPECT_EQ(bench.state().safety, link::SafetyState::kProtectiveStop);
+    EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+    EXPECT_LT(bench.cerebellum.statistics().measured_speed, 1.1);
+    EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
+  }
+}
+
+// Moved and pushed along at once, also where a zone allows less: motion and giving way together keep the limits.
+TEST(Compliance, MotionAndGivingWayShareTheLimits) {
+  for (const double share : {1.0, 0.3}) {
+    Settings settings;
+    settings.zone_speed_share[0] = share;
+    Bench bench({.step = 1ms}, settings);
+    bench.arm();
+    link::Command contact = plain_command(CommandKind::kContact);
+    contact.contact_n = 200;
+    bench.send(contact);
+    Hand hand(bench);
+    bench.plant.sensors.zones_occupied = 1;
+    hand.hold(Vector6::Zero(), 20);
+    link::Compliance soft = springs(0, 0);
+    soft.damping = {20, 20, 20, 1, 1, 1};
+    bench.send(control_command(Controller::kAdmittance, soft));
+    hand.hold(Vector6::Zero(), 20);
+    bench.move(AxisVector(bench_robot().home.array() + 1.5));
+    const AxisVector& limit = bench_robot().limits.speed_rad_s;
+    double fastest = 0, commanded = 0;
+    for (int tick = 0; tick < 2500; ++tick) {
+      const AxisVector before = bench.plant.sensors.position;
+      hand.push(along(tick / 500 % 3, 12 * std::sin(2 * std::numbers::pi * tick / 500)));
+      bench.tick();
+      const AxisVector speed = (bench.plant.sensors.position - before) / 1e-3;
+      if (tick < 250) continue;  // it is being slowed
+      fastest = std::max(fastest, speed.cwiseAbs().cwiseQuotient(limit).maxCoeff());
+      commanded = std::max(commanded, bench.state().commanded.speed.cwiseAbs().cwiseQuotient(limit).maxCoeff());
+    }
+    std::printf("of the speed limits, where %.1f is allowed: %.3f\n", share, fastest);
+    EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
+    EXPECT_LE(fastest, share * 1.15);  // the push itself moves the arm, too, before control has answered it
+    EXPECT_LE(commanded, share * (1 - kGivingShare) * 1.01) << "so that it can give way at any time";
+    EXPECT_GT(commanded, share * 0.6);
+    EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
+  }
 }
 
 // From any law to any other, pushed or not: no torque jumps by more than it changes between two ticks anyway.

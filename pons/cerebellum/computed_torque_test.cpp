@@ -84,29 +84,34 @@ TEST_P(Laws, AreFunctionsOfWhatTheyAreHanded) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, Laws,
-    testing::Values(
-        LawCase{"ComputedTorque",
-                [](auto& model, auto& is, auto& torque_nm) {
-                  computed_torque(model, {}, is.arm(), is.commanded, is.acting, 1e-3, is.corrections, torque_nm);
-                }},
-        LawCase{"FeedForward",
-                [](auto& model, auto& is, auto& torque_nm) {
-                  feed_forward(model, is.commanded, is.payload, is.corrections, torque_nm);
-                }},
-        LawCase{"GiveWay", [](auto& model, auto& is,
-                              auto& torque_nm) { give_way(model, {}, is.arm(), is.corrections, torque_nm); }},
-        LawCase{"Impedance",
-                [](auto& model, auto& is, auto& torque_nm) {
-                  impedance(model, is.compliance, {}, is.arm(), is.commanded, torque_nm);
-                }},
-        LawCase{"Admittance",
-                [](auto& model, auto& is, auto& torque_nm) {
-                  admittance(model, is.compliance, {}, is.commanded, is.felt, 1e-3, is.admittance, is.reference);
-                  computed_torque(model, {}, is.arm(), is.reference, is.acting, 1e-3, is.corrections, torque_nm);
-                }}),
-    [](const auto& c) { return std::string(c.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, Laws,
+                         testing::Values(LawCase{"ComputedTorque",
+                                                 [](auto& model, auto& is, auto& torque_nm) {
+                                                   computed_torque(model, {}, is.arm(), is.commanded, is.acting, 1e-3,
+                                                                   is.corrections, torque_nm);
+                                                 }},
+                                         LawCase{"FeedForward",
+                                                 [](auto& model, auto& is, auto& torque_nm) {
+                                                   feed_forward(model, is.commanded, is.payload, is.corrections,
+                                                                torque_nm);
+                                                 }},
+                                         LawCase{"GiveWay",
+                                                 [](auto& model, auto& is, auto& torque_nm) {
+                                                   give_way(model, {}, is.arm(), is.corrections, torque_nm);
+                                                 }},
+                                         LawCase{"Impedance",
+                                                 [](auto& model, auto& is, auto& torque_nm) {
+                                                   impedance(model, is.compliance, {}, is.arm(), is.commanded,
+                                                             torque_nm);
+                                                 }},
+                                         LawCase{"Admittance",
+                                                 [](auto& model, auto& is, auto& torque_nm) {
+                                                   admittance(model, is.compliance, {}, {bench_robot().limits},
+                                                              is.commanded, is.felt, 1e-3, is.admittance, is.reference);
+                                                   computed_torque(model, {}, is.arm(), is.reference, is.acting, 1e-3,
+                                                                   is.corrections, torque_nm);
+                                                 }}),
+                         [](const auto& c) { return std::string(c.param.name); });
 
 // At the commanded place, with nothing to correct, only the model speaks; an error is answered at once, by its gain.
 TEST(ComputedTorque, IsInverseDynamicsAndTheGains) {

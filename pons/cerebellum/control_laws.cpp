@@ -14,7 +14,7 @@ ControlLaws::ControlLaws(model::RobotModel& model, const Gains& gains, const Con
       corrections_(model.axes(), delay),
       asked_(delay, at_rest(AxisVector::Zero(model.axes()))),
       fading_nm_(AxisVector::Zero(model.axes())) {
-  admittance_.axis_way = fading_nm_;
+  admittance_.axis_way = admittance_.axis_speed = fading_nm_;
 }
 
 void ControlLaws::select(Controller controller, const link::Compliance& compliance) PONS_NONBLOCKING {
@@ -26,6 +26,7 @@ void ControlLaws::select(Controller controller, const link::Compliance& complian
   admittance_.way.setZero();
   admittance_.speed.setZero();
   admittance_.axis_way.setZero();
+  admittance_.axis_speed.setZero();
 }
 
 void ControlLaws::reset() PONS_NONBLOCKING {
@@ -59,7 +60,7 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
       impedance(model_, compliance, settings_.compliance, now.arm, acting(), torque_nm);
       break;
     case Controller::kAdmittance:
-      admittance(model_, compliance, settings_.compliance, now.commanded,
+      admittance(model_, compliance, settings_.compliance, {now.limits, now.speed_share}, now.commanded,
                  now.presses ? now.felt : Vector6(Vector6::Zero()), now.dt_s, admittance_, reference_);
       asked_.push(reference_);
       computed_torque(model_, gains_, now.arm, reference_, acting(), now.dt_s, corrections_, torque_nm);

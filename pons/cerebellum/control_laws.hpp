@@ -35,6 +35,12 @@ class ControlLaws {
   // What the arm was asked to do by now, as of the last tick: what was commanded so much earlier as the drives delay
   // it, with what admittance gave way.
   [[nodiscard]] const AxisState& acting() const { return asked_.out(); }
+  // The newest of these.
+  [[nodiscard]] const AxisState& asked() const { return asked_.before(0); }
+  // What the commanded motion may have of the speed that is allowed: admittance adds to it.
+  [[nodiscard]] double motion_share() const {
+    return controller_ == link::Controller::kAdmittance ? 1 - kGivingShare : 1;
+  }
   // The arm is where `commanded` has it; what is on its way no longer counts.
   void rest(const AxisState& commanded) PONS_NONBLOCKING { asked_.fill(commanded); }
 
@@ -44,6 +50,8 @@ class ControlLaws {
     const AxisState& commanded;  // for when these torques will act
     const Vector6& felt;         // WristSense::at_tip()
     double dt_s;
+    const AxisLimits& limits;
+    double speed_share;  // that is allowed of each speed limit
     bool presses;  // false: the wrench that was asked for is not exerted, and felt ones move nothing: it is stopping
   };
   // Not clamped. `last_nm` are the torques of the tick before.

@@ -12,6 +12,13 @@ namespace {
 constexpr double kRate = 1 + 1e-6;
 constexpr double kPosition = 1e-6;  // rad
 
+// Whether a value whose rate went from `before` to `after` may have changed by `change`, if that rate itself never
+// changes faster than `limit`: the trapezoid of the two is then wrong by a quarter of limit · dt² at most. Four times
+// that is let pass: the rate of a slowed motion keeps its limits from tick to tick, not in between.
+bool follows(double change, double before, double after, double limit, double dt_s, double tolerance) {
+  return std::abs(change - dt_s * (before + after) / 2) <= limit * dt_s * dt_s + tolerance;
+}
+
 }  // namespace
 
 std::string_view name(Limit limit) {
@@ -24,24 +31,38 @@ std::string_view name(Limit limit) {
       return "acceleration";
     case Limit::kJerk:
       return "jerk";
+    case Limit::kContinuity:
+      return "continuity";
     case Limit::kStoppingDistance:
       return "stopping distance";
   }
   return "unknown";
 }
 
-std::optional<Breach> LimitWatch::breach_now(const AxisState& previous, const AxisState& next, double dt_s) const {
-  for (Eigen::Index i = 0; i < next.position.size(); ++i) {
-    const double change = std::abs(next.acceleration[i] - previous.acceleration[i]);
+std::optional<Breach> LimitWatch::beyond(const AxisState& state) const PONS_NONBLOCKING {
+  for (Eigen::Index i = 0; i < state.position.size(); ++i) {
     // Written so that a value that is not a number fails.
-    if (!(next.position[i] >= limits_.position_min[i] - kPosition) ||
-        !(next.position[i] <= limits_.position_max[i] + kPosition))
+    if (!(state.position[i] >= limits_.position_min[i] - kPosition) ||
+        !(state.position[i] <= limits_.position_max[i] + kPosition))
       return Breach{i, Limit::kPosition};
-    if (!(std::abs(next.speed[i]) <= limits_.speed_rad_s[i] * kRate)) return Breach{i, Limit::kSpeed};
-    if (!(std::abs(next.acceleration[i]) <= limits_.acceleration_rad_s2[i] * kRate))
+    if (!(std::abs(state.speed[i]) <= limits_.speed_rad_s[i] * kRate)) return Breach{i, Limit::kSpeed};
+    if (!(std::abs(state.acceleration[i]) <= limits_.acceleration_rad_s2[i] * kRate))
       return Breach{i, Limit::kAcceleration};
-    if (!(change <= limits_.jerk_rad_s3[i] * dt_s * kRate + SeamTolerance::kAcceleration))
-      return Breach{i, Limit::kJerk};
+  }
+  return std::nullopt;
+}
+
+std::optional<Breach> LimitWatch::breach_now(const AxisState& previous, const AxisState& next, double dt_s) const {
+  if (const auto breach = beyond(next)) return breach;
+  for (Eigen::Index i = 0; i < next.position.size(); ++i) {
+    const double acceleration = limits_.acceleration_rad_s2[i], jerk = limits_.jerk_rad_s3[i];
+    const double change = std::abs(next.acceleration[i] - previous.acceleration[i]);
+    if (change > jerk * dt_s * kRate + SeamTolerance::kAcceleration) return Breach{i, Limit::kJerk};
+    if (!follows(next.speed[i] - previous.speed[i], previous.acceleration[i], next.acceleration[i], jerk, dt_s,
+                 SeamTolerance::kSpeed) ||
+        !follows(next.position[i] - previous.position[i], previous.speed[i], next.speed[i], acceleration, dt_s,
+                 SeamTolerance::kPosition + dt_s * SeamTolerance::kSpeed))
+      return Breach{i, Limit::kContinuity};
   }
   return std::nullopt;
 }

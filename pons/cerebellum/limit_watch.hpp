@@ -30,7 +30,7 @@ struct Statistics {
   std::uint64_t stops = 0;               // of any kind
 };
 
-enum class Limit : std::uint8_t { kPosition, kSpeed, kAcceleration, kJerk, kStoppingDistance };
+enum class Limit : std::uint8_t { kPosition, kSpeed, kAcceleration, kJerk, kContinuity, kStoppingDistance };
 [[nodiscard]] std::string_view name(Limit limit);
 
 struct Breach {
@@ -44,10 +44,13 @@ class LimitWatch {
   explicit LimitWatch(const AxisLimits& limits) : limits_(limits) {}
 
   // Why `next` may not follow `previous` after dt_s, if so: position, speed, acceleration beyond their limits, the
-  // change of acceleration beyond the jerk limit, or no way left to stop inside the position and speed limits.
-  // Tolerances: 1e-6 rad, 1e-6 of each rate, and for jerk what a seam may add (SeamTolerance).
+  // change of acceleration beyond the jerk limit, a position or speed that no motion within the limits leads to in that
+  // time, or no way left to stop inside the position and speed limits.
+  // Tolerances: 1e-6 rad, 1e-6 of each rate, and what a seam may add (SeamTolerance).
   [[nodiscard]] std::optional<Breach> breach(const AxisState& previous, const AxisState& next,
                                              double dt_s) const PONS_NONBLOCKING;
+  // The first limit of position, speed or acceleration that a state is beyond.
+  [[nodiscard]] std::optional<Breach> beyond(const AxisState& state) const PONS_NONBLOCKING;
   // Records what was sent; counts it as a violation if it broke a limit all the same.
   void record(const AxisState& previous, const AxisState& next, double dt_s,
               Statistics& statistics) const PONS_NONBLOCKING;

@@ -105,6 +105,46 @@ TEST_F(Recovery, RefusesHasteAndEverythingButMotion) {
   EXPECT_EQ(bench_.state().safety, SafetyState::kProtectiveStop);
 }
 
+// A stop on the way in leaves the arm outside, and breaks no limit by that.
+TEST_F(Recovery, AStopOnTheWayInIsNoBreachOfLimits) {
+  recover();
+  move(found_[0] - 0.1, 0.09);
+  bench_.run(500ms);
+  bench_.send(plain_command(CommandKind::kProtectiveStop));
+  bench_.run(500ms);
+  ASSERT_EQ(bench_.state().safety, SafetyState::kProtectiveStop);
+  ASSERT_GT(bench_.state().commanded.position[0], bench_robot().limits.position_max[0] + 0.05);
+  bench_.send(plain_command(CommandKind::kReset));
+  bench_.run(100ms);
+  EXPECT_EQ(bench_.state().safety, SafetyState::kDisarmed);
+  EXPECT_TRUE(bench_.plant.set_points.power);
+  recover();
+  move(bench_robot().limits.position_max[0] - 0.05, 0.09);
+  bench_.run(2s);
+  EXPECT_EQ(bench_.state().safety, SafetyState::kRecovery);
+  EXPECT_EQ(bench_.cerebellum.statistics().violations, 0U);
+}
+
+// As far outside as arming allows it stays where it is, and may come in but go no further out.
+TEST_F(Recovery, ArmedALittleOutsideItIsNotMoved) {
+  const double limit = bench_robot().limits.position_max[0];
+  found_[0] = limit + 0.9 * kArmTolerance_rad;
+  bench_.plant.place(found_);
+  bench_.run(50ms);
+  bench_.arm();
+  bench_.run(200ms);
+  EXPECT_LT((bench_.plant.sensors.position - found_).cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_EQ(bench_.cerebellum.statistics().commanded.acceleration, 0);
+  move(limit - 0.5, 1);
+  bench_.run(1s);
+  ASSERT_TRUE(bench_.operational()) << name(bench_.state().cause);
+  move(limit + 0.5 * kArmTolerance_rad, 1);
+  bench_.run(1s);
+  EXPECT_EQ(bench_.state().cause, StopCause::kLimit);
+  EXPECT_LE(bench_.plant.sensors.position[0], limit + 1e-4);
+  EXPECT_EQ(bench_.cerebellum.statistics().violations, 0U);
+}
+
 TEST_F(Recovery, EndsWithTheBridge) {
   recover();
   bench_.mute = true;

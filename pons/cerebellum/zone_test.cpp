@@ -126,6 +126,53 @@ TEST(Zones, ASlowedMotionCanBeReplaced) {
   EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
 }
 
+// Also where the law is to change between two motions, and the clock is past the end of the second.
+TEST(Zones, ASlowedMotionIsNotOverAtAHalt) {
+  Bench bench({}, zones());
+  bench.arm();
+  bench.plant.sensors.zones_occupied = kSlow;
+  const AxisVector zero = AxisVector::Zero(6);
+  const auto first =
+      point_to_point({bench_robot().home, zero, zero}, bench.now + 20ms, away(1.5), bench_robot().limits);
+  const auto second =
+      point_to_point({away(1.5), zero, zero}, first.back().end() + 50ms, away(1.45), bench_robot().limits);
+  Segment halt;
+  halt.start = first.back().end();
+  halt.duration = 50ms;
+  for (Eigen::Index i = 0; i < 6; ++i) halt.coefficients[static_cast<std::size_t>(i)] = {away(1.5)[i]};
+  bench.move(first);
+  bench.send(motion_command(halt, false));
+  for (const Segment& segment : second) bench.send(motion_command(segment, false));
+  bench.run(100ms);
+  while (!is_at_rest(bench.state().commanded)) bench.tick();
+  ASSERT_GT(bench.now, second.back().end());
+  link::Command springs = plain_command(CommandKind::kControl);
+  springs.controller = link::Controller::kImpedance;
+  springs.compliance.stiffness = springs.compliance.damping = {100, 100, 100, 100, 100, 100};
+  springs.compliance.force_max_n = 50;
+  bench.send(springs);
+  bench.tick();
+  EXPECT_EQ(bench.state().controller, link::Controller::kTracking);
+  bench.run(2s);
+  EXPECT_TRUE(bench.operational());
+  EXPECT_LT((bench.plant.sensors.position - away(1.45)).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+// The bridge looks only now and then; who was there in between it must know, until the stop is left.
+TEST(Zones, WhoWasThereForOneTickIsRememberedUntilTheReset) {
+  Bench bench({}, zones());
+  bench.arm();
+  bench.plant.sensors.zones_occupied = kStop | kSlow;
+  bench.tick();
+  bench.plant.sensors.zones_occupied = 0;
+  bench.run(1s);
+  EXPECT_EQ(bench.state().zones_occupied, 0U);
+  EXPECT_EQ(bench.state().zones_entered, kStop) << "a zone that slows has stopped nothing";
+  bench.send(plain_command(CommandKind::kReset));
+  bench.run(10ms);
+  EXPECT_EQ(bench.state().zones_entered, 0U);
+}
+
 // Random motions, random visits: no limit is ever broken or refused, and everything arrives.
 TEST(Zones, RandomVisitsBreakNoLimit) {
   int visits = 0, not_slowed = 0;
