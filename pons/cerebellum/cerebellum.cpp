@@ -334,7 +334,7 @@ void Cerebellum::follow(Time now) {
       log_.write(now, "{:.1f} % of a speed limit where {:.1f} % are allowed", 100 * *share, 100 * state_.speed_share);
   } else {
     commanded_ = next;
-    narrow();
+    if (state_.safety == SafetyState::kRecovery) narrow();
   }
 }
 

@@ -35,10 +35,6 @@ namespace pons::cerebellum {
   return shares;
 }
 
-// So little outside its limits (by sagging or by hand) the arm is armed where it is, and may only come in; further out
-// only recovery is possible.
-inline constexpr double kArmTolerance_rad = 0.01;
-
 struct Settings {
   Gains gains;
   CollisionSettings collision;
@@ -97,8 +93,8 @@ class Cerebellum {
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
   //                    nobody in a zone that stops
-  //   kArm             disarmed, at measured standstill, at most kArmTolerance_rad outside the position limits, word
-  //                    and stop input released; the commanded position becomes the measured one
+  //   kArm             disarmed, at measured standstill, inside the position limits, word and stop input released; the
+  //                    commanded position becomes the measured one
   //   kRecover         likewise, wherever the arm is. Until kReset every axis keeps recovery_share of its speed limit,
   //                    and one outside its position limits goes no further outside than it is
   void step(Time now, const body::Sensors& sensors, link::CerebellumEnd& link,
@@ -159,7 +155,7 @@ class Cerebellum {
   const Duration delay_;  // of the drives
   model::RobotModel model_;
   model::Payload payload_;  // told
-  AxisLimits limits_;       // in force: the robot's, or what recovery and an arm outside make of them
+  AxisLimits limits_;       // in force: the robot's, or what recovery makes of them
   LimitWatch limit_watch_;
   CollisionWatch collision_;
   ControlLaws laws_;

@@ -156,11 +156,9 @@ bool Cerebellum::reset(Time now) {
 }
 
 bool Cerebellum::arm(Time now) {
-  if (!is_released()) return false;
   const AxisVector inside =
       measured_position_.cwiseMax(robot_limits().position_min).cwiseMin(robot_limits().position_max);
-  if ((inside - measured_position_).cwiseAbs().maxCoeff() > kArmTolerance_rad) return false;
-  if (!begin(SafetyEvent::kArm, now)) return false;
+  if (!is_released() || inside != measured_position_ || !begin(SafetyEvent::kArm, now)) return false;
   log_.write(now, "armed in epoch {}", state_.epoch);
   return true;
 }

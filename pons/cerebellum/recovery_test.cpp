@@ -40,6 +40,9 @@ class Recovery : public testing::Test {
 };
 
 TEST_F(Recovery, OutsideItsLimitsTheArmIsNotArmed) {
+  found_[0] = bench_robot().limits.position_max[0] + 1e-5;  // not even so little: arming would have to move it
+  bench_.plant.place(found_);
+  bench_.run(50ms);
   bench_.send(plain_command(CommandKind::kArm));
   bench_.run(50ms);
   EXPECT_EQ(bench_.state().safety, SafetyState::kDisarmed);
@@ -122,26 +125,6 @@ TEST_F(Recovery, AStopOnTheWayInIsNoBreachOfLimits) {
   move(bench_robot().limits.position_max[0] - 0.05, 0.09);
   bench_.run(2s);
   EXPECT_EQ(bench_.state().safety, SafetyState::kRecovery);
-  EXPECT_EQ(bench_.cerebellum.statistics().violations, 0U);
-}
-
-// As far outside as arming allows it stays where it is, and may come in but go no further out.
-TEST_F(Recovery, ArmedALittleOutsideItIsNotMoved) {
-  const double limit = bench_robot().limits.position_max[0];
-  found_[0] = limit + 0.9 * kArmTolerance_rad;
-  bench_.plant.place(found_);
-  bench_.run(50ms);
-  bench_.arm();
-  bench_.run(200ms);
-  EXPECT_LT((bench_.plant.sensors.position - found_).cwiseAbs().maxCoeff(), 1e-4);
-  EXPECT_EQ(bench_.cerebellum.statistics().commanded.acceleration, 0);
-  move(limit - 0.5, 1);
-  bench_.run(1s);
-  ASSERT_TRUE(bench_.operational()) << name(bench_.state().cause);
-  move(limit + 0.5 * kArmTolerance_rad, 1);
-  bench_.run(1s);
-  EXPECT_EQ(bench_.state().cause, StopCause::kLimit);
-  EXPECT_LE(bench_.plant.sensors.position[0], limit + 1e-4);
   EXPECT_EQ(bench_.cerebellum.statistics().violations, 0U);
 }
 

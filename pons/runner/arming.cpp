@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <string>
 
-#include "pons/cerebellum/cerebellum.hpp"
 #include "pons/cerebellum/safety_machine.hpp"
 
 namespace pons::runner {
@@ -17,7 +16,12 @@ using link::SafetyState;
 // A stop whose cause has passed is left again after this long at standstill.
 constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
 
+// So far outside its limits, by sagging or by a hand, an arm is brought in unasked: slowly, as any recovery.
+constexpr double kBroughtInUnasked_rad = 0.01;
+
 constexpr std::string_view kArm = "arm";  // the word after which no person is needed any more
+
+bool has(std::uint32_t zones, std::size_t i) { return ((zones >> i) & 1U) != 0; }
 
 bool is_stopped(const link::State& state) {
   return state.safety == SafetyState::kProtectiveStop || state.safety == SafetyState::kEmergencyStop;
@@ -47,7 +51,7 @@ Expected<void> Arming::tick(Time now) {
   look_around(now);
   const link::State& state = skills_.state();
   yielding_ = yielding_ && state.safety == SafetyState::kOperational;
-  needs_person_ = needs_person_ || (is_stopped(state) && resumes(state) == cerebellum::Resumes::kPerson);
+  needs_person_ = needs_person_ || (is_stopped(state) && needs_person(state));
   const bool operational = state.safety == SafetyState::kOperational && !yielding_ && !needs_person_;
   if (operational && took_over_) took_over_ = !skills_.settle(now);
   bridge_.hold(operational && !took_over_ ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
@@ -77,15 +81,14 @@ Expected<void> Arming::lead_out(const link::State& state, Time now) {
     return {};
   }
   const bool recovers = state.safety == SafetyState::kRecovery;
-  if (recovers || (state.safety == SafetyState::kDisarmed && skills_.outside_rad() > cerebellum::kArmTolerance_rad))
-    return bring_in(now);
+  if (recovers || (state.safety == SafetyState::kDisarmed && skills_.outside_rad() > 0)) return bring_in(now);
   if (state.safety == SafetyState::kDisarmed || (stands(state) && may_resume(state, now))) skills_.arm(now);
   return {};
 }
 
 Expected<void> Arming::bring_in(Time now) {
   const double outside_rad = skills_.outside_rad();
-  if (recovery_ == Recovery::kRefused) {
+  if (recovery_ == Recovery::kRefused && outside_rad > kBroughtInUnasked_rad) {
     return fail(fmt::format("an axis stands {:.3f} rad outside its position limits", outside_rad), "arm",
                 "see that its way in is clear and allow it with --recover, or bring it in by hand");
   }
@@ -96,26 +99,36 @@ Expected<void> Arming::bring_in(Time now) {
 
 // From a stop at rest.
 bool Arming::may_resume(const link::State& state, Time now) const {
-  if (resumes(state) == cerebellum::Resumes::kZone && !zones_are_empty(now)) return false;
-  return now - *stopped_since_ >= kStandstillBeforeReset;
+  return zones_are_empty(state, now) && now - *stopped_since_ >= kStandstillBeforeReset;
 }
 
-// Who is where, into the journal.
+// Who is where, into the journal. A visit may be shorter than a period, or have begun before this bridge did: the loop
+// remembers those that matter, and when they ended is then taken to be now.
 void Arming::look_around(Time now) {
-  const std::uint32_t occupied = skills_.state().zones_occupied;
+  const link::State& state = skills_.state();
+  const std::uint32_t occupied = state.zones_occupied | (state.zones_entered & ~zones_entered_);
   for (std::size_t i = 0; i < zones_.size(); ++i) {
-    const bool is = ((occupied >> i) & 1U) != 0, was = ((zones_occupied_ >> i) & 1U) != 0;
+    const bool is = has(occupied, i), was = has(zones_occupied_, i);
     if (is) occupied_at_[i] = now;
     if (is != was) bridge_.note("zone", {{"zone", zones_[i].name}, {"occupied", is}}, now);
   }
   zones_occupied_ = occupied;
+  zones_entered_ = state.zones_entered;
 }
 
-bool Arming::zones_are_empty(Time now) const {
+bool Arming::needs_person(const link::State& state) const {
+  if (resumes(state) == cerebellum::Resumes::kPerson) return true;
   for (std::size_t i = 0; i < zones_.size(); ++i) {
-    const world::Zone& zone = zones_[i];
-    if (zone.speed_share > 0 || !occupied_at_[i]) continue;
-    if (!zone.resume_after_s || now - *occupied_at_[i] < from_s(*zone.resume_after_s)) return false;
+    if (has(state.zones_entered, i) && !zones_[i].resume_after_s) return true;
+  }
+  return false;
+}
+
+// Of those that stop, for as long as each of them wants.
+bool Arming::zones_are_empty(const link::State& state, Time now) const {
+  for (std::size_t i = 0; i < zones_.size(); ++i) {
+    if (has(state.zones_entered, i) && now - occupied_at_[i] < from_s(zones_[i].resume_after_s.value_or(0)))
+      return false;
   }
   return true;
 }
@@ -176,7 +189,7 @@ Json Arming::describe() const {
       return needs_person_ ? "a person who arms it: pons robot arm" : "arming";
     if (!stands(state)) return "standstill";
     if (needs_person_) return "a person who resets it: pons robot reset";
-    return resumes(state) == cerebellum::Resumes::kZone ? "the zone to be empty" : "a moment";
+    return state.zones_entered != 0 ? "the zone to be empty" : "a moment";
   };
   return {{"state", link::name(state.safety)},
           {"cause", link::name(state.cause)},

@@ -55,15 +55,16 @@ class Arming {
   [[nodiscard]] Expected<void> lead_out(const link::State& state, Time now);
   [[nodiscard]] Expected<void> bring_in(Time now);
   [[nodiscard]] bool may_resume(const link::State& state, Time now) const;
-  [[nodiscard]] bool zones_are_empty(Time now) const;
+  [[nodiscard]] bool needs_person(const link::State& state) const;
+  [[nodiscard]] bool zones_are_empty(const link::State& state, Time now) const;
 
   bridge::Bridge& bridge_;
   const SkillPort& skills_;
   const std::vector<world::Zone>& zones_;
   Recovery recovery_;
   std::optional<Time> stopped_since_;
-  std::array<std::optional<Time>, kMaxZones> occupied_at_;  // last
-  std::uint32_t zones_occupied_ = 0;
+  std::array<Time, kMaxZones> occupied_at_;  // when somebody was last seen there, or heard of
+  std::uint32_t zones_occupied_ = 0, zones_entered_ = 0;
   std::int64_t stops_ = 0;
   bool needs_person_ = false;  // to reset and to arm
   bool was_operational_ = false, recovering_ = false;
