@@ -46,20 +46,23 @@ def main(path, task_id="sway"):
         sys.exit(answer["error"])
     while not (seen := pons.ask(op="observe"))["ok"]:
         pass  # the arm is at something else; answers come at the bridge's pace
-    home, ends, chunks, asked = seen["position"], round(SECONDS / PERIOD_S), 0, -EVERY
-    while asked + ACTIONS < ends:
+    home, ends, chunks, asked, last = seen["position"], round(SECONDS / PERIOD_S), 0, -EVERY, False
+    while seen["ok"]:
         observed = seen["executed"]
-        if observed >= asked + EVERY:
+        # After a stop nothing of what was sent is left, the last chunk neither.
+        is_time = seen["enough_s"] == 0 or (observed >= asked + EVERY and not last)
+        if is_time and observed < ends - 1e-6:
             count = min(ACTIONS, math.ceil(ends - observed))
             chunk = {"observed": observed, "period_ms": 1e3 * PERIOD_S, "actions": act(home, observed, count)}
-            answer = pons.ask(op="chunk", stream=seen["stream"], last=observed + count >= ends, **chunk)
+            ends_it = observed + count >= ends
+            answer = pons.ask(op="chunk", stream=seen["stream"], last=ends_it, **chunk)
             if answer["ok"]:
-                asked, chunks = observed, chunks + 1
-            elif not answer["error"].startswith("chunk_stopped"):
+                asked, chunks, last = observed, chunks + 1, ends_it
+            elif not answer["error"].startswith("chunk_st"):  # stopped, or as it was before the arm was
                 sys.exit(answer["error"])
         seen = pons.ask(op="observe")
-        if not seen["ok"]:
-            sys.exit(seen["error"])
+    if not last:
+        sys.exit(seen["error"])
     print(f"{chunks} chunks sent")
 
 

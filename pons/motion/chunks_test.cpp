@@ -206,6 +206,46 @@ TEST(Chunks, StarveByNameWhereTheDelayIsTooLong) {
   }
 }
 
+// Where nothing more comes it slows down on the curve that the actions give, each axis in its place, and not straight
+// to the end.
+TEST(Chunks, StarvingSlowsDownAlongACurve) {
+  const auto curve = [](double executed) {
+    const double phase = 0.06 * executed;
+    return AxisVector{{0.4 * std::sin(phase), 0.3 * (1 - std::cos(phase)), 0.2 * std::sin(2 * phase)}};
+  };
+  double worst = 0;
+  for (const int delay_ms : {0, 100, 300}) {
+    for (const double dries_up_s : {2.0, 2.33, 2.67, 3.0}) {
+      const AxisLimits limits = limits_of(3);
+      const Act act = [&](double observed) {
+        std::vector<AxisVector> actions;
+        for (int j = 1; j <= 50; ++j) actions.push_back(curve(observed + j));
+        return actions;
+      };
+      ChunkPath path(curve(0), Time{}, 0);
+      Follower follower(curve(0), limits);
+      (void)run(path, follower, limits, act, milliseconds(20),
+                {milliseconds(delay_ms), milliseconds(500), milliseconds(100)}, dries_up_s,
+                [](const ChunkPath&, const Follower&) {});
+      int slowing = 0;
+      for (double before = path.executed(follower.now()); follower.now() < path.end();) {
+        follower.step();
+        const double executed = path.executed(follower.now()), pace = (executed - before) / 0.05;
+        before = executed;
+        if (!path.starved(follower.now())) continue;
+        if (pace > 0.05 && pace < 0.95) ++slowing;
+        worst = std::max(worst, (follower.state().position - curve(executed)).cwiseAbs().maxCoeff());
+      }
+      EXPECT_GT(slowing, 100);
+      EXPECT_TRUE(follower.state().speed.isZero(1e-9));
+      EXPECT_LT(follower.seam(), 1e-9);
+      EXPECT_LE(follower.use().worst(), 1 + 1e-6);
+    }
+  }
+  std::printf("slowing down for want of actions: at most %.1e rad off the curve\n", worst);
+  EXPECT_LT(worst, 2e-3);  // of 0.4: what is evened out of a curve
+}
+
 // ---- random streams ----
 
 // A smooth motion that the policy has in mind, and how badly it says so.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -19,6 +20,7 @@ using task::Status;
 constexpr Duration kTick = std::chrono::milliseconds(1);  // of the loop: what starvation is counted in
 constexpr Duration kSilence = std::chrono::seconds(10);   // then the policy is taken for dead
 constexpr Duration kLongestStream = std::chrono::seconds(600);
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 class FollowPolicy final : public task::Skill, public task::ChunkStream {
  public:
@@ -36,14 +38,15 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
 
   Progress tick(Time now) override {
     if (cell_.held) return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
-    if (!cell_.arm.operational()) return stopped(now);
+    if (!cell_.arm.operational()) return stopped();
     if (!path_) return begin(now);
+    executed_ = std::max(executed_, path_->executed(motion_time(now)));
     count_starved(now);
     if (ending_) {
       if (motion_time(now) < path_->end()) return {};
       return verdict_;
     }
-    if (last_ && motion_time(now) >= path_->end()) return whole();
+    if (last_ && motion_time(now) >= path_->end()) return whole() ? succeeded() : too_slow();
     if (first_chunk_ && now >= *first_chunk_ + for_) {
       end(now, succeeded());
     } else if (!last_ && now >= heard_ + kSilence) {
@@ -57,8 +60,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     if (path_ && cell_.arm.operational() && !ending_) {
       end(now, cancelled);
     } else {
-      ending_ = true;
-      verdict_ = cancelled;
+      finish(cancelled);
     }
   }
 
@@ -69,8 +71,12 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
 
   [[nodiscard]] task::Observation observe(Time now) const override {
     const link::State& state = cell_.arm.state();
-    task::Observation seen{.stamp = now, .position = state.position, .speed = state.speed, .objects = cell_.objects()};
-    if (path_) {
+    task::Observation seen{.stamp = now,
+                           .position = state.position,
+                           .speed = state.speed,
+                           .executed = executed_,
+                           .objects = cell_.objects()};
+    if (path_ && cell_.arm.operational()) {
       const Time motion = motion_time(now);
       seen.executed = path_->executed(motion);
       seen.enough = std::max(Duration{0}, path_->enough_until() - motion);
@@ -88,12 +94,13 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     ++chunks_;
     heard_ = now;
     if (!first_chunk_) first_chunk_ = now;
-    last_.reset();
-    if (chunk.last) last_ = chunk.observed + static_cast<double>(chunk.actions.size());
+    last_ = chunk.last;
+    total_ = last_ ? chunk.observed + static_cast<double>(chunk.actions.size()) : kEndless;
     return {};
   }
 
  private:
+  // While the arm follows; stopped, it is late no longer, wherever its motion broke off.
   [[nodiscard]] Time motion_time(Time now) const { return now - cell_.arm.late(); }
 
   Expected<void> splice(const Chunk& chunk, Time now) {
@@ -101,7 +108,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
       return fail("no motion is taken now", "chunk_stopped", "wait until observe says that it goes on");
     if (chunk.observed < oldest_)
       return fail(fmt::format("it was observed at {:.1f} actions, before the arm was stopped", chunk.observed),
-                  "chunk_stale", "observe again");
+                  "chunk_stale", "observe again, and do not round what it answers");
     motion::ChunkPath next = *path_;
     auto way = next.splice(chunk, motion_time(now), motion_time(cell_.arm.splice_time(now)), cell_.limits_planned());
     if (!way) return std::unexpected(way.error());
@@ -123,21 +130,30 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     if (now < cell_.arm.motion_end()) return {};
     const Time from = cell_.arm.splice_time(now);
     path_.emplace(cell_.arm.planned(from).position, motion_time(now), oldest_);
+    executed_ = oldest_;
     counted_ = motion_time(now);
     heard_ = now;
     return {};
   }
 
-  // What was sent in before a stop must not move the arm after it.
-  Progress stopped(Time now) {
-    if (path_) oldest_ = std::floor(path_->executed(motion_time(now))) + 1;
+  // What was sent in before a stop must not move the arm after it, nor end the stream: who had said the last says the
+  // rest again. So the numbers go on above all that can have been observed, but short of what nobody has seen executed:
+  // within the action that was under way, and before the end.
+  Progress stopped() {
+    if (path_ && !ending_ && whole()) finish(succeeded());
+    if (path_) oldest_ = (executed_ + std::min(std::floor(executed_) + 1, total_)) / 2;
     path_.reset();
+    last_ = false;
     return ending_ ? verdict_ : Progress{};
   }
 
-  void end(Time now, Progress verdict) {
+  void finish(Progress verdict) {
     ending_ = true;
     verdict_ = std::move(verdict);
+  }
+
+  void end(Time now, Progress verdict) {
+    finish(std::move(verdict));
     motion::ChunkPath next = *path_;
     auto way = next.stop(motion_time(cell_.arm.splice_time(now)), cell_.limits_planned());
     // Without, the motion ends at rest where the last chunk does.
@@ -150,9 +166,9 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     for (; counted_ < motion_time(now); counted_ += kTick) starved_ += path_->starved(counted_) ? 1 : 0;
   }
 
+  [[nodiscard]] bool whole() const { return last_ && executed_ >= total_ - motion::kSameProgress; }
   // What is played slowly may be longer than what can be queued.
-  [[nodiscard]] Progress whole() const {
-    if (path_->executed(path_->end()) >= *last_ - motion::kSameProgress) return succeeded();
+  [[nodiscard]] Progress too_slow() const {
     return {Status::kFailed, "the limits make the last chunk too slow to be queued whole", detail()};
   }
   [[nodiscard]] Progress succeeded() const { return {Status::kSucceeded, {}, detail()}; }
@@ -160,8 +176,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     task::Json told{{"policy", arguments_.at("policy")},
                     {"chunks", chunks_},
                     {"refused", refused_},
-                    {"executed", static_cast<std::int64_t>(std::floor((path_ ? path_->executed(counted_) : oldest_) +
-                                                                      motion::kSameProgress))},
+                    {"executed", static_cast<std::int64_t>(std::floor(executed_ + motion::kSameProgress))},
                     {"starved_ticks", starved_}};
     if (refused_ > 0) told["last_refusal"] = last_refusal_;
     return told;
@@ -172,12 +187,14 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   const std::uint64_t number_;
   const Duration for_;
   std::optional<motion::ChunkPath> path_;  // not while the arm is stopped
+  double executed_ = 0;                    // actions, when the arm was last seen to follow
   double oldest_ = 0;                      // observations of fewer actions were made before a stop
   Time counted_, heard_;
   std::optional<Time> first_chunk_;
   std::int64_t chunks_ = 0, refused_ = 0, starved_ = 0;
   std::string last_refusal_;
-  std::optional<double> last_;  // how many actions the stream has, once the policy has said its last
+  bool last_ = false;        // the policy has said its last, and no stop has come since
+  double total_ = kEndless;  // actions of the stream, as far as that is known
   bool ending_ = false;
   Progress verdict_;
 };

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <functional>
+#include <future>
 #include <string>
 
 #include "pons/gate/local_socket.hpp"
@@ -53,6 +55,28 @@ TEST_F(OutsidePolicy, MovesTheArm) {
   EXPECT_EQ(detail["executed"], 120) << detail;
   EXPECT_EQ(detail["refused"], 0) << detail;
   EXPECT_GE(detail["chunks"], 10) << detail;
+}
+
+// A person stops the arm in the middle, and again when all has been sent, and sends it on each time.
+TEST_F(OutsidePolicy, GoesOnAfterAStop) {
+  during_a_run("lockstep", [&] {
+    auto running = std::async(std::launch::async, [&] { return example("sway"); });
+    for (const double stop_at : {30.0, 108.0}) {
+      // On a busy computer the end may pass unseen.
+      while (running.wait_for(std::chrono::seconds(0)) != std::future_status::ready &&
+             ask({{"op", "observe"}}).value("executed", 0.0) < stop_at) {
+      }
+      for (const char* operation : {"stop", "reset", "arm"}) {
+        while (ask({{"op", operation}})["ok"] != true) {
+        }
+      }
+    }
+    const Finished ran = running.get();
+    EXPECT_EQ(ran.code, 0) << ran.err;
+  });
+  const json detail = told("sway");
+  std::printf("stopped twice: %s\n", detail.dump().c_str());
+  EXPECT_EQ(detail["executed"], 120) << detail;
 }
 
 // By the clock its chunks come as late as this computer makes them, and a policy within runs on a thread of its own.

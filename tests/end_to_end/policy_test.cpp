@@ -46,6 +46,7 @@ class PolicyRun {
       cell->body->cerebellum->step(now, sensors, *parts.body.link, set_points);
       parts.body.plant.body->write(set_points);
       if (now.ns() % runner::kBridgePeriod.count() != 0) continue;
+      if (first) first(now);
       const auto ticked = parts.bridge_side->tick(now, *parts.observer);
       ASSERT_TRUE(ticked) << ticked.error().line();
       look();
@@ -68,8 +69,12 @@ class PolicyRun {
     EXPECT_EQ(cell->body->cerebellum->statistics().refused, 0u);
   }
 
+  [[nodiscard]] task::ChunkStream* stream() const { return cell->above->cell->stream; }
+  [[nodiscard]] skills::Arm& arm() const { return cell->above->cell->arm; }
+
   world::World world;
   std::unique_ptr<apps::Assembly> cell;
+  Meanwhile first;  // before the bridge's tick
   Time now;
   Json detail;
   task::Outcome outcome = task::Outcome::kCancelled;
@@ -122,7 +127,8 @@ TEST_P(PolicyAtPace, KeepsTheToolOverAParcelThatRidesBy) {
 }
 INSTANTIATE_TEST_SUITE_P(Paces, PolicyAtPace,
                          testing::Values(Pace{5, 0}, Pace{5, 100}, Pace{5, 200}, Pace{5, 300}, Pace{20, 0},
-                                         Pace{20, 300}, Pace{50, 0}, Pace{50, 100}, Pace{50, 200}, Pace{50, 300}),
+                                         Pace{20, 100}, Pace{20, 200}, Pace{20, 300}, Pace{50, 0}, Pace{50, 100},
+                                         Pace{50, 200}, Pace{50, 300}),
                          [](const auto& pace) {
                            return std::to_string(pace.param.rate_hz) + "HzLate" + std::to_string(pace.param.delay_ms);
                          });
@@ -158,6 +164,17 @@ Chunk chunk_of(const PolicyRun& run, double observed, std::size_t count, double 
   Chunk chunk{.observed = observed, .period = std::chrono::milliseconds(50)};
   for (std::size_t j = 1; j <= count; ++j)
     chunk.actions.emplace_back(run.world.robot.home.array() + by * static_cast<double>(j) / static_cast<double>(count));
+  return chunk;
+}
+
+// The first axis to and fro over the number of executed actions.
+double sway(double executed) { return 0.3 * (1 - std::cos(4 * 0.05 * executed)); }
+Chunk swaying(const PolicyRun& run, double observed, int count) {
+  Chunk chunk{.observed = observed, .period = std::chrono::milliseconds(50)};
+  for (int j = 1; j <= count; ++j) {
+    chunk.actions.push_back(run.world.robot.home);
+    chunk.actions.back()[0] += sway(observed + j);
+  }
   return chunk;
 }
 
@@ -237,7 +254,6 @@ TEST(Policy, WhoseChunksAreRefusedDoesNotMoveTheArm) {
 // place.
 TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
   PolicyRun run("parcel_cell", {{.zone = 0, .from = Time(from_s(4)), .stays = from_s(4)}});
-  const auto sway = [](double executed) { return 0.3 * (1 - std::cos(4 * 0.05 * executed)); };
   double off = 0;
   run.follow({{"policy", "outside"}, {"seconds", 10}}, [&](Time now) {
     task::ChunkStream* const stream = run.cell->above->cell->stream;
@@ -246,12 +262,7 @@ TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
     const double at = run.cell->body->cerebellum->state().commanded.position[0] - run.world.robot.home[0];
     off = std::max(off, std::abs(at - sway(executed)));
     if (now.ns() % std::chrono::nanoseconds(std::chrono::milliseconds(200)).count() != 0) return;
-    Chunk chunk{.observed = executed, .period = std::chrono::milliseconds(50)};
-    for (int j = 1; j <= 20; ++j) {
-      chunk.actions.push_back(run.world.robot.home);
-      chunk.actions.back()[0] += sway(executed + j);
-    }
-    const auto taken = stream->take(chunk, now);
+    const auto taken = stream->take(swaying(run, executed, 20), now);
     ASSERT_TRUE(taken || taken.error().where == "chunk_stopped") << taken.error().line();
   });
   EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
@@ -285,6 +296,173 @@ TEST(Policy, GoesOnAfterAStopButNotWithWhatItSawBefore) {
   EXPECT_GE(run.over_it, 20);
   EXPECT_LT(run.worst_height_m, 0.2);
   run.expect_no_limit_broken();
+}
+
+// Somebody in the aisle makes the motion late, and then stops it in the gate, from where on nothing is late any more:
+// asked at the clock's time the stopped motion would seem to have got further than the arm.
+TEST(Policy, StoppedWhileItIsLateCountsOnlyWhatItDid) {
+  PolicyRun run("parcel_cell", {{.zone = 0, .from = Time(from_s(2)), .stays = from_s(3)},
+                                {.zone = 1, .from = Time(from_s(5)), .stays = from_s(0.5)}});
+  double did = 0, on = 0, leap = 0;
+  Duration late{0};
+  bool was_stopped = false;
+  // Whoever visits the bridge looks before the skill has noticed.
+  run.first = [&](Time now) {
+    if (run.stream() == nullptr || did == 0 || on > 0) return;
+    run.arm().refresh(now);
+    if (!run.arm().operational()) leap = std::max(leap, std::abs(run.stream()->observe(now).executed - did));
+  };
+  run.follow({{"policy", "outside"}, {"seconds", 12}}, [&](Time now) {
+    if (run.stream() == nullptr || now < Time(from_s(1))) return;
+    const double executed = run.stream()->observe(now).executed;
+    if (!run.arm().operational()) {
+      was_stopped = was_stopped || did > 0;
+      return;
+    }
+    if (!was_stopped) {
+      did = executed;
+      late = run.arm().late();
+    }
+    if (now.ns() % std::chrono::nanoseconds(std::chrono::milliseconds(200)).count() != 0) return;
+    const auto taken = run.stream()->take(swaying(run, executed, 20), now);
+    ASSERT_TRUE(taken || taken.error().where == "chunk_stopped") << taken.error().line();
+    if (taken && was_stopped && on == 0) on = executed;
+  });
+  std::printf("stopped %.2f s late after %.2f actions, goes on at %.2f\n", to_s(late), did, on);
+  EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 1u);
+  EXPECT_GT(late, from_s(0.3));
+  EXPECT_LT(leap, 1e-9);
+  // Above what was observed before, and the action under way is not said to have been executed.
+  EXPECT_GT(on, did);
+  EXPECT_LT(on, std::floor(did) + 1);
+  run.expect_no_limit_broken();
+}
+
+TEST(Policy, StoppedWhileItsLastChunkIsLateHasNotSucceeded) {
+  PolicyRun run("parcel_cell", {{.zone = 0, .from = Time(from_s(1.5)), .stays = from_s(6)},
+                                {.zone = 1, .from = Time(from_s(5.8)), .stays = from_s(0.5)}});
+  double did = 0;
+  Duration late{0};
+  bool sent = false;
+  run.follow({{"policy", "outside"}, {"seconds", 40}}, [&](Time now) {
+    if (run.stream() == nullptr || now < Time(from_s(1))) return;
+    if (run.arm().operational() && run.cell->body->cerebellum->statistics().stops == 0) {
+      did = run.stream()->observe(now).executed;
+      late = run.arm().late();
+    }
+    if (sent) return;
+    Chunk chunk = swaying(run, 0, 80);
+    chunk.last = true;
+    const auto taken = run.stream()->take(chunk, now);
+    ASSERT_TRUE(taken) << taken.error().line();
+    sent = true;
+  });
+  std::printf("stopped %.2f s late after %.2f of 80 actions: %s\n", to_s(late), did, run.detail.dump().c_str());
+  EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 1u);
+  EXPECT_LT(did, 79);
+  EXPECT_GT(did + to_s(late) / 0.05, 80);  // at the clock's time all would seem to have been executed
+  EXPECT_EQ(run.outcome, task::Outcome::kFailed);
+  EXPECT_EQ(run.reason, "no chunk came for 10 s");
+  EXPECT_EQ(run.told("executed"), std::floor(did));
+  run.expect_no_limit_broken();
+}
+
+// A stop ends no stream: whoever has said its last can say the rest of it.
+TEST(Policy, StoppedInItsLastChunkSendsTheRest) {
+  for (const double stop_at : {7.4, 19.2}) {
+    PolicyRun run;
+    double did = 0, on = 0;
+    int sent = 0;
+    run.follow({{"policy", "outside"}, {"seconds", 40}}, [&](Time now) {
+      if (run.stream() == nullptr || now < Time(from_s(1)) || !run.arm().operational()) return;
+      const double executed = run.stream()->observe(now).executed;
+      const bool stopped = run.cell->body->cerebellum->statistics().stops > 0;
+      if (sent == 1 && !stopped) {
+        did = executed;
+        if (executed >= stop_at) run.arm().halt();
+      } else if (sent == 0 || (sent == 1 && stopped)) {
+        Chunk chunk{.observed = executed, .period = std::chrono::milliseconds(50)};
+        for (double n = executed + 1; n < 21; ++n)
+          chunk.actions.emplace_back(run.world.robot.home.array() + 0.1 * std::min(1.0, n / 20));
+        chunk.last = true;
+        const auto taken = run.stream()->take(chunk, now);
+        if (!taken && taken.error().where == "chunk_stopped") return;
+        ASSERT_TRUE(taken) << taken.error().line();
+        if (++sent == 2) on = executed;
+      }
+    });
+    std::printf("stopped after %.2f of 20 actions, goes on at %.2f: %s\n", did, on, run.detail.dump().c_str());
+    EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 1u);
+    EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+    EXPECT_GT(on, did);
+    EXPECT_LT(on, std::floor(did) + 1);
+    EXPECT_EQ(run.told("executed"), 20);
+    EXPECT_EQ(run.told("chunks"), 2);
+    const AxisVector end = run.world.robot.home.array() + 0.1;
+    EXPECT_TRUE(run.cell->body->cerebellum->state().commanded.position.isApprox(end, 1e-9));
+    run.expect_no_limit_broken();
+  }
+}
+
+// However often, and though the last action ends between two whole numbers: what was never done does not count.
+TEST(Policy, StoppedInItsLastChunkAndSilentFailsForThat) {
+  for (const double stop_at : {7.4, 19.2, 20.2}) {
+    PolicyRun run;
+    int sent = 0, halts = 0;
+    double did = 0, on = 0, total = 20;
+    run.follow({{"policy", "outside"}, {"seconds", 60}}, [&](Time now) {
+      if (run.stream() == nullptr || now < Time(from_s(1)) || !run.arm().operational()) return;
+      const double executed = run.stream()->observe(now).executed;
+      const auto stops = static_cast<int>(run.cell->body->cerebellum->statistics().stops);
+      if (stops == 0) did = executed;
+      if (sent == 0 || (sent == 1 && executed >= 2.5)) {
+        Chunk chunk = chunk_of(run, executed, 20 - 2 * static_cast<std::size_t>(sent), 0.1);
+        chunk.last = true;
+        const auto taken = run.stream()->take(chunk, now);
+        ASSERT_TRUE(taken) << taken.error().line();
+        ++sent;
+        total = executed + static_cast<double>(chunk.actions.size());
+      } else if (executed >= stop_at && halts == stops && halts < 3 && executed > on) {
+        on = executed;
+        run.arm().halt();
+        ++halts;
+      }
+    });
+    std::printf("stopped after %.3f of %.3f actions, and at %.3f again\n", did, total, on);
+    EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, 3u);
+    EXPECT_LT(on, std::min(total, std::floor(did) + 1));
+    EXPECT_EQ(run.outcome, task::Outcome::kFailed);
+    EXPECT_EQ(run.reason, "no chunk came for 10 s");
+    EXPECT_EQ(run.told("executed"), std::floor(stop_at));
+    run.expect_no_limit_broken();
+  }
+}
+
+// Stopped when nothing is left of it but to notice that.
+TEST(Policy, StoppedAtTheVeryEndOfItsLastChunkHasSucceeded) {
+  int ended = 0;
+  for (std::size_t count = 20; count < 30 && ended == 0; ++count) {
+    PolicyRun run;
+    bool sent = false;
+    run.follow({{"policy", "outside"}, {"seconds", 60}}, [&](Time now) {
+      if (run.stream() == nullptr || now < Time(from_s(1))) return;
+      if (!sent) {
+        Chunk chunk = chunk_of(run, 0, count, 0.1);
+        chunk.last = true;
+        const auto taken = run.stream()->take(chunk, now);
+        ASSERT_TRUE(taken) << taken.error().line();
+        sent = true;
+      } else if (ended == 0 && run.stream()->observe(now).executed >= static_cast<double>(count) - 1e-6) {
+        run.arm().halt();
+        ++ended;
+      }
+    });
+    EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
+    EXPECT_EQ(run.told("executed"), count);
+    EXPECT_EQ(run.cell->body->cerebellum->statistics().stops, static_cast<std::uint64_t>(ended));
+  }
+  EXPECT_EQ(ended, 1);
 }
 
 TEST(Policy, CancelledComesToRestAlongItsWay) {
