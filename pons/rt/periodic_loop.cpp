@@ -41,7 +41,6 @@ void PeriodicLoop::run(const std::function<bool(Time)>& tick) {
       lateness_.record(late_);
       scheduled += period_;
     } else {
-      late_ = Duration{0};
       ++woken_;
     }
     const bool go_on = tick(time);
