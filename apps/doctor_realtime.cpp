@@ -52,6 +52,8 @@ std::string line_of(const std::filesystem::path& file) {
   return line;
 }
 
+constexpr const char* kUnknown = "unknown: the kernel does not tell";
+
 // The kernel's list has a headline and a line for each swap.
 bool has_swap(const std::filesystem::path& root) {
   std::ifstream in(root / "proc/swaps");
@@ -81,7 +83,7 @@ Finding measure(Duration how_long) {
 }  // namespace
 
 Governor loop_governor(const std::filesystem::path& sys) {
-  const int pinned = rt::loop_cpu();
+  const int pinned = rt::loop_cpu(sys);
   const int cpu = pinned >= 0 ? pinned : sched_getcpu();
   return {cpu, line_of(sys / fmt::format("devices/system/cpu/cpu{}/cpufreq/scaling_governor", cpu))};
 }
@@ -94,20 +96,26 @@ Finding read_settings(const std::filesystem::path& root) {
   const bool preempts = line_of(root / "sys/kernel/realtime") == "1";
   check(preempts, "kernel", preempts ? "PREEMPT_RT" : "not PREEMPT_RT: expect single ticks late by milliseconds");
   const std::string clock = line_of(root / "sys/devices/system/clocksource/clocksource0/current_clocksource");
-  check(clock == "tsc" || clock == "arch_sys_counter", "clock source", clock.empty() ? "unknown" : clock);
+  check(clock == "tsc" || clock == "arch_sys_counter", "clock source", clock.empty() ? kUnknown : clock);
   const auto [cpu, governor] = loop_governor(root / "sys");
   check(governor.empty() || governor == "performance", "CPU governor",
         governor.empty() ? "none: the clock rate is not this system's to choose"
                          : fmt::format("{}, of CPU {}", governor, cpu));
+  const bool isolated = rt::is_isolated(cpu, root / "sys");
+  check(isolated, "isolated CPU",
+        fmt::format("CPU {} {}", cpu,
+                    isolated ? "is kept free by the kernel" : "is shared with whatever else runs here"));
   const std::string pages = line_of(root / "sys/kernel/mm/transparent_hugepage/enabled");
   check(pages.find("[always]") == std::string::npos, "huge pages", pages.empty() ? "none" : pages);
   const std::string swappiness = line_of(root / "proc/sys/vm/swappiness");
   const bool swaps = has_swap(root);
   check(!swaps || (!swappiness.empty() && std::atoi(swappiness.c_str()) <= 10), "swappiness",
-        swaps ? swappiness : "of no matter: there is no swap");
+        !swaps               ? "of no matter: there is no swap"
+        : swappiness.empty() ? kUnknown
+                             : swappiness);
   const std::string budget = line_of(root / "proc/sys/kernel/sched_rt_runtime_us");
   check(budget == "-1" || std::atoi(budget.c_str()) >= 900'000, "real-time budget",
-        budget + " of every 1000000 µs; -1 is no limit");
+        budget.empty() ? kUnknown : budget + " of every 1000000 µs; -1 is no limit");
   if (worst != Finding::kGood) say(worst, "what helps", kAdvice);
   return worst;
 }
@@ -120,10 +128,15 @@ Finding judge_jitter(const rt::Jitter& jitter) {
       fmt::format("ticks begin late by {:.0f} µs (median), {:.0f} (99 %), {:.0f} (99.9 %), {:.0f} (worst)",
                   us(late.percentile(50)), us(late.percentile(99)), us(late.percentile(99.9)), us(late.max()));
   say(bad == 0 ? Finding::kGood : Finding::kDegraded, "jitter", figures);
-  if (bad == 0) return say(Finding::kGood, "1 kHz", fmt::format("held: each of {} ticks within 100 µs", all));
-  return say(Finding::kDegraded, "1 kHz",
-             fmt::format("not held within 100 µs: {} of {} ticks ({:.2g} %) later than that, {} of them missed", bad,
-                         all, 100.0 * static_cast<double>(bad) / static_cast<double>(all), jitter.missed));
+  const double measured_s = static_cast<double>(all) * to_s(kPeriod);
+  if (bad == 0) {
+    return say(Finding::kGood, "1 kHz",
+               fmt::format("held for {:.1f} s: each of {} ticks within 100 µs", measured_s, all));
+  }
+  return say(
+      Finding::kDegraded, "1 kHz",
+      fmt::format("not held for {:.1f} s: {} of {} ticks ({:.2g} %) more than 100 µs late, {} of them missed",
+                  measured_s, bad, all, 100.0 * static_cast<double>(bad) / static_cast<double>(all), jitter.missed));
 }
 
 Finding try_realtime(Duration jitter) {

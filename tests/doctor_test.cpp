@@ -2,6 +2,9 @@
 
 #include "apps/doctor.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
 
@@ -11,6 +14,7 @@
 #include <fstream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "pons/rt/grant.hpp"
@@ -18,6 +22,8 @@
 
 namespace pons::apps {
 namespace {
+
+using testing::HasSubstr;
 
 std::vector<int> allowed_cpus() {
   cpu_set_t allowed;
@@ -58,7 +64,7 @@ TEST_F(LoopGovernor, IsThatOfTheCpuThatTheLoopTakesWhereverTheDoctorRuns) {
       allow({here});
       allow(cpus_);
       const Governor governor = loop_governor(sys_.path());
-      const int taken = rt::loop_cpu() >= 0 ? rt::loop_cpu() : here;
+      const int taken = rt::loop_cpu(sys_.path()) >= 0 ? rt::loop_cpu(sys_.path()) : here;
       EXPECT_EQ(governor.cpu, taken);
       EXPECT_EQ(governor.name, "governor of CPU " + std::to_string(taken));
     }).join();
@@ -88,6 +94,7 @@ class Settings : public testing::Test {
     write("sys/kernel/realtime", "1");
     write("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc");
     for (const int cpu : allowed_cpus()) write(governor(cpu), "performance");
+    write("sys/devices/system/cpu/isolated", fmt::format("{}", fmt::join(allowed_cpus(), ",")));
     write("sys/kernel/mm/transparent_hugepage/enabled", "always [madvise] never");
     write("proc/swaps", "Filename Type Size Used Priority\n/swap file 1 0 -2");
     write("proc/sys/vm/swappiness", "10");
@@ -117,11 +124,12 @@ TEST_F(Settings, AreGoodAsThePackageSetsThem) { EXPECT_EQ(read_settings(root_.pa
 TEST_F(Settings, AreEachMissed) {
   EXPECT_EQ(with("sys/kernel/realtime", ""), Finding::kDegraded);
   EXPECT_EQ(with("sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet"), Finding::kDegraded);
-  const int cpu = rt::loop_cpu() >= 0 ? rt::loop_cpu() : allowed_cpus().front();
+  const int cpu = rt::loop_cpu(root_ / "sys") >= 0 ? rt::loop_cpu(root_ / "sys") : allowed_cpus().front();
   EXPECT_EQ(with(governor(cpu), "powersave"), Finding::kDegraded);
   EXPECT_EQ(with("sys/kernel/mm/transparent_hugepage/enabled", "[always] madvise never"), Finding::kDegraded);
   EXPECT_EQ(with("proc/sys/vm/swappiness", "60"), Finding::kDegraded);
   EXPECT_EQ(with("proc/sys/kernel/sched_rt_runtime_us", "500000"), Finding::kDegraded);
+  EXPECT_EQ(with("sys/devices/system/cpu/isolated", ""), Finding::kDegraded);
   EXPECT_EQ(read_settings(root_.path()), Finding::kGood);
 }
 
@@ -130,13 +138,36 @@ TEST_F(Settings, WithoutSwapSwappinessIsOfNoMatter) {
   EXPECT_EQ(with("proc/sys/vm/swappiness", "60"), Finding::kGood);
 }
 
+// A container may be shown an empty file, or none.
+TEST_F(Settings, ThatTheKernelHidesAreSaidToBeUnknown) {
+  for (const auto& [file, what] :
+       {std::pair{"proc/sys/kernel/sched_rt_runtime_us", "real-time budget"},
+        {"proc/sys/vm/swappiness", "swappiness"},
+        {"sys/devices/system/clocksource/clocksource0/current_clocksource", "clock source"}}) {
+    const std::string before = tests::read_text(root_ / file);
+    std::filesystem::remove(root_ / file);
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(read_settings(root_.path()), Finding::kDegraded);
+    EXPECT_THAT(testing::internal::GetCapturedStdout(),
+                HasSubstr(fmt::format("slow  {:<22} unknown: the kernel does not tell\n", what)));
+    tests::write_text(root_ / file, before);
+  }
+}
+
 TEST(OneKilohertz, IsHeldWhereNoTickIsMissedOrLate) {
   using std::chrono::microseconds;
   rt::Jitter jitter{.ticks = 1000};
   for (int i = 0; i < 1000; ++i) jitter.lateness.record(microseconds(99));
-  EXPECT_EQ(judge_jitter(jitter), Finding::kGood);
+  const auto said = [&](Finding finding) {
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(judge_jitter(jitter), finding);
+    return testing::internal::GetCapturedStdout();
+  };
+  // A verdict is worth as much as it was long.
+  EXPECT_THAT(said(Finding::kGood), HasSubstr("held for 1.0 s: each of 1000 ticks within 100 µs\n"));
   jitter.missed = 1;
-  EXPECT_EQ(judge_jitter(jitter), Finding::kDegraded);
+  EXPECT_THAT(said(Finding::kDegraded),
+              HasSubstr("not held for 1.0 s: 1 of 1001 ticks (0.1 %) more than 100 µs late, 1 of them missed\n"));
   jitter.missed = 0;
   jitter.lateness.record(microseconds(110));
   EXPECT_EQ(judge_jitter(jitter), Finding::kDegraded);

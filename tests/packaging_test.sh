@@ -59,6 +59,11 @@ done
 for setting in enabled\ -\ -\ -\ -\ madvise scaling_governor\ -\ -\ -\ -\ performance; do
   grep -qE "^w!? /sys/.*/$setting\$" tmpfiles.d/pons.conf || die "tmpfiles.d/pons.conf lacks $setting"
 done
+# Its group may write the device, and it is the group that people and services get.
+grep -qxF 'KERNEL=="cpu_dma_latency", GROUP="realtime", MODE="0660"' udev/90-pons.rules || die "udev/90-pons.rules does not give the device"
+for file in $(grep -o '^| `.*` |' README.md | grep -o '`[a-z.-]*/[^`]*`' | tr -d '`' | grep -v '^/'); do
+  [ -e "$file" ] || die "README.md's table names $file, which there is not"
+done
 for file in $(find . -mindepth 2 -type f -printf '%P\n'); do
   grep -qF "\`$file\`" README.md || die "$file is not in the table of README.md"
 done

@@ -18,7 +18,8 @@
 
 namespace pons::link {
 
-// What must be equal on both sides, beside the program's version.
+// What must be equal on both sides, beside what the memory itself compares: Border::kVersion and its size. Two builds
+// that agree on those are taken for one.
 struct Identity {
   std::array<char, 65> world{};  // its name
   std::uint64_t cell = 0;        // digest of the files that say what it is: world, scene, robot and tool

@@ -40,10 +40,10 @@ void note(Grant& grant, const char* what, int error, const std::string& mend) {
 }
 
 // The kernel's list form, "0-3,6". An unreadable one holds nothing.
-cpu_set_t isolated_cpus() {
+cpu_set_t isolated_cpus(const std::filesystem::path& sys) {
   cpu_set_t cpus;
   CPU_ZERO(&cpus);
-  std::ifstream file("/sys/devices/system/cpu/isolated");
+  std::ifstream file(sys / "devices/system/cpu/isolated");
   for (std::size_t first = 0, last = 0; file >> first;) {
     last = first;
     if (file.peek() == '-') file.ignore() >> last;
@@ -101,10 +101,10 @@ Grant make_realtime(const Scheduling& scheduling) {
   return grant;
 }
 
-int loop_cpu() {
+int loop_cpu(const std::filesystem::path& sys) {
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0 || CPU_COUNT(&allowed) < 2) return -1;
-  const cpu_set_t isolated = isolated_cpus();
+  const cpu_set_t isolated = isolated_cpus(sys);
   int last = -1, last_isolated = -1;
   for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
     if (!CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) continue;
@@ -112,6 +112,11 @@ int loop_cpu() {
     if (CPU_ISSET(static_cast<std::size_t>(cpu), &isolated)) last_isolated = cpu;
   }
   return last_isolated >= 0 ? last_isolated : last;
+}
+
+bool is_isolated(int cpu, const std::filesystem::path& sys) {
+  const cpu_set_t isolated = isolated_cpus(sys);
+  return cpu >= 0 && CPU_ISSET(static_cast<std::size_t>(cpu), &isolated);
 }
 
 }  // namespace pons::rt

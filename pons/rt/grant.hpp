@@ -2,6 +2,7 @@
 // refuse.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,6 +48,10 @@ struct Grant {
 
 // Where a loop should run: the last CPU that this thread may use and that the kernel keeps free of other work
 // (isolcpus), else the last that it may use, else, if there is but one, -1: pinning would only take it from others.
-[[nodiscard]] int loop_cpu();
+// `sys`: where the kernel's files lie.
+[[nodiscard]] int loop_cpu(const std::filesystem::path& sys = "/sys");
+
+// Whether the kernel keeps that CPU free of other work.
+[[nodiscard]] bool is_isolated(int cpu, const std::filesystem::path& sys = "/sys");
 
 }  // namespace pons::rt

@@ -12,10 +12,13 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "pons/rt/test_rights.hpp"
 
@@ -24,6 +27,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
 constexpr int kPriority = 37;
@@ -213,6 +217,59 @@ TEST(LoopCpu, IsOneThatTheThreadMayUse) {
   if (const int cpu = loop_cpu(); cpu >= 0) {
     EXPECT_TRUE(CPU_ISSET(static_cast<std::size_t>(cpu), &allowed));
   }
+}
+
+// With such a file of the kernel's.
+class IsolatedCpus : public testing::Test {
+ protected:
+  IsolatedCpus() { std::filesystem::create_directories(folder_); }
+  ~IsolatedCpus() override { std::filesystem::remove_all(sys_); }
+  void write(const std::string& list) const { std::ofstream(folder_ / "isolated") << list << "\n"; }
+  std::vector<int> isolated() const {
+    std::vector<int> cpus;
+    for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+      if (is_isolated(cpu, sys_)) cpus.push_back(cpu);
+    }
+    return cpus;
+  }
+
+  const std::filesystem::path sys_ =
+      std::filesystem::path(testing::TempDir()) / ("isolated." + std::to_string(getpid()));
+  const std::filesystem::path folder_ = sys_ / "devices/system/cpu";
+};
+
+TEST_F(IsolatedCpus, AreReadAsTheKernelListsThem) {
+  EXPECT_THAT(isolated(), IsEmpty()) << "there is no such file";
+  for (const auto& [list, cpus] : std::vector<std::pair<std::string, std::vector<int>>>{{"", {}},
+                                                                                        {"3", {3}},
+                                                                                        {"0-3,6", {0, 1, 2, 3, 6}},
+                                                                                        {"1,4-5,1023", {1, 4, 5, 1023}},
+                                                                                        {"1022-5000", {1022, 1023}},
+                                                                                        {"none", {}}}) {
+    write(list);
+    EXPECT_EQ(isolated(), cpus) << list;
+  }
+  EXPECT_FALSE(is_isolated(-1, sys_));
+}
+
+TEST_F(IsolatedCpus, AreTakenBeforeOthersTheLastOfThemThatTheThreadMayUse) {
+  cpu_set_t allowed;
+  sched_getaffinity(0, sizeof allowed, &allowed);
+  std::vector<int> mine, others;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu)
+    (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed) ? mine : others).push_back(cpu);
+  const auto chosen = [&](int cpu) { return mine.size() > 1 ? cpu : -1; };  // of one there is no choice
+  EXPECT_EQ(loop_cpu(sys_), chosen(mine.back()));
+  for (std::size_t i = 0; i < mine.size(); ++i) {
+    write(std::to_string(mine[i]));
+    EXPECT_EQ(loop_cpu(sys_), chosen(mine[i]));
+    write(std::to_string(mine.front()) + "," + std::to_string(mine[i]));
+    EXPECT_EQ(loop_cpu(sys_), chosen(mine[i]));
+    write(std::to_string(mine[i]) + "," + std::to_string(others.back()));
+    EXPECT_EQ(loop_cpu(sys_), chosen(mine[i])) << "the other one is not to be had";
+  }
+  write(std::to_string(others.back()));
+  EXPECT_EQ(loop_cpu(sys_), chosen(mine.back()));
 }
 
 }  // namespace

@@ -1,20 +1,32 @@
 #include "pons/rt/periodic_loop.hpp"
 
+#include <algorithm>
+
 namespace pons::rt {
 
 Time PeriodicLoop::sleep_until(Time scheduled) {
-  constexpr std::int64_t kSoon_ns = 200'000;
+  constexpr std::int64_t kSoon_ns = 200'000, kLongestLook_ns = 1'000'000;
   timespec deadline = clock_.absolute(scheduled);
-  for (;;) {
+  leashed_ns_ = 0;
+  for (std::int64_t asleep_ns = 0;;) {
     const auto woken = word_.wait(seen_, deadline);
     const std::int64_t raw_ns = MonotonicClock::raw_ns();
     const Time now = clock_.now();
     late_ = Duration(raw_ns - deadline.tv_sec * 1'000'000'000LL - deadline.tv_nsec);
+    // A look at a clock that stands still takes a moment more than it should; beyond that the thread was held up.
+    if (asleep_ns != 0) leashed_ns_ += std::min(raw_ns - asleep_ns, kLongestLook_ns);
     if (now >= scheduled) return scheduled;
     if (woken == WakeWord::Woken::kChanged) return now;
     // On a leash, standing still: whoever paces the clock needs the CPU.
+    asleep_ns = raw_ns;
     deadline = MonotonicClock::as_timespec(raw_ns + kSoon_ns);
   }
+}
+
+void PeriodicLoop::begin_tick() {
+  const std::int64_t now_ns = MonotonicClock::raw_ns();
+  gap_ = begun_ns_ == 0 ? Duration{0} : Duration(now_ns - begun_ns_ - leashed_ns_);
+  begun_ns_ = now_ns;
 }
 
 void PeriodicLoop::run(const std::function<bool(Time)>& tick) {
@@ -23,12 +35,12 @@ void PeriodicLoop::run(const std::function<bool(Time)>& tick) {
   for (;;) {
     const Time time = sleep_until(scheduled);
     seen_ = word_.value();  // before the tick looks at what it stands for: a change from here on wakes again
+    begin_tick();
     const Time begin = clock_.now();
     if (time == scheduled) {
       lateness_.record(late_);
       scheduled += period_;
     } else {
-      late_ = Duration{0};
       ++woken_;
     }
     const bool go_on = tick(time);

@@ -29,13 +29,16 @@ class PeriodicLoop {
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] std::uint64_t missed() const { return missed_; }
   [[nodiscard]] std::uint64_t woken() const { return woken_; }  // ticks that the word asked for
-  // How late this tick's thread was woken; 0 for one that the word asked for. What a clock on a leash stood still is
-  // not the thread's lateness.
-  [[nodiscard]] Duration late() const { return late_; }
-  [[nodiscard]] const Histogram& lateness() const { return lateness_; }    // of all scheduled ticks
+  // By CLOCK_MONOTONIC, when this tick began, and how long after the one before it (0 for the first): whatever kept the
+  // thread, in its sleep, inside a tick or between, is in it. What it waited for a clock on a leash is not.
+  [[nodiscard]] std::int64_t begun_ns() const { return begun_ns_; }
+  [[nodiscard]] Duration gap() const { return gap_; }
+  // Of all scheduled ticks: how late the thread was woken. What a clock on a leash stood still is not in it.
+  [[nodiscard]] const Histogram& lateness() const { return lateness_; }
   [[nodiscard]] const Histogram& execution() const { return execution_; }  // from the tick's begin to its end
 
  private:
+  void begin_tick();
   // The time of the next tick, when it has come.
   [[nodiscard]] Time sleep_until(Time scheduled);
 
@@ -45,7 +48,8 @@ class PeriodicLoop {
   const WakeWord& word_;
   std::uint32_t seen_ = 0;  // of the word
   std::uint64_t ticks_ = 0, missed_ = 0, woken_ = 0;
-  Duration late_{0};
+  Duration late_{0}, gap_{0};
+  std::int64_t begun_ns_ = 0, leashed_ns_ = 0;  // the latter: waited for the clock since the last tick
   Histogram lateness_, execution_;
 };
 

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -45,7 +44,8 @@ bool is_taken(int file, SharedMemory::Role role) {
   return fcntl(file, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
 }
 
-std::string path_of(const std::string& name) { return "/dev/shm/pons." + name; }
+constexpr const char* kFolder = "/dev/shm";
+std::string path_of(const std::string& name) { return fmt::format("{}/pons.{}", kFolder, name); }
 
 Expected<void> check_name(const std::string& name) {
   constexpr std::size_t kLongest = 200;
@@ -57,7 +57,10 @@ Expected<void> check_name(const std::string& name) {
 }
 
 std::unexpected<Error> system_error(const std::string& path) {
-  return fail(std::strerror(errno), path, "is /dev/shm mounted, writable, and not full?");
+  const bool forbidden = errno == EACCES || errno == EPERM;
+  return fail(std::strerror(errno), path,
+              forbidden ? "another user's process made it: run both sides as one user, or choose another name"
+                        : "is /dev/shm mounted, writable, and not full?");
 }
 
 // Whether the name's file is the one that is open: an owner that went away may have been followed by another.
@@ -71,15 +74,13 @@ bool is_at(const std::string& path, int file) {
 SharedMemory::~SharedMemory() {
   if (bytes_ != nullptr) munmap(bytes_ - kPage, mapped_);
   if (file_ < 0) return;
-  if (!unpublished_.empty()) unlink(unpublished_.c_str());
-  if (role_ == Role::kOwner && unpublished_.empty() && is_at(path_of(name_), file_)) unlink(path_of(name_).c_str());
+  if (role_ == Role::kOwner && is_at(path_of(name_), file_)) unlink(path_of(name_).c_str());
   close(file_);
 }
 
 void SharedMemory::swap(SharedMemory& other) noexcept {
   std::swap(role_, other.role_);
   std::swap(name_, other.name_);
-  std::swap(unpublished_, other.unpublished_);
   std::swap(file_, other.file_);
   std::swap(mapped_, other.mapped_);
   std::swap(bytes_, other.bytes_);
@@ -92,24 +93,24 @@ Expected<SharedMemory> SharedMemory::make(const std::string& name, const Layout&
     const bool taken = is_taken(old, Role::kOwner);
     close(old);
     if (taken) return fail("another process owns it", path, "end that one, or choose another name");
+  } else if (errno != ENOENT) {
+    return system_error(path);
   }
   SharedMemory memory;
   memory.role_ = Role::kOwner;
   memory.name_ = name;
-  const std::string made = fmt::format("{}.{}", path, getpid());
-  unlink(made.c_str());  // of an earlier process of this number
-  memory.file_ = ::open(made.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (memory.file_ < 0) return system_error(made);
-  memory.unpublished_ = made;
+  // Without a name: nobody can come upon it, and nothing of it stays if this process is killed before publish().
+  memory.file_ = ::open(kFolder, O_RDWR | O_TMPFILE | O_CLOEXEC, 0600);
+  if (memory.file_ < 0) return system_error(kFolder);
   const std::size_t whole = kPage + layout.bytes;
   // Reserved now: a full /dev/shm would otherwise kill the process at its first touch.
   if (const int error = posix_fallocate(memory.file_, 0, static_cast<off_t>(whole)); error != 0) {
     errno = error;
-    return system_error(made);
+    return system_error(path);
   }
-  if (!take(memory.file_, Role::kOwner)) return system_error(made);
+  if (!take(memory.file_, Role::kOwner)) return system_error(path);
   void* const start = mmap(nullptr, whole, PROT_READ | PROT_WRITE, MAP_SHARED, memory.file_, 0);
-  if (start == MAP_FAILED) return system_error(made);
+  if (start == MAP_FAILED) return system_error(path);
   memory.mapped_ = whole;
   memory.bytes_ = static_cast<std::byte*>(start) + kPage;
   const Header header{kMagic, layout.version, layout.bytes};
@@ -119,8 +120,10 @@ Expected<SharedMemory> SharedMemory::make(const std::string& name, const Layout&
 
 Expected<void> SharedMemory::publish() {
   const std::string path = path_of(name_);
-  if (std::rename(unpublished_.c_str(), path.c_str()) != 0) return system_error(path);
-  unpublished_.clear();
+  // A link does not replace what has the name: a dead owner's memory goes first.
+  if (unlink(path.c_str()) != 0 && errno != ENOENT) return system_error(path);
+  const std::string opened = fmt::format("/proc/self/fd/{}", file_);
+  if (linkat(AT_FDCWD, opened.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) != 0) return system_error(path);
   return {};
 }
 

@@ -33,12 +33,13 @@ class SharedMemory {
   ~SharedMemory();
 
   // Zeroed memory that nobody sees before publish(). Names hold letters, digits, '-', '_' and '.'.
-  // Errors: a bad name, a living owner of that name, no room. Of two that make one name at the same moment, the later
-  // is seen.
+  // Errors: a bad name, a living owner of that name, another user's, no room. Of two that make one name at the same
+  // moment, one is seen; the other's publish() may fail.
   [[nodiscard]] static Expected<SharedMemory> make(const std::string& name, const Layout& layout);
   // The owner, once, when the object in it is whole.
   [[nodiscard]] Expected<void> publish();
-  // Errors: a bad name, nobody owns it, its owner has died, another user has it, of another version, not whole.
+  // Errors: a bad name, nobody owns it, its owner has died, another process uses it, it belongs to another user, is of
+  // another version, or not whole.
   [[nodiscard]] static Expected<SharedMemory> open(const std::string& name, const Layout& layout);
 
   // Whether a living owner has published something under that name: open() may still refuse it.
@@ -52,7 +53,7 @@ class SharedMemory {
   void swap(SharedMemory& other) noexcept;
 
   Role role_ = Role::kUser;
-  std::string name_, unpublished_;  // the file's name while nobody may see it
+  std::string name_;
   int file_ = -1;
   std::size_t mapped_ = 0;
   std::byte* bytes_ = nullptr;

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,7 +12,10 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "pons/rt/ring.hpp"
 #include "pons/rt/triple_buffer.hpp"
@@ -20,7 +24,10 @@
 namespace pons::rt {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
 
 struct Channel {
   static constexpr std::uint64_t kVersion = 7;
@@ -36,11 +43,19 @@ struct OtherSize : Channel {
 
 class SharedMemoryTest : public testing::Test {
  protected:
-  const std::string name_ = "test." + std::to_string(getpid());
+  const std::string name_ = "test." + std::to_string(getpid()) + ".rt";
   const std::string path_ = "/dev/shm/pons." + name_;
   ~SharedMemoryTest() override {
     std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
+    for (const std::string& file : files()) std::filesystem::remove(file, ignored);
+  }
+  // Of this name, or of one that begins with it.
+  std::vector<std::string> files() const {
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::directory_iterator("/dev/shm")) {
+      if (entry.path().string().starts_with(path_)) found.push_back(entry.path());
+    }
+    return found;
   }
   template <typename T>
   std::string open_error() const {
@@ -209,13 +224,67 @@ TEST_F(SharedMemoryTest, WhatIsNotWholeOrOfAnotherVersionIsRefused) {
   EXPECT_FALSE(std::filesystem::exists(path_)) << "it goes with its owner";
 }
 
+TEST_F(SharedMemoryTest, ThatIsNoMemoryOfPonsIsRefusedWhateverItsSize) {
+  const auto owner = Shared<Channel>::make(name_);
+  ASSERT_TRUE(owner) << owner.error().line();
+  EXPECT_EQ(open_error<Channel>(), "opened");
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.put('q');
+  }
+  EXPECT_THAT(open_error<Channel>(), HasSubstr("is not shared memory of Pons, or not whole"));
+}
+
 TEST_F(SharedMemoryTest, NobodySeesItBeforeItIsPublished) {
   const SharedMemory::Layout layout{4096, 1};
   auto memory = SharedMemory::make(name_, layout);
   ASSERT_TRUE(memory) << memory.error().line();
   EXPECT_FALSE(SharedMemory::open(name_, layout));
+  EXPECT_THAT(files(), IsEmpty());
   ASSERT_TRUE(memory->publish());
   EXPECT_TRUE(SharedMemory::open(name_, layout));
+  EXPECT_THAT(files(), ElementsAre(path_));
+}
+
+TEST_F(SharedMemoryTest, AnOwnerThatIsKilledBeforeItPublishesLeavesNothing) {
+  const pid_t child = in_a_process([&] {
+    const auto memory = SharedMemory::make(name_, {4096, 1});
+    if (memory) kill(getpid(), SIGKILL);
+    return 1;
+  });
+  EXPECT_EQ(wait_for(child), -SIGKILL);
+  EXPECT_THAT(files(), IsEmpty());
+}
+
+// Whatever a link is called, nobody else's is in its way: not what one makes that is called by part of its name.
+TEST_F(SharedMemoryTest, NamesThatBeginAlikeAreStrangers) {
+  const auto longer = Shared<Channel>::make(name_ + "." + std::to_string(getpid()));
+  ASSERT_TRUE(longer) << longer.error().line();
+  {
+    const auto owner = Shared<Channel>::make(name_);
+    ASSERT_TRUE(owner) << owner.error().line();
+    EXPECT_THAT(files(), SizeIs(2));
+  }
+  const auto user = Shared<Channel>::open(name_ + "." + std::to_string(getpid()));
+  ASSERT_TRUE(user) << user.error().line();
+  EXPECT_TRUE(longer->other_lives());
+}
+
+TEST_F(SharedMemoryTest, AnotherUsersIsSaidToBe) {
+  const auto owner = Shared<Channel>::make(name_);
+  ASSERT_TRUE(owner) << owner.error().line();
+  ASSERT_EQ(chmod(path_.c_str(), 0), 0);  // as for a stranger
+  const pid_t child = in_a_process([&] {
+    constexpr uid_t kNobody = 65'534;
+    if (geteuid() == 0 && setresuid(kNobody, kNobody, kNobody) != 0) return 1;
+    const auto is_told = [](const auto& shared) {
+      return !shared && shared.error().line().find("run both sides as one user") != std::string::npos;
+    };
+    if (!is_told(Shared<Channel>::open(name_))) return 2;
+    if (!is_told(Shared<Channel>::make(name_))) return 3;
+    return 0;
+  });
+  EXPECT_EQ(wait_for(child), 0);
 }
 
 TEST_F(SharedMemoryTest, NamesAreNoPaths) {

@@ -17,8 +17,8 @@ class WakeWord {
 
   [[nodiscard]] std::uint32_t value() const PONS_NONBLOCKING { return word_.load(std::memory_order_acquire); }
 
-  // Changes the word and wakes all who wait for that. Any thread or process, signal handlers too: one system call,
-  // which never blocks.
+  // Changes the word and wakes all who wait for that; what was written before is there for who sees the change. Any
+  // thread or process, signal handlers too: one system call, which never blocks.
   void set(std::uint32_t value);
 
   // The same, to a value that it did not have: for words that only say that something has changed.

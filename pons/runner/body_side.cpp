@@ -13,10 +13,7 @@
 namespace pons::runner {
 namespace {
 
-// Below the loop's: it must not wait for the body.
-constexpr int kBodyPriority = 60;
-
-// A loop that was woken so late is told of: libfranka's robots stop after twenty missed packets in a row.
+// Ticks that begin so far apart are told of: libfranka's robots stop after twenty missed packets in a row.
 constexpr Duration kStall = 20 * kControlPeriod;
 
 // A loop from which nothing has come for so many of the body's ticks in a row is gone for good, and so is the run: a
@@ -112,16 +109,16 @@ void BodySide::run_body() {
 
 LoopFigures BodySide::run_loop() {
   name_thread("pons_loop");
-  const rt::Grant grant = rt::make_realtime({.cpu = rt::loop_cpu()});
+  const rt::Grant grant = rt::make_realtime({.priority = kLoopPriority, .cpu = rt::loop_cpu()});
   refusals_.note(grant);
   Asked asked;
   rt::PeriodicLoop loop(clock_, kControlPeriod, parts_.link->emergency_word());
   loop.run([&](Time now) {
     const rt::InTick in_tick;
     if (!running_.load()) return false;  // the parts may be gone by now
-    if (loop.late() >= kStall)
-      parts_.cerebellum->log().write(now, "the loop was woken {:.1f} ms late, at {:.6f} s of CLOCK_MONOTONIC",
-                                     1e3 * to_s(loop.late()), 1e-9 * static_cast<double>(rt::MonotonicClock::raw_ns()));
+    if (loop.gap() >= kStall)
+      parts_.cerebellum->log().write(now, "no tick began for {:.1f} ms, until {:.6f} s of CLOCK_MONOTONIC",
+                                     1e3 * to_s(loop.gap()), 1e-9 * static_cast<double>(loop.begun_ns()));
     const body::Sensors& sensors = measured_.read();
     if (sensors.position.size() > 0) {
       parts_.cerebellum->step(now, sensors, *parts_.link, asked.set_points);

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "pons/rt/clock.hpp"
+#include "pons/rt/grant.hpp"
 #include "pons/rt/triple_buffer.hpp"
 #include "pons/runner/refusals.hpp"
 #include "pons/runner/run.hpp"
@@ -18,6 +19,11 @@ namespace pons::runner {
 // Neither the body nor the run's clock goes further than this past the last set-points. A real arm falls on while its
 // loop is held up; a simulated one need not, and what a busy computer does to it would say nothing about a robot.
 inline constexpr Duration kLeash = 4 * kControlPeriod;
+
+// SCHED_FIFO's. The loop waits for nobody; the body, which on a robot would have a computer of its own, not for what
+// thinks.
+inline constexpr int kLoopPriority = rt::Scheduling{}.priority, kBodyPriority = 60, kBridgePriority = 10;
+static_assert(kLoopPriority > kBodyPriority && kBodyPriority > kBridgePriority && kBridgePriority > 0);
 
 class BodySide {
  public:

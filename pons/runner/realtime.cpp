@@ -8,12 +8,6 @@
 #include "pons/runner/ending.hpp"
 
 namespace pons::runner {
-namespace {
-
-constexpr int kBridgePriority = 10;  // below loop and body: neither must wait for it
-
-}  // namespace
-
 Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, const BodyView& body, Refusals& refusals,
                                const Watch& watch) {
   refusals.note(rt::make_realtime({.priority = kBridgePriority}));

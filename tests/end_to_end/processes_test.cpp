@@ -22,6 +22,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr int kBadInput = 2, kBodyGone = 3, kInterrupted = 130;
+constexpr int kConfirmWithin_ms = 2000 + 20;  // cerebellum::Settings, and a tick that a busy computer may delay
 constexpr Duration kLongest = std::chrono::seconds(120);  // beyond it a run hangs
 
 class Processes : public ::testing::Test {
@@ -114,8 +115,11 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
   ASSERT_TRUE(std::regex_search(
       log, standing, std::regex("standstill CONFIRMED ([0-9]+) ms after the stop began, ([0-9]+) of them braking")))
       << log;
-  EXPECT_LE(std::stoi(standing[2]), 300);
-  EXPECT_LE(std::stoi(standing[1]), 600) << "a load that swings moves the arm that holds it";
+  // Braking is the loop's own motion. Afterwards a load that swings moves the arm that holds it, for as long as it
+  // does: CONFIRMED says that it stood soon enough for the loop.
+  const int braking_ms = std::stoi(standing[2]);
+  EXPECT_LE(braking_ms, 300);
+  EXPECT_LE(std::stoi(standing[1]) - braking_ms, kConfirmWithin_ms);
 
   Running second(folder_.path(), "second", bridge(kParcels));
   const Finished ended = second.wait();

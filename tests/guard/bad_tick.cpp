@@ -2,6 +2,7 @@
 // a guard each of them ends, and with code 0.
 #include <fcntl.h>
 #include <linux/futex.h>
+#include <malloc.h>
 #include <pthread.h>
 #include <semaphore.h>
 #include <sys/mman.h>
@@ -181,6 +182,51 @@ void semaphore() {
   tick([&] { sem_wait(&one); });
 }
 
+// Each waits for nothing, or for a moment that has passed.
+constexpr timespec kPast{.tv_sec = 0, .tv_nsec = 0};
+
+template <typename Take>
+void locks_mutex(Take take) {
+  pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+  tick([&] { number = take(&lock); });
+}
+
+template <typename Take>
+void locks_rwlock(Take take) {
+  pthread_rwlock_t lock = PTHREAD_RWLOCK_INITIALIZER;
+  tick([&] { number = take(&lock); });
+}
+
+template <typename Wait>
+void waits_for_semaphore(Wait wait) {
+  sem_t one;
+  sem_init(&one, 0, 1);
+  tick([&] { number = wait(&one); });
+}
+
+template <typename Wait>
+void waits_for_condition(Wait wait) {
+  pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+  pthread_cond_t condition = PTHREAD_COND_INITIALIZER;
+  pthread_mutex_lock(&lock);
+  std::jthread other([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) pthread_cond_broadcast(&condition);
+  });
+  tick([&] { number = wait(&condition, &lock); });
+}
+
+void barrier() {
+  pthread_barrier_t barrier;
+  pthread_barrier_init(&barrier, nullptr, 1);
+  tick([&] { number = pthread_barrier_wait(&barrier); });
+}
+
+void grows_array() {
+  void* memory = std::malloc(8);
+  kept = memory;
+  tick([&] { kept = reallocarray(memory, 100, 8); });
+}
+
 void joins() {
   std::thread other([] {});
   tick([&] { other.join(); });
@@ -235,6 +281,10 @@ const std::map<std::string, void (*)()> kCases{
     {"realloc", grows},
     {"aligned_alloc", [] { tick([] { kept = std::aligned_alloc(64, 64); }); }},
     {"posix_memalign", aligns},
+    {"memalign", [] { tick([] { kept = memalign(64, 64); }); }},
+    {"valloc", [] { tick([] { kept = valloc(8); }); }},
+    {"pvalloc", [] { tick([] { kept = pvalloc(8); }); }},
+    {"reallocarray", grows_array},
     {"free", frees},
     {"new", [] { tick([] { kept = new int(1); }); }},
     {"vector", fills_a_vector},
@@ -244,7 +294,22 @@ const std::map<std::string, void (*)()> kCases{
     {"shared_mutex", shared_mutex},
     {"condition", condition},
     {"spin", spin},
+    {"timed_mutex", [] { locks_mutex([](auto* lock) { return pthread_mutex_timedlock(lock, &kPast); }); }},
+    {"write_lock", [] { locks_rwlock([](auto* lock) { return pthread_rwlock_wrlock(lock); }); }},
+    {"timed_read_lock", [] { locks_rwlock([](auto* lock) { return pthread_rwlock_timedrdlock(lock, &kPast); }); }},
+    {"timed_write_lock", [] { locks_rwlock([](auto* lock) { return pthread_rwlock_timedwrlock(lock, &kPast); }); }},
+    {"clock_read_lock",
+     [] { locks_rwlock([](auto* lock) { return pthread_rwlock_clockrdlock(lock, CLOCK_MONOTONIC, &kPast); }); }},
+    {"clock_write_lock",
+     [] { locks_rwlock([](auto* lock) { return pthread_rwlock_clockwrlock(lock, CLOCK_MONOTONIC, &kPast); }); }},
+    {"untimed_condition", [] { waits_for_condition(pthread_cond_wait); }},
+    {"timed_condition",
+     [] { waits_for_condition([](auto* of, auto* lock) { return pthread_cond_timedwait(of, lock, &kPast); }); }},
+    {"barrier", barrier},
     {"semaphore", semaphore},
+    {"timed_semaphore", [] { waits_for_semaphore([](auto* one) { return sem_timedwait(one, &kPast); }); }},
+    {"clock_semaphore",
+     [] { waits_for_semaphore([](auto* one) { return sem_clockwait(one, CLOCK_MONOTONIC, &kPast); }); }},
     {"join", joins},
     {"read", reads},
     {"write", writes},

@@ -37,6 +37,8 @@ void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);
 void* __libc_realloc(void* old, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
+void* __libc_valloc(std::size_t size);
+void* __libc_pvalloc(std::size_t size);
 void __libc_free(void* memory);
 }
 // NOLINTEND(bugprone-reserved-identifier, readability-identifier-naming)
@@ -76,6 +78,16 @@ void* memalign(std::size_t alignment, std::size_t size) noexcept {
 void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
   allocates("aligned_alloc");
   return __libc_memalign(alignment, size);
+}
+
+void* valloc(std::size_t size) noexcept {
+  allocates("valloc");
+  return __libc_valloc(size);
+}
+
+void* pvalloc(std::size_t size) noexcept {
+  allocates("pvalloc");
+  return __libc_pvalloc(size);
 }
 
 int posix_memalign(void** memory, std::size_t alignment, std::size_t size) noexcept {

@@ -36,7 +36,7 @@ struct Settings {
 };
 constinit Settings settings;
 
-constinit std::atomic<std::uint64_t> ticks{0};
+constinit std::atomic<std::uint64_t> ticks{0}, inner{0};
 constinit std::array<std::atomic<std::uint64_t>, kKinds> counts{};
 
 void say(std::span<char> text, int length) {
@@ -52,8 +52,8 @@ void summarize() {
   std::array<char, 256> text{};
   say(text, std::snprintf(text.data(), text.size(),
                           "pons_guard: %lu ticks guarded, %lu violations (%lu allocations, %lu locks, %lu system "
-                          "calls, %lu page faults)\n",
-                          ticks.load(), all, found[0], found[1], found[2], found[3]));
+                          "calls, %lu page faults), %lu scopes inside of ticks\n",
+                          ticks.load(), all, found[0], found[1], found[2], found[3], inner.load()));
 }
 
 [[noreturn]] void give_up(const char* why) {
@@ -145,7 +145,10 @@ extern "C" {
 
 void pons_tick_begin() noexcept {
   using pons::guard::watch;
-  if (watch.depth++ > 0) return;
+  if (watch.depth++ > 0) {
+    pons::guard::inner.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
   if (!watch.armed) pons::guard::arm();
   pons::guard::ticks.fetch_add(1, std::memory_order_relaxed);
   watch.faults = pons::guard::page_faults();
