@@ -44,6 +44,7 @@ struct Arguments {
     corrections.integral = any(random, 50);
     for (int i = 0; i < 4; ++i) corrections.sent.push(any(random, 50));
     admittance.axis_way = any(random, 0.01);
+    admittance.axis_speed = any(random, 0.1);
     admittance.speed.setConstant(random.uniform(0, 0.02));
   }
   [[nodiscard]] ArmNow arm() const { return {position, speed, payload}; }
@@ -65,6 +66,7 @@ void expect_equal(const Arguments& one, const Arguments& other) {
   EXPECT_EQ(one.admittance.speed, other.admittance.speed);
   EXPECT_EQ(one.admittance.way, other.admittance.way);
   EXPECT_EQ(one.admittance.axis_way, other.admittance.axis_way);
+  EXPECT_EQ(one.admittance.axis_speed, other.admittance.axis_speed);
 }
 
 TEST_P(Laws, AreFunctionsOfWhatTheyAreHanded) {
