@@ -255,7 +255,19 @@ TEST(LimitUse, FindsExtremesBetweenTheEnds) {
   EXPECT_EQ(limit_use(std::span(&segment, 1), tight).worst(), 2);
 }
 
-// Pieces that cannot raise it are passed over: none that does.
+// Pieces that cannot raise it are passed over, but not one that does so in its middle only.
+TEST(LimitUse, SeesAMiddleBehindHigherEnds) {
+  std::vector<Segment> segments(2);
+  for (Segment& segment : segments) segment.duration = 1s;
+  segments[0].coefficients[0] = {0, 1, 0.5};             // speed from 1 to 2, acceleration 1
+  segments[1].coefficients[0] = {0, 0, 0, 20, -30, 12};  // twice the minimum-jerk polynomial
+  const LimitUse use = limit_use(segments, arm_limits(1));
+  EXPECT_NEAR(use.speed, 3.75 / 3.14, 1e-12);
+  EXPECT_NEAR(use.acceleration, 20 / std::sqrt(3.0) / 20, 1e-12);
+  segments[1].coefficients[0] = {6, 2, -2};  // 6.5 half-way
+  EXPECT_FALSE(limit_use(segments, arm_limits(1)).inside_position);
+}
+
 TEST(LimitUse, IsWhatDenseSamplingSees) {
   Random random(12);
   constexpr Eigen::Index kAxes = 3;
