@@ -12,7 +12,7 @@ namespace {
 constexpr double kExact = 1e-11;          // m and rad: better than this is left as it is
 constexpr int kPolishes = 12;             // steps at most; each squares the error, near a singularity it halves it
 constexpr double kPolishDamping = 1e-12;  // of units of the Jacobian squared
-constexpr double kOnLimit = 1e-9;         // rad beyond a limit that are rounding
+constexpr double kOnLimit = 1e-9;         // rad or m beyond a limit that are rounding
 constexpr double kNoSide = 1e-7;          // of Sides: as near to a singularity as rounding may be on either side
 
 bool same_side(const Sides& seed, const Sides& other) {
@@ -33,14 +33,14 @@ Branch branch_of(const Sides& sides) {
 
 InverseKinematics::InverseKinematics(const Chain& chain) : chain_(chain), closed_form_(ClosedForm::recognise(chain)) {}
 
-// Whole turns nearest to the seed; false if an axis has none inside its limits.
+// Whole turns nearest to the seed, of axes that turn; false if an axis has none inside its limits.
 bool InverseKinematics::turn_near(const AxisVector& seed, AxisVector& q) const {
   const AxisLimits& limits = chain_.limits();
   for (Eigen::Index axis = 0; axis < q.size(); ++axis) {
     const double low = limits.position_min[axis], high = limits.position_max[axis];
-    const double angle = nearest_turn(q[axis], seed[axis], low - kOnLimit, high + kOnLimit);
-    if (angle < low - kOnLimit || angle > high + kOnLimit) return false;
-    q[axis] = std::clamp(angle, low, high);
+    if (chain_.joint(axis).revolute) q[axis] = nearest_turn(q[axis], seed[axis], low - kOnLimit, high + kOnLimit);
+    if (q[axis] < low - kOnLimit || q[axis] > high + kOnLimit) return false;
+    q[axis] = std::clamp(q[axis], low, high);
   }
   return true;
 }

@@ -1,7 +1,9 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -123,28 +125,45 @@ TEST(Inverse, TakesTheTurnNearestToTheSeed) {
   EXPECT_NEAR(model.inverse(model.world_from_tip(wanted), seed).value()[5], 6.5 - 2 * std::numbers::pi, 1e-6);
 }
 
-TEST(Inverse, RefusesWhatIsOutOfReach) {
-  auto model = RobotModel::load(hanging_arm()).value();
-  const auto q = model.inverse(tool_down(2, 0, 1, 0), hanging_arm().home);
-  ASSERT_FALSE(q.has_value());
-  EXPECT_NE(q.error().line().find("cannot reach (2.000, 0.000, 1.000)"), std::string::npos);
+std::string error_of(const Expected<AxisVector>& q) { return q ? "none" : q.error().line(); }
+
+// Beyond reach, or reached on another branch only, or with an axis beyond its limits: each is said, and how to mend it.
+TEST(Inverse, SaysWhyThereIsNoAnswer) {
+  auto robot = hanging_arm();
+  auto model = RobotModel::load(robot).value();
+  const Pose far = tool_down(2, 0, 1, 0);
+  EXPECT_EQ(error_of(model.inverse(far, robot.home)),
+            "ur5e: the tip cannot reach (2.000, 0.000, 1.000) m in that orientation within the position limits on the "
+            "branch that the arm begins on; choose a pose inside the arm's reach, or begin on another branch");
+  EXPECT_EQ(error_of(model.inverse(far, robot.home, Among::kAllBranches)),
+            "ur5e: the tip cannot reach (2.000, 0.000, 1.000) m in that orientation within the position limits; choose "
+            "a pose inside the arm's reach, or wider position limits");
   Pose nonsense = Pose::Identity();
   nonsense.translation().x() = NAN;
-  EXPECT_FALSE(model.inverse(nonsense, hanging_arm().home).has_value());
+  EXPECT_EQ(error_of(model.inverse(nonsense, robot.home)),
+            "ur5e: pose or seed is not finite, or the seed has another number of axes; give finite numbers, and 6 of "
+            "them as the seed");
+
+  AxisVector limited = robot.home;
+  limited[0] -= 0.5;
+  const Pose beside = model.world_from_tip(limited);
+  robot.limits.position_min[0] = robot.home[0] - 0.2, robot.limits.position_max[0] = robot.home[0] + 0.2;
+  EXPECT_THAT(error_of(RobotModel::load(robot)->inverse(beside, robot.home)),
+              ::testing::HasSubstr("within the position limits on the branch that the arm begins on"));
 }
 
 // A seven-axis arm of the common kind (published parameters of a Panda).
+const std::vector<JointRow> kSevenRows{{{0, 0, 0.333}},
+                                       {{0, 0, 0}, {-kHalfPi, 0, 0}},
+                                       {{0, -0.316, 0}, {kHalfPi, 0, 0}},
+                                       {{0.0825, 0, 0}, {kHalfPi, 0, 0}},
+                                       {{-0.0825, 0.384, 0}, {-kHalfPi, 0, 0}},
+                                       {{0, 0, 0}, {kHalfPi, 0, 0}},
+                                       {{0.088, 0, 0}, {kHalfPi, 0, 0}}};
+
 world::Robot seven_axis_arm() {
   const static world::TestFolder folder;
-  auto robot = serial_robot(folder, "seven",
-                            {{{0, 0, 0.333}},
-                             {{0, 0, 0}, {-kHalfPi, 0, 0}},
-                             {{0, -0.316, 0}, {kHalfPi, 0, 0}},
-                             {{0.0825, 0, 0}, {kHalfPi, 0, 0}},
-                             {{-0.0825, 0.384, 0}, {-kHalfPi, 0, 0}},
-                             {{0, 0, 0}, {kHalfPi, 0, 0}},
-                             {{0.088, 0, 0}, {kHalfPi, 0, 0}}},
-                            Vector3(0, 0, 0.107), 3);
+  auto robot = serial_robot(folder, "seven", kSevenRows, Vector3(0, 0, 0.107), 3);
   robot.home = axis_vector({0, -0.785, 0, -2.356, 0, 1.571, 0.785});
   robot.limits.position_min = axis_vector({-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973});
   robot.limits.position_max = axis_vector({2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973});
@@ -222,18 +241,20 @@ TEST(Inverse, RedundantArmGetsAlmostAnywhereFromHome) {
   EXPECT_GE(solved, kPoses * 995 / 1000);
 }
 
-// Six axes of which no three are parallel and no three meet, and one that slides: no closed form, but answers.
+// Six axes of which no three are parallel and no three meet: no closed form.
+const std::vector<JointRow> kSkew{{{0, 0, 0.3}},
+                                  {{0.1, 0.05, 0.1}, {kHalfPi, 0, 0}},
+                                  {{0.4, 0, 0}, {0.3, 0, 0}},
+                                  {{0.1, 0.05, 0.3}, {kHalfPi, 0.2, 0}},
+                                  {{0.03, 0, 0.1}, {-kHalfPi, 0, 0}},
+                                  {{0.05, 0.02, 0.1}, {kHalfPi, 0, 0}}};
+
+// That arm, and one whose first axis slides: answers all the same.
 TEST(Inverse, ArmsWithoutClosedFormAreIterated) {
-  const std::vector<JointRow> skew{{{0, 0, 0.3}},
-                                   {{0.1, 0.05, 0.1}, {kHalfPi, 0, 0}},
-                                   {{0.4, 0, 0}, {0.3, 0, 0}},
-                                   {{0.1, 0.05, 0.3}, {kHalfPi, 0.2, 0}},
-                                   {{0.03, 0, 0.1}, {-kHalfPi, 0, 0}},
-                                   {{0.05, 0.02, 0.1}, {kHalfPi, 0, 0}}};
   const world::TestFolder folder;
-  auto sliding = skew;
+  auto sliding = kSkew;
   sliding[0].type = "prismatic";
-  for (const auto& [name, rows] : {std::pair{"skew", skew}, std::pair{"sliding", sliding}}) {
+  for (const auto& [name, rows] : {std::pair{"skew", kSkew}, std::pair{"sliding", sliding}}) {
     auto model = RobotModel::load(serial_robot(folder, name, rows, {0, 0, 0.1}, 2.5)).value();
     EXPECT_EQ(model.inverse_method(), RobotModel::InverseMethod::kIteration) << name;
     Random random(16);
@@ -250,6 +271,63 @@ TEST(Inverse, ArmsWithoutClosedFormAreIterated) {
     }
     EXPECT_GE(solved, 495) << name;
   }
+}
+
+// Iterations from a seed may pass a singularity on their way and end behind it: that is no answer on the seed's branch.
+TEST(Inverse, WithoutClosedFormTheSeedsBranchIsKeptToo) {
+  const world::TestFolder folder;
+  auto model = RobotModel::load(serial_robot(folder, "skew", kSkew, {0, 0, 0.1}, 2.5)).value();
+  Random random(17);
+  const auto anywhere = [&] {
+    AxisVector q(6);
+    for (auto& angle : q) angle = random.uniform(-2.5, 2.5);
+    return q;
+  };
+  int solved = 0, behind = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const AxisVector seed = anywhere();
+    const Pose target = model.world_from_tip(anywhere());
+    const double side = Jacobian(model.tip_jacobian(seed)).determinant();
+    if (const auto found = model.inverse(target, seed)) {
+      ++solved;
+      EXPECT_GT(model.tip_jacobian(*found).determinant() * side, -1e-3 * side * side) << i;
+    } else {
+      EXPECT_THAT(error_of(found), ::testing::HasSubstr("iteration near the seed did not bring the tip to")) << i;
+    }
+    const auto other = model.inverse(target, seed, Among::kAllBranches);
+    if (other && model.tip_jacobian(*other).determinant() * side < 0) ++behind;
+  }
+  std::printf("skew arm, on the seed's branch: solved %d of 1000; of all branches %d on another\n", solved, behind);
+  EXPECT_GT(solved, 200);
+  EXPECT_GT(behind, 200) << "else there was nothing to keep off";
+}
+
+// A whole turn takes an axis back to where it was; 2π m do not.
+TEST(Inverse, WhatSlidesIsNotTakenForATurn) {
+  const world::TestFolder folder;
+  auto rows = kSevenRows;
+  rows.insert(rows.begin(), {{0, 0, 0}, {kHalfPi, 0, 0}, Vector3::UnitZ(), "prismatic"});
+  rows[1].rpy = {-kHalfPi, 0, 0};
+  auto robot = serial_robot(folder, "rail", rows, Vector3(0, 0, 0.107), 3);
+  robot.limits.position_min[0] = -10, robot.limits.position_max[0] = 10;
+  auto model = RobotModel::load(robot).value();
+  Random random(18);
+  int solved = 0;
+  for (int i = 0; i < 200; ++i) {
+    AxisVector q(8);
+    for (auto& angle : q) angle = random.uniform(-1.5, 1.5);
+    AxisVector seed = q;
+    q[0] = random.uniform(4, 9), seed[0] = random.uniform(-9, -4);
+    const Pose target = model.world_from_tip(q);
+    const auto nearest = model.inverse(target, seed, Among::kAllBranches);
+    BranchSolutions all;
+    model.inverse_all(target, seed, all);
+    ASSERT_EQ(all.size(), nearest ? 1U : 0U) << i;
+    if (!nearest) continue;
+    ++solved;
+    EXPECT_LT((all[0].q - *nearest).cwiseAbs().maxCoeff(), 1e-5) << i;
+  }
+  EXPECT_GT(solved, 150);
 }
 
 }  // namespace

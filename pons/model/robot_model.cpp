@@ -155,6 +155,23 @@ struct RobotModel::Impl {
     return jacobian;
   }
 
+  // Says no more than was looked at: the seed's branch alone, and by iteration there is no proof.
+  [[nodiscard]] Error unreached(const Pose& world_from_tip, Among among) const {
+    const Vector3& p = world_from_tip.translation();
+    const std::string pose = fmt::format("({:.3f}, {:.3f}, {:.3f}) m in that orientation", p.x(), p.y(), p.z());
+    const bool seeds = among == Among::kBranchOfSeed;
+    if (!inverse->closed_form()) {
+      return {fmt::format("iteration{} did not bring the tip to {} within the position limits",
+                          seeds ? " near the seed" : "", pose),
+              robot.name, "choose a pose farther inside the arm's reach, or begin elsewhere"};
+    }
+    return {fmt::format("the tip cannot reach {} within the position limits{}", pose,
+                        seeds ? " on the branch that the arm begins on" : ""),
+            robot.name,
+            seeds ? "choose a pose inside the arm's reach, or begin on another branch"
+                  : "choose a pose inside the arm's reach, or wider position limits"};
+  }
+
   // What inverse kinematics needs of the model: the axes with every joint at zero.
   Chain chain() {
     const Jacobian at_zero = tip_jacobian(AxisVector::Zero(model.nv));
@@ -293,12 +310,11 @@ RobotModel::InverseMethod RobotModel::inverse_method() const {
 
 Expected<AxisVector> RobotModel::inverse(const Pose& world_from_tip, const AxisVector& seed, Among among) const {
   if (seed.size() != axes() || !seed.allFinite() || !world_from_tip.matrix().allFinite()) {
-    return fail("pose or seed is not finite, or the seed has another number of axes", impl_->robot.name);
+    return fail("pose or seed is not finite, or the seed has another number of axes", impl_->robot.name,
+                fmt::format("give finite numbers, and {} of them as the seed", axes()));
   }
   if (const auto q = impl_->inverse->nearest(world_from_tip, seed, among)) return *q;
-  const Vector3& p = world_from_tip.translation();
-  return fail(fmt::format("the tip cannot reach ({:.3f}, {:.3f}, {:.3f}) m in that orientation", p.x(), p.y(), p.z()),
-              impl_->robot.name, "choose a pose inside the arm's reach");
+  return std::unexpected(impl_->unreached(world_from_tip, among));
 }
 
 void RobotModel::inverse_all(const Pose& world_from_tip, const AxisVector& seed, BranchSolutions& found) const {

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
 
 #include "pons/core/random.hpp"
 #include "pons/model/test_robots.hpp"
@@ -243,17 +244,32 @@ TEST(RobotModel, CopyIsIndependentAndEqual) {
   EXPECT_EQ(here, there);
 }
 
-// The same arm, of nothing.
-std::filesystem::path without_masses(const std::filesystem::path& urdf) {
+// The same arm, with another value for an attribute of every link.
+std::filesystem::path with_all(const std::filesystem::path& urdf, const std::string& attribute,
+                               const std::string& value) {
   std::ifstream in(urdf);
   std::string text((std::istreambuf_iterator<char>(in)), {});
-  for (auto at = text.find("<mass value=\""); at != std::string::npos; at = text.find("<mass value=\"", at + 1)) {
-    const auto number = at + std::string("<mass value=\"").size();
-    text.replace(number, text.find('"', number) - number, 1, '0');
+  for (auto at = text.find(attribute + "=\""); at != std::string::npos; at = text.find(attribute + "=\"", at + 1)) {
+    const auto begin = at + attribute.size() + 2;
+    text.replace(begin, text.find('"', begin) - begin, value);
   }
   const auto path = std::filesystem::path(testing::TempDir()) / "weightless.urdf";
   std::ofstream(path) << text;
   return path;
+}
+
+// The controller would reckon with an arm that weighs nothing, or with none at all.
+TEST(RobotModel, WhatHasNoMassOrInertiaIsRefused) {
+  for (const auto& [attribute, value] :
+       {std::pair{"value", "0"}, std::pair{"value", "-1"}, std::pair{"value", "inf"}, std::pair{"value", "nan"},
+        std::pair{"ixx", "0"}, std::pair{"iyy", "0"}, std::pair{"izz", "0"}, std::pair{"ixx", "inf"},
+        std::pair{"izz", "nan"}, std::pair{"ixy", "nan"}, std::pair{"ixy", "inf"}}) {
+    auto robot = hanging_arm();
+    robot.urdf = with_all(robot.urdf, attribute, value);
+    const auto model = RobotModel::load(robot);
+    ASSERT_FALSE(model) << attribute << ' ' << value;
+    EXPECT_NE(model.error().line().find("has no mass or no inertia"), std::string::npos) << attribute << ' ' << value;
+  }
 }
 
 TEST(RobotModel, LoadingSaysWhatIsWrong) {
@@ -273,9 +289,6 @@ TEST(RobotModel, LoadingSaysWhatIsWrong) {
   robot = hanging_arm();
   robot.flange_link = "forearm_link";
   EXPECT_NE(RobotModel::load(robot).error().line().find("does not hang on the last moving joint"), std::string::npos);
-  robot = hanging_arm();
-  robot.urdf = without_masses(robot.urdf);
-  EXPECT_NE(RobotModel::load(robot).error().line().find("has no mass or no inertia"), std::string::npos);
   const auto path = std::filesystem::path(testing::TempDir()) / "broken.urdf";
   std::ofstream(path) << "<robot name='x'><link";
   robot = hanging_arm();

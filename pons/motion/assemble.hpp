@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <span>
 
 #include "pons/motion/axis_piece.hpp"
@@ -31,6 +32,14 @@ struct Piece {
 
 // Appends the profiles as segments from `at` on, for `duration`.
 void append(std::span<const AxisProfile> profiles, Time at, Duration duration, Trajectory& trajectory);
+
+// What follow() makes before it checks limits, and that check: it names the first axis beyond one by more than
+// kLimitTolerance, and when.
+inline constexpr double kLimitTolerance = 1e-9;  // relative
+[[nodiscard]] Expected<Trajectory> fit(const AxisState& start, Time at,
+                                       const std::function<Expected<AxisVector>(double)>& path, double duration_s,
+                                       double knot_s, const AxisLimits& limits);
+[[nodiscard]] Expected<void> check_use(const Trajectory& trajectory, const AxisLimits& limits);
 
 // Up to whole nanoseconds.
 [[nodiscard]] Duration ceil_ns(double seconds);

@@ -14,7 +14,6 @@ namespace {
 constexpr double kPositionTolerance = 1e-4;     // rad
 constexpr double kSpeedTolerance = 0.05;        // rad/s
 constexpr double kAccelerationTolerance = 2.0;  // rad/s²
-constexpr double kLimitTolerance = 1e-9;        // relative
 constexpr std::size_t kFewestPieces = 4;        // the stencils below need five samples
 constexpr std::size_t kMostPieces = 100'000;
 
@@ -65,7 +64,8 @@ Expected<void> check_beginning(const AxisState& start, const AxisState& path) {
   return ok;
 }
 
-// Names the first axis beyond a limit.
+}  // namespace
+
 Expected<void> check_use(const Trajectory& trajectory, const AxisLimits& limits) {
   if (limit_use(trajectory, limits).worst() <= 1 + kLimitTolerance) return {};
   for (const Segment& segment : trajectory) {
@@ -93,10 +93,8 @@ Expected<void> check_use(const Trajectory& trajectory, const AxisLimits& limits)
   return {};
 }
 
-}  // namespace
-
-Expected<Trajectory> follow(const AxisState& start, Time at, const std::function<Expected<AxisVector>(double)>& path,
-                            double duration_s, double knot_s, const AxisLimits& limits) {
+Expected<Trajectory> fit(const AxisState& start, Time at, const std::function<Expected<AxisVector>(double)>& path,
+                         double duration_s, double knot_s, const AxisLimits& limits) {
   if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
   if (!(duration_s >= 1e-6) || !(knot_s > 0) || !(duration_s / knot_s <= static_cast<double>(kMostPieces))) {
     return fail(fmt::format("cannot follow for {} s with a knot every {} s", duration_s, knot_s), "path",
@@ -132,7 +130,14 @@ Expected<Trajectory> follow(const AxisState& start, Time at, const std::function
     trajectory.push_back(segment);
     from = to;
   }
-  if (auto ok = check_use(trajectory, limits); !ok) return std::unexpected(ok.error());
+  return trajectory;
+}
+
+Expected<Trajectory> follow(const AxisState& start, Time at, const std::function<Expected<AxisVector>(double)>& path,
+                            double duration_s, double knot_s, const AxisLimits& limits) {
+  auto trajectory = fit(start, at, path, duration_s, knot_s, limits);
+  if (!trajectory) return trajectory;
+  if (auto ok = check_use(*trajectory, limits); !ok) return std::unexpected(ok.error());
   return trajectory;
 }
 

@@ -4,66 +4,62 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "pons/model/iterate.hpp"
 #include "pons/motion/assemble.hpp"
 #include "pons/motion/pace.hpp"
+#include "pons/motion/straight.hpp"
 
 namespace pons::motion {
 namespace {
 
-constexpr double kNear_rad = 0.02;  // between neighbours of the table, each axis
-constexpr double kJump = 1e-6;      // share of the line within which an axis may not turn farther than that
-constexpr std::size_t kMostNodes = 20'000;
+constexpr double kNear_rad = 0.02;       // between neighbours of the table, each axis
+constexpr double kJump = 1e-6;           // share of the line within which an axis may not turn farther than that
 constexpr double kNodesApart_s = 0.001;  // of the path that is paced, in time at full speed
 constexpr Eigen::Index kFewestNodes = 200, kMostColumns = 6000;
 constexpr Eigen::Index kSmooth = 4;  // nodes to either side over which their spacing is evened out, twice
 constexpr double kKnot_s = 0.010;
-constexpr double kCoarsest_s = 0.02;  // between knots: coarser ones lose the line's bends
-constexpr double kMostPieces = 240;   // what the control loop holds at once
-constexpr Eigen::Index kHold = 4;     // knots at the end, so that it ends at rest exactly
-constexpr double kStretch = 1.01;     // tried next where the fitted motion is beyond a limit
-constexpr int kStretches = 70;        // to twice as long
-constexpr double kOff_m = 1e-4, kOff_rad = 0.01 * std::numbers::pi / 180;
+constexpr double kCoarsest_s = 0.02;   // between knots: coarser ones lose the line's bends
+constexpr Eigen::Index kHold = 4;      // knots at the end, so that it ends at rest exactly
+constexpr double kMovingPieces = 236;  // and these are what the control loop holds at once
+constexpr double kLongest_s = kCoarsest_s * kMovingPieces;
+constexpr double kStretch = 1.01;  // tried next where the fitted motion is beyond a limit
+constexpr int kStretches = 70;     // to twice as long
+constexpr double kTrusted = 0.8;   // of the steps that its excess asks for
 constexpr int kNewtonSteps = 8;
 constexpr double kExact = 1e-11;   // m and rad, together
 constexpr double kNothing = 1e-9;  // m and rad: no way, no turn
 
-// The tool's way.
-class Straight {
+// Poses that may still be asked for. Counted, never timed: the same line is planned or refused on any computer.
+class Budget {
  public:
-  Straight(const Pose& from, const Pose& to) : from_(from), turned_(from.linear()), to_(to.linear()) {
-    way_ = to.translation() - from.translation();
-    if (turned_.dot(to_) < 0) to_.coeffs() = -to_.coeffs();
-    turn_rad_ = turned_.angularDistance(to_);
+  explicit Budget(int most) : most_(most) {}
+  [[nodiscard]] bool take() { return ++taken_ <= most_; }
+  [[nodiscard]] bool spent() const { return taken_ > most_; }
+  [[nodiscard]] int taken() const { return taken_; }
+  [[nodiscard]] std::unexpected<Error> error() const {
+    return fail(fmt::format("takes more than {} poses to plan: it passes close to a singularity, or is long", most_),
+                "line", "pass farther beside the singularity, or go in parts");
   }
-  [[nodiscard]] Pose at(double share) const {
-    Pose pose = Pose::Identity();
-    pose.linear() = turned_.slerp(share, to_).toRotationMatrix();
-    pose.translation() = from_.translation() + share * way_;
-    return pose;
-  }
-  [[nodiscard]] double length_m() const { return way_.norm(); }
-  [[nodiscard]] double turn_rad() const { return turn_rad_; }
 
  private:
-  Pose from_;
-  Eigen::Quaterniond turned_, to_;
-  Vector3 way_;
-  double turn_rad_ = 0;
+  int most_, taken_ = 0;
 };
 
 // Joint angles for a pose close to one whose angles are known.
 class Tracker {
  public:
-  explicit Tracker(const model::RobotModel& model)
-      : model_(model), redundant_(model.inverse_method() == model::RobotModel::InverseMethod::kIteration) {}
+  Tracker(const model::RobotModel& model, Budget& budget)
+      : model_(model),
+        budget_(budget),
+        redundant_(model.inverse_method() == model::RobotModel::InverseMethod::kIteration) {}
 
+  [[nodiscard]] bool spent() const { return budget_.spent(); }
   // Of a redundant arm the nearest angles, by Newton's method: its inverse kinematics may choose others from pose to
   // pose, and what follows a line must not.
   [[nodiscard]] Expected<AxisVector> operator()(const Pose& pose, const AxisVector& near) const {
+    if (!budget_.take()) return budget_.error();
     if (!redundant_) return model_.inverse(pose, near);
     const model::Chain& chain = model_.chain();
     AxisVector q = near;
@@ -86,6 +82,7 @@ class Tracker {
   }
 
   const model::RobotModel& model_;
+  Budget& budget_;
   bool redundant_;
 };
 
@@ -99,10 +96,16 @@ std::string where(const Straight& line, double share) {
   return fmt::format("after {:.1f} % of the line, at ({:.3f}, {:.3f}, {:.3f}) m", 100 * share, p.x(), p.y(), p.z());
 }
 
+Error beyond(const Straight& line, double share) {
+  return {"leaves the arm's reach or an axis' position limits " + where(line, share), "line",
+          "end it before, or choose another start"};
+}
+
 // Joint angles along the line, so close together that each follows from the one before.
 class Table {
  public:
-  Table(const model::RobotModel& model, const Straight& line) : model_(model), track_(model), line_(line) {}
+  Table(const model::RobotModel& model, const Straight& line, Budget& budget)
+      : model_(model), track_(model, budget), line_(line) {}
 
   Expected<std::vector<Node>> fill(const AxisVector& start) const {
     std::vector<Node> nodes{{0, start}};
@@ -111,12 +114,12 @@ class Table {
       const Node& last = nodes.back();
       const double share = std::min(1.0, last.share + step);
       auto q = track_(line_.at(share), last.q);
+      if (track_.spent()) return std::unexpected(q.error());
       const double turned = q ? (*q - last.q).cwiseAbs().maxCoeff() : 1;
       if (turned > kNear_rad) {
         if (step *= 0.5; step < kJump) return std::unexpected(stuck(last, q));
         continue;
       }
-      if (nodes.size() == kMostNodes) return fail("needs too many steps " + where(line_, share), "line", "shorten it");
       nodes.push_back({share, std::move(*q)});
       if (turned < 0.4 * kNear_rad) step = std::min(2 * step, 1.0 / 64);
     }
@@ -128,16 +131,13 @@ class Table {
   [[nodiscard]] Error stuck(const Node& last, const Expected<AxisVector>& q) const {
     const double next = std::min(1.0, last.share + 10 * kJump);
     const auto elsewhere = model_.inverse(line_.at(next), last.q, model::Among::kAllBranches);
-    const std::string place = where(line_, last.share);
-    if (!q && !elsewhere) {
-      return {"leaves the arm's reach or an axis' position limits " + place, "line",
-              "end it before, or choose another start"};
-    }
+    if (!q && !elsewhere) return beyond(line_, last.share);
     Eigen::Index axis = 0;
     const AxisVector& there = q ? *q : *elsewhere;
     (there - last.q).cwiseAbs().maxCoeff(&axis);
-    return {fmt::format("runs through a singularity {}: axis {} would have to jump", place, axis + 1), "line",
-            "pass beside it, or go by joints"};
+    return {
+        fmt::format("runs through a singularity {}: axis {} would have to jump", where(line_, last.share), axis + 1),
+        "line", "pass beside it, or go by joints"};
   }
 
   const model::RobotModel& model_;
@@ -189,16 +189,15 @@ std::vector<double> spread(const std::vector<Node>& nodes, const Rates& rates, d
 }
 
 // The path that is paced: joints, and the tip's way and turn.
-Expected<SampledPath> sampled(const model::RobotModel& model, const Straight& line, const AxisVector& start,
+Expected<SampledPath> sampled(const Tracker& track, const Straight& line, const AxisVector& start,
                               const std::vector<double>& shares, double whole_s, const Rates& rates) {
   const Eigen::Index axes = start.size(), columns = static_cast<Eigen::Index>(shares.size());
   SampledPath path{Eigen::MatrixXd(axes + 2, columns), whole_s / static_cast<double>(columns - 1), {}};
-  const Tracker track(model);
   AxisVector q = start;
   for (Eigen::Index k = 0; k < columns; ++k) {
     const double share = shares[static_cast<std::size_t>(k)];
     auto next = track(line.at(share), q);
-    if (!next) return std::unexpected(next.error());
+    if (!next) return std::unexpected(track.spent() ? next.error() : beyond(line, share));
     q = *next;
     path.points.col(k) << q, share * line.length_m(), share * line.turn_rad();
   }
@@ -235,19 +234,12 @@ double least_s(const std::vector<Node>& nodes, const Rates& rates) {
 }
 
 // Whether the fitted motion keeps to the line, looked at between its knots too.
-bool keeps_to(const Trajectory& trajectory, const Straight& line, model::RobotModel& model) {
-  const Vector3 from = line.at(0).translation();
-  const Vector3 along = (line.at(1).translation() - from).normalized();
+bool keeps_to(const Trajectory& trajectory, const Straight& line, model::RobotModel& model, Budget& budget) {
   for (const Segment& segment : trajectory) {
+    if (!budget.take()) return false;
     for (const double part : {0.0, 0.25, 0.5, 0.75}) {
       const Time time = segment.start + from_s(part * to_s(segment.duration));
-      const Pose tip = model.world_from_tip(sample(trajectory, time, model.axes()).position);
-      const Vector3 off = tip.translation() - from;
-      const double share = line.length_m() > kNothing ? std::clamp(off.dot(along) / line.length_m(), 0.0, 1.0) : -1;
-      if ((off - std::max(share, 0.0) * line.length_m() * along).norm() > kOff_m) return false;
-      if (share < 0) continue;
-      const Eigen::AngleAxisd wrong(tip.linear().transpose() * line.at(share).linear());
-      if (std::abs(wrong.angle()) > kOff_rad) return false;
+      if (!line.holds(model.world_from_tip(sample(trajectory, time, model.axes()).position))) return false;
     }
   }
   return true;
@@ -268,55 +260,89 @@ Expected<void> check(const model::RobotModel& model, const AxisVector& start, co
   return {};
 }
 
+Error too_long() {
+  return {fmt::format("would take more than the {:.1f} s that can be followed: it passes close to a singularity, or is "
+                      "long",
+                      kLongest_s),
+          "line", "pass farther beside the singularity, or go in parts"};
+}
+
+// How many steps of kStretch slower a fitted motion must at least be: slower in time by s, speeds are less by s,
+// accelerations by its square, jerks by its cube. Some of them less, because the slower one is fitted anew.
+int steps_slower(const LimitUse& use) {
+  const double excess = std::max({use.speed, std::sqrt(use.acceleration), std::cbrt(use.jerk)});
+  return std::max(1, static_cast<int>(kTrusted * std::log(excess) / std::log(kStretch)));
+}
+
+// The line at its pace: the first of a few ever slower motions that keeps to it and to all limits.
+class Fitting {
+ public:
+  Fitting(model::RobotModel& model, const Straight& line, const AxisLimits& limits, Budget& budget)
+      : model_(model), line_(line), limits_(limits), budget_(budget), track_(model, budget) {}
+
+  Expected<Trajectory> run(const AxisVector& start, Time at, const Pace& pace, const std::vector<double>& shares,
+                           double step) {
+    const AxisState rest{start, AxisVector::Zero(start.size()), AxisVector::Zero(start.size())};
+    Expected<void> why = fail("cannot be followed to 0.1 mm", "line", "pass farther beside the singularity");
+    for (int slower = 0; slower < kStretches;) {
+      const double stretch = std::pow(kStretch, slower), moves_s = stretch * pace.duration_s();
+      if (moves_s > kLongest_s) return std::unexpected(too_long());
+      const double knot_s = std::max(kKnot_s, moves_s / kMovingPieces);
+      AxisVector q = start;
+      const auto follow_line = [&](double t) -> Expected<AxisVector> {
+        const double column = pace.at(t / stretch) / step;
+        const auto k = std::min(static_cast<std::size_t>(column), shares.size() - 2);
+        auto next = track_(line_.at(cubic(shares, k, column - static_cast<double>(k))), q);
+        if (next) q = *next;
+        return next;
+      };
+      const double duration_s = knot_s * (std::ceil(moves_s / knot_s) + static_cast<double>(kHold));
+      auto fitted = fit(rest, at, follow_line, duration_s, knot_s, limits_);
+      const LimitUse use = fitted ? limit_use(*fitted, limits_) : LimitUse{};
+      const bool within = fitted && use.worst() <= 1 + kLimitTolerance;
+      if (within && keeps_to(*fitted, line_, model_, budget_)) return fitted;
+      if (budget_.spent()) return budget_.error();
+      if (!within) why = fitted ? check_use(*fitted, limits_) : std::unexpected(fitted.error());
+      slower += fitted && !within ? steps_slower(use) : 1;
+    }
+    return std::unexpected(why.error());
+  }
+
+ private:
+  model::RobotModel& model_;
+  const Straight& line_;
+  const AxisLimits& limits_;
+  Budget& budget_;
+  Tracker track_;
+};
+
 }  // namespace
 
 Expected<Line> move_line(model::RobotModel& model, const AxisVector& start, Time at, const Pose& world_from_tip,
-                         const AxisLimits& limits, const TipLimits& tip) {
+                         const AxisLimits& limits, const TipLimits& tip, int most_poses) {
   if (auto ok = check(model, start, world_from_tip, limits, tip); !ok) return std::unexpected(ok.error());
-  const AxisState rest{start, AxisVector::Zero(start.size()), AxisVector::Zero(start.size())};
   const Straight line(model.world_from_tip(start), world_from_tip);
   if (line.length_m() < kNothing && line.turn_rad() < kNothing) {
-    auto stay = move(rest, at, {start, rest.speed}, limits);
+    const AxisVector still = AxisVector::Zero(start.size());
+    auto stay = move({start, still, still}, at, {start, still}, limits);
     if (!stay) return std::unexpected(stay.error());
-    return Line{std::move(*stay), 0};
+    return Line{std::move(*stay), 0, 0};
   }
-  const auto nodes = Table(model, line).fill(start);
+  Budget budget(most_poses);
+  const auto nodes = Table(model, line, budget).fill(start);
   if (!nodes) return std::unexpected(nodes.error());
   const Rates rates{limits, tip, line.length_m(), line.turn_rad()};
+  const double least = least_s(*nodes, rates);
+  if (least > kLongest_s) return std::unexpected(too_long());
   double whole_s = 0;
   const std::vector<double> shares = spread(*nodes, rates, whole_s);
-  const auto path = sampled(model, line, start, shares, whole_s, rates);
+  const auto path = sampled(Tracker(model, budget), line, start, shares, whole_s, rates);
   if (!path) return std::unexpected(path.error());
-  const Pace pace = find_pace(*path);
-
-  const double least = least_s(*nodes, rates);
-  Expected<Trajectory> fitted = fail("cannot be followed to 0.1 mm", "line", "pass farther beside the singularity");
-  const Tracker track(model);
-  double stretch = 1;
-  for (int i = 0; i < kStretches; ++i, stretch *= kStretch) {
-    const double moves_s = stretch * pace.duration_s();
-    const double knot_s = std::max(kKnot_s, moves_s / (kMostPieces - static_cast<double>(kHold)));
-    if (knot_s > kCoarsest_s) {
-      return fail(
-          fmt::format("would take {:.1f} s within all limits, and no more than {:.1f} s can be followed: it passes "
-                      "close to a singularity, or is long",
-                      moves_s, kCoarsest_s * kMostPieces),
-          "line", "pass farther beside the singularity, or go in parts");
-    }
-    AxisVector q = start;
-    const auto follow_line = [&](double t) -> Expected<AxisVector> {
-      const double column = pace.at(t / stretch) / path->step;
-      const auto k = std::min(static_cast<std::size_t>(column), shares.size() - 2);
-      auto next = track(line.at(cubic(shares, k, column - static_cast<double>(k))), q);
-      if (next) q = *next;
-      return next;
-    };
-    const double duration_s = knot_s * (std::ceil(moves_s / knot_s) + static_cast<double>(kHold));
-    auto followed = follow(rest, at, follow_line, duration_s, knot_s, limits);
-    if (followed && keeps_to(*followed, line, model)) return Line{std::move(*followed), least};
-    if (!followed) fitted = std::move(followed);
-  }
-  return std::unexpected(fitted.error());
+  const auto pace = find_pace(*path, kLongest_s);
+  if (!pace) return std::unexpected(too_long());
+  auto trajectory = Fitting(model, line, limits, budget).run(start, at, *pace, shares, path->step);
+  if (!trajectory) return std::unexpected(trajectory.error());
+  return Line{std::move(*trajectory), least, budget.taken()};
 }
 
 }  // namespace pons::motion

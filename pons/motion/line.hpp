@@ -15,11 +15,16 @@ struct TipLimits {
   double turn_rad_s = 3.0, turn_acceleration_rad_s2 = 20, turn_jerk_rad_s3 = 400;
 };
 
+// What one line may cost: poses that joint angles are sought for, or that are looked at, at most. With them the slowest
+// line takes some 30 ms, so that a tick of the bridge can plan one.
+inline constexpr int kMostPoses = 10'000;
+
 struct Line {
   Trajectory trajectory;
   // No motion along this line is faster: the time that it takes with every joint's and the tip's speed limit kept and
   // no other, and, at rest at both ends, by acceleration and jerk of the tip.
   double least_s = 0;
+  int poses = 0;  // that it cost
 };
 
 // From rest at `start` (rad) to rest at `world_from_tip`: position on a straight line, orientation by SLERP (Shoemake
@@ -33,8 +38,9 @@ struct Line {
 //
 // Errors: start or goal not finite or not in reach, limits not positive; the line leaves reach or position limits, or
 // runs through a singularity, where a joint would have to jump or the branch would have to change: each with how far
-// along the line that is. Any thread that owns the model.
+// along the line that is; it would take too long, or cost more than `most_poses`. Any thread that owns the model.
 [[nodiscard]] Expected<Line> move_line(model::RobotModel& model, const AxisVector& start, Time at,
-                                       const Pose& world_from_tip, const AxisLimits& limits, const TipLimits& tip);
+                                       const Pose& world_from_tip, const AxisLimits& limits, const TipLimits& tip,
+                                       int most_poses = kMostPoses);
 
 }  // namespace pons::motion

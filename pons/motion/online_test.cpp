@@ -305,6 +305,7 @@ TEST(Online, ReachesSpeedsTogetherInTheShortestTime) {
                 (synchronization == Synchronization::kNone ? expected : duration) * (1 + kTight));
       EXPECT_NEAR(profiles[k].end().speed, tasks[k].end_speed, kTight);
       EXPECT_EQ(profiles[k].end().acceleration, 0);
+      expect_limits(profiles[k], tasks[k].bounds);
     }
     EXPECT_NEAR(duration, longest, kTight * (1 + longest));
   }

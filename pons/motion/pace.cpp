@@ -28,11 +28,12 @@ class PaceSearch {
     for (Index k = 0; k < nodes_; ++k) cap_[static_cast<std::size_t>(k)] = cap(k);
   }
 
-  Pace run() {
+  std::optional<Pace> run(double most_s) {
     std::vector<double> best;
     double best_excess = 1, least = std::numeric_limits<double>::infinity();
     for (int round = 0; round < kRounds; ++round) {
-      speed_up_and_down();
+      // Caps are only lowered, so what takes too long once does so in every later round.
+      if (speed_up_and_down(); !(time() <= most_s)) break;
       const std::vector<double> smooth = average(average(over_time(), first_), second_);
       const double excess = std::max(1.0, judge(smooth));
       if (const double length = excess * static_cast<double>(smooth.size()); length < least) {
@@ -41,7 +42,10 @@ class PaceSearch {
       if (excess <= kGood) break;
       lower();
     }
-    return {std::move(best), best_excess};
+    if (best.empty()) return std::nullopt;
+    Pace pace(std::move(best), best_excess);
+    if (!(pace.duration_s() <= most_s)) return std::nullopt;
+    return pace;
   }
 
  private:
@@ -96,19 +100,25 @@ class PaceSearch {
     for (Index k = nodes_ - 2; k >= 0; --k) pass(k + 1, k);
   }
 
-  // The parameter each tick; between nodes its acceleration is constant.
+  // When each node is passed, between nodes with constant acceleration; the last of these times.
+  double time() {
+    times_.assign(cap_.size(), 0);
+    for (std::size_t k = 0; k + 1 < speed_.size(); ++k) {
+      times_[k + 1] = times_[k] + 2 * path_.step / (speed_[k] + speed_[k + 1]);
+    }
+    return times_.back();
+  }
+
+  // The parameter each tick.
   std::vector<double> over_time() {
     std::vector<double> result;
-    times_.assign(cap_.size(), 0);
     double t = 0;  // of the next tick
     for (std::size_t k = 0; k + 1 < speed_.size(); ++k) {
-      const double here = speed_[k], next = speed_[k + 1];
-      const double takes = 2 * path_.step / (here + next), gain = (next - here) / takes;
-      for (; t < times_[k] + takes; t += Pace::kTick_s) {
+      const double here = speed_[k], gain = (speed_[k + 1] - here) / (times_[k + 1] - times_[k]);
+      for (; t < times_[k + 1]; t += Pace::kTick_s) {
         const double on = t - times_[k];
         result.push_back(path_.step * static_cast<double>(k) + on * (here + 0.5 * on * gain));
       }
-      times_[k + 1] = times_[k] + takes;
     }
     result.push_back(path_.step * static_cast<double>(nodes_ - 1));
     return result;
@@ -153,17 +163,18 @@ class PaceSearch {
     const double at = std::clamp(parameter / path_.step, 0.0, static_cast<double>(nodes_ - 1));
     const Index k = std::min(static_cast<Index>(at), nodes_ - 2);
     const double share = at - static_cast<double>(k);
-    double worst = 0;
+    double fastest = 0, most_pushed = 0, most_jerked = 0;
     for (Index i = 0; i < path_.points.rows(); ++i) {
       const auto between = [&](const Eigen::MatrixXd& d) { return d(i, k) + share * (d(i, k + 1) - d(i, k)); };
       const double d1 = between(first_derivative_), d2 = between(second_derivative_), d3 = between(third_derivative_);
       const RateLimits& limit = path_.limits[static_cast<std::size_t>(i)];
       const double a = d2 * speed * speed + d1 * acceleration;
       const double j = d3 * speed * speed * speed + 3 * d2 * speed * acceleration + d1 * jerk;
-      worst = std::max({worst, std::abs(d1 * speed) / limit.speed, std::sqrt(std::abs(a) / limit.acceleration),
-                        std::cbrt(std::abs(j) / limit.jerk)});
+      fastest = std::max(fastest, std::abs(d1 * speed) / limit.speed);
+      most_pushed = std::max(most_pushed, std::abs(a) / limit.acceleration);
+      most_jerked = std::max(most_jerked, std::abs(j) / limit.jerk);
     }
-    return worst;
+    return std::max({fastest, std::sqrt(most_pushed), std::cbrt(most_jerked)});
   }
 
   void lower() {
@@ -197,6 +208,6 @@ double Pace::at(double t_s) const {
   return cubic(at_ticks_, k, x - static_cast<double>(k));
 }
 
-Pace find_pace(const SampledPath& path) { return PaceSearch(path).run(); }
+std::optional<Pace> find_pace(const SampledPath& path, double most_s) { return PaceSearch(path).run(most_s); }
 
 }  // namespace pons::motion

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <utility>
 #include <vector>
 
 namespace pons::motion {
@@ -39,7 +41,8 @@ class Pace {
   double excess_;
 };
 
-// As fast as a few rounds of lowering what is too fast find; see line.hpp. At least five columns.
-[[nodiscard]] Pace find_pace(const SampledPath& path);
+// As fast as a few rounds of lowering what is too fast find; see line.hpp. At least five columns. None if that takes
+// longer than `most_s`; work and memory grow with it.
+[[nodiscard]] std::optional<Pace> find_pace(const SampledPath& path, double most_s);
 
 }  // namespace pons::motion
