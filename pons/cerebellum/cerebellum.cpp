@@ -19,15 +19,10 @@ using link::StopResult;
 
 // Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
 constexpr double kTooFast = 1.01;
+// An arm on a spring may be so for so long: a blow is to be known for a collision.
+constexpr Duration kHastyTime = std::chrono::milliseconds(10);
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
-
-// No axis takes longer to brake from that speed.
-double longest_stop_s(const AxisVector& speed, const AxisLimits& limits) {
-  return (speed.cwiseAbs().cwiseQuotient(limits.acceleration_rad_s2) +
-          limits.acceleration_rad_s2.cwiseQuotient(limits.jerk_rad_s3))
-      .maxCoeff();
-}
 
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
   settings.compliance = with_delay(settings.compliance, delay_s);
@@ -204,11 +199,18 @@ void Cerebellum::watch_zones(Time now) {
 
 // How fast an arm goes that is held by a spring, what pushes it decides.
 void Cerebellum::watch_springs(Time now) {
-  if (laws_.controller() != Controller::kImpedance || !moves(state_.safety)) return;
+  if (laws_.controller() != Controller::kImpedance || !moves(state_.safety)) {
+    hasty_ = false;
+    return;
+  }
   const double share = measured_speed_.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
   const bool slowed = slow_since_ && now - *slow_since_ >= settings_.slow_within;
   const double allowed = slowed ? state_.speed_share : 1;
-  if (share > allowed * kTooFast && stop(slowed ? StopCause::kNotSlowed : StopCause::kLimit, now))
+  const bool hasty = share > allowed * kTooFast;
+  if (hasty && !hasty_) hasty_since_ = now;
+  hasty_ = hasty;
+  if (!hasty || now - hasty_since_ < kHastyTime) return;
+  if (stop(slowed ? StopCause::kNotSlowed : StopCause::kLimit, now))
     log_.write(now, "pushed to {:.1f} % of a speed limit where {:.1f} % are allowed", 100 * share, 100 * allowed);
 }
 
@@ -222,8 +224,9 @@ std::optional<double> Cerebellum::too_fast(const AxisState& next, Time now) cons
 void Cerebellum::watch_contact(Time now) {
   if (state_.safety != SafetyState::kOperational) return;
   statistics_.contact = std::max(statistics_.contact, collision_.share());
+  const bool follows = laws_.controller() != Controller::kImpedance;  // else it has given way already
   if (!collision_.collides() || !stop(StopCause::kCollision, now)) return;
-  gives_way_ = true;
+  gives_way_ = follows;
   const Vector6& wrench = collision_.wrench();
   log_.write(now, "axis {} is pushed with {:.1f} N·m, {:.0f} % of what no collision explains; {:.0f} N at the tip",
              collision_.axis() + 1, collision_.external_nm()[collision_.axis()], 100 * collision_.share(),
@@ -281,17 +284,18 @@ bool Cerebellum::stop(StopCause cause, Time now) {
   state_.cause = cause;
   state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
   if (!is_braking(before)) {
+    // Where a spring has let the arm be pushed to, and how fast, no commanded motion says.
+    if (laws_.controller() == Controller::kImpedance) {
+      AxisState measured = at_rest(position_now_);
+      measured.speed = speed_now_.cwiseMax(-limits().speed_rad_s).cwiseMin(limits().speed_rad_s);
+      track_from(measured);
+    }
     motion::plan_stop(commanded_, limits(),
                       std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
     double longest = 0;
     for (Eigen::Index i = 0; i < commanded_.position.size(); ++i)
       longest = std::max(longest, stop_profiles_[static_cast<std::size_t>(i)].duration_s());
     stop_began_ = stepped_;
-    if (laws_.controller() == Controller::kImpedance) {
-      // Where a spring has let it be pushed to, and how fast, no commanded motion says.
-      gives_way_ = true;
-      longest = std::max(longest, longest_stop_s(speed_now_, limits()));
-    }
     stop_ends_ = std::max(now, stop_began_ + from_s(longest));
     queue_.rest(commanded_.position, stop_ends_);
   }
@@ -338,13 +342,18 @@ void Cerebellum::follow(Time now) {
   }
 }
 
-void Cerebellum::hold_measured(Time now) {
-  gives_way_ = false;
+// Computed torque goes on from there, whatever was commanded.
+void Cerebellum::track_from(const AxisState& state) {
+  commanded_ = before_ = state;
+  widen();
   laws_.forget();
   laws_.reset();
-  commanded_ = before_ = at_rest(measured_position_);
-  widen();
   laws_.rest(commanded_);
+}
+
+void Cerebellum::hold_measured(Time now) {
+  gives_way_ = false;
+  track_from(at_rest(measured_position_));
   motion::plan_stop(commanded_, limits(),
                     std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
   queue_.rest(commanded_.position, now);
@@ -385,11 +394,7 @@ void Cerebellum::judge_stop(Time now) {
   enter(SafetyEvent::kStandstill);
   if (state_.cause == StopCause::kFollowingError) {
     // Something holds the arm off: holding the commanded place would go on pressing.
-    commanded_ = at_rest(measured_position_);
-    widen();
-    laws_.forget();
-    laws_.reset();
-    laws_.rest(commanded_);
+    track_from(at_rest(measured_position_));
   }
   queue_.rest(commanded_.position, now);
 }

@@ -137,6 +137,7 @@ class Cerebellum {
   bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
+  void track_from(const AxisState& state);
   void hold_measured(Time now);
   void sample_stop(Time now);
   void judge_stop(Time now);
@@ -182,8 +183,8 @@ class Cerebellum {
   Time still_since_;
   std::uint32_t zones_ = 0;  // occupied
   std::optional<Time> slow_since_;
-  bool strays_ = false;
-  Time strays_since_;
+  bool strays_ = false, hasty_ = false;
+  Time strays_since_, hasty_since_;
 
   // After a collision the arm gives way while it brakes, and then holds where that brought it.
   bool gives_way_ = false;
