@@ -18,6 +18,7 @@ using task::Progress;
 using task::Status;
 
 constexpr Duration kTick = std::chrono::milliseconds(1);  // of the loop: what starvation is counted in
+constexpr double kRounding = 1e-9;                        // of a number of actions that a path is asked for
 constexpr Duration kSilence = std::chrono::seconds(10);   // then the policy is taken for dead
 constexpr Duration kLongestStream = std::chrono::seconds(600);
 constexpr double kEndless = std::numeric_limits<double>::infinity();
@@ -106,7 +107,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   Expected<void> splice(const Chunk& chunk, Time now) {
     if (!path_ || ending_ || !cell_.arm.operational())
       return fail("no motion is taken now", "chunk_stopped", "wait until observe says that it goes on");
-    if (chunk.observed < oldest_)
+    if (chunk.observed < oldest_ - kRounding)
       return fail(fmt::format("it was observed at {:.1f} actions, before the arm was stopped", chunk.observed),
                   "chunk_stale", "observe again, and do not round what it answers");
     motion::ChunkPath next = *path_;
@@ -141,7 +142,7 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   // within the action that was under way, and before the end.
   Progress stopped() {
     if (path_ && !ending_ && whole()) finish(succeeded());
-    if (path_) oldest_ = (executed_ + std::min(std::floor(executed_) + 1, total_)) / 2;
+    if (path_) oldest_ = (executed_ + std::min(std::floor(executed_ + motion::kSameProgress) + 1, total_)) / 2;
     path_.reset();
     last_ = false;
     return ending_ ? verdict_ : Progress{};
