@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
 
 #include "pons/body/plausible.hpp"
-#include "pons/motion/stop.hpp"
 #include "pons/rt/guard.hpp"
 
 namespace pons::cerebellum {
@@ -79,13 +77,14 @@ void Cerebellum::step(Time now, const body::Sensors& sensors, link::CerebellumEn
 
 // After a gap in its own ticks the commanded motion has run away from the arm: it must not be followed further.
 void Cerebellum::watch_loop(Time now) {
+  stall_ = Duration{0};
   if (!powered_ || now - stepped_ <= settings_.stall_timeout) return;
   const Duration gap = now - stepped_, lost = gap - settings_.period;
   stepped_ += lost;
   stop_began_ += lost;
   stop_ends_ += lost;
   dt_s_ = to_s(settings_.period);
-  if (stop(StopCause::kLoopStalled, now)) log_.write(now, "no step for {:.1f} ms", 1e3 * to_s(gap));
+  stall_ = gap;
 }
 
 void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
@@ -167,6 +166,8 @@ bool Cerebellum::is_standing(Time now) const {
 void Cerebellum::watch(Time now, const link::CerebellumEnd& link) {
   word_raised_ = link.emergency_stop_raised();
   if (word_raised_) stop(StopCause::kEmergencyWord, now);
+  if (stall_ > Duration{0} && stop(StopCause::kLoopStalled, now))
+    log_.write(now, "no step for {:.1f} ms", 1e3 * to_s(stall_));
   if (powered_ && is_silent(now) && stop(StopCause::kBodySilent, now))
     log_.write(now, "no newer measurement for {:.1f} ms", 1e3 * to_s(now - fresh_at_));
   if (stop_input_) stop(StopCause::kStopInput, now);
@@ -203,6 +204,12 @@ void Cerebellum::watch_springs(Time now) {
     hasty_ = false;
     return;
   }
+  AxisState measured = at_rest(measured_position_);
+  measured.speed = measured_speed_;
+  if (const auto breach = limit_watch_.breach_ahead(measured); breach && breach->limit == Limit::kStoppingDistance) {
+    if (stop(StopCause::kLimit, now)) log_.write(now, "axis {} is pushed over its position limit", breach->axis + 1);
+    return;
+  }
   const double share = measured_speed_.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s).maxCoeff();
   const bool slowed = slow_since_ && now - *slow_since_ >= settings_.slow_within;
   const double allowed = slowed ? state_.speed_share : 1;
@@ -222,7 +229,7 @@ std::optional<double> Cerebellum::too_fast(const AxisState& next, Time now) cons
 }
 
 void Cerebellum::watch_contact(Time now) {
-  if (state_.safety != SafetyState::kOperational) return;
+  if (!moves(state_.safety)) return;
   statistics_.contact = std::max(statistics_.contact, collision_.share());
   const bool follows = laws_.controller() != Controller::kImpedance;  // else it has given way already
   if (!collision_.collides() || !stop(StopCause::kCollision, now)) return;
@@ -270,45 +277,11 @@ bool Cerebellum::enter(SafetyEvent event) {
   return true;
 }
 
-bool Cerebellum::stop(StopCause cause, Time now) {
-  const SafetyEvent event = cause_row(cause)->event;
-  const SafetyState before = state_.safety;
-  const std::uint32_t epoch = state_.epoch;
-  if (!enter(event)) return false;
-  if (is_emergency(before) && state_.epoch == epoch) {  // the same stop, only harder
-    state_.stop_result = StopResult::kUncertain;
-    log_.write(now, "power off: {}", name(cause));
-    return true;
-  }
-  ++statistics_.stops;
-  state_.cause = cause;
-  state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
-  if (!is_braking(before)) {
-    // Where a spring has let the arm be pushed to, and how fast, no commanded motion says.
-    if (laws_.controller() == Controller::kImpedance) {
-      AxisState measured = at_rest(position_now_);
-      measured.speed = speed_now_.cwiseMax(-limits().speed_rad_s).cwiseMin(limits().speed_rad_s);
-      track_from(measured);
-    }
-    motion::plan_stop(commanded_, limits(),
-                      std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
-    double longest = 0;
-    for (Eigen::Index i = 0; i < commanded_.position.size(); ++i)
-      longest = std::max(longest, stop_profiles_[static_cast<std::size_t>(i)].duration_s());
-    stop_began_ = stepped_;
-    stop_ends_ = std::max(now, stop_began_ + from_s(longest));
-    queue_.rest(commanded_.position, stop_ends_);
-  }
-  log_.write(now, "{} stop: {}",
-             is_emergency(state_.safety) ? std::string_view("emergency") : std::string_view("protective"), name(cause));
-  return true;
-}
-
 void Cerebellum::advance(Time now) {
   before_ = commanded_;
   if (!powered_) {
     commanded_ = before_ = at_rest(seen_ ? measured_position_ : commanded_.position);
-    laws_.rest(commanded_);
+    laws_.rest(commanded_, to_s(settings_.period));
     return;
   }
   if (moves(state_.safety)) follow(now);
@@ -342,63 +315,6 @@ void Cerebellum::follow(Time now) {
   }
 }
 
-// Computed torque goes on from there, whatever was commanded.
-void Cerebellum::track_from(const AxisState& state) {
-  commanded_ = before_ = state;
-  widen();
-  laws_.forget();
-  laws_.reset();
-  laws_.rest(commanded_);
-}
-
-void Cerebellum::hold_measured(Time now) {
-  gives_way_ = false;
-  track_from(at_rest(measured_position_));
-  motion::plan_stop(commanded_, limits(),
-                    std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size())));
-  queue_.rest(commanded_.position, now);
-}
-
-void Cerebellum::sample_stop(Time now) {
-  const double t = to_s(now - stop_began_);
-  for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
-    const motion::AxisPoint point = stop_profiles_[static_cast<std::size_t>(i)].at(t);
-    commanded_.position[i] = point.position;
-    commanded_.speed[i] = point.speed;
-    commanded_.acceleration[i] = point.acceleration;
-  }
-}
-
-void Cerebellum::judge_stop(Time now) {
-  const bool at_end = is_braking(state_.safety) && now >= stop_ends_;
-  const bool unsure = state_.stop_result == StopResult::kUncertain || state_.stop_result == StopResult::kFailed;
-  if (!at_end && !unsure) return;
-  const bool standing = is_standing(now) && (unsure || now - stop_ends_ >= settings_.standstill_time || !powered_);
-  if (standing) {
-    state_.stop_result = StopResult::kConfirmed;
-  } else if (at_end && powered_ && is_silent(now)) {
-    state_.stop_result = StopResult::kFailed;
-  } else if (at_end && now - stop_ends_ >= settings_.confirm_within) {
-    state_.stop_result = StopResult::kUncertain;
-  }
-  const StopResult result = state_.stop_result;
-  if (!at_end && standing) log_.write(now, "standstill {}, at last", name(result));
-  if (!at_end || result == StopResult::kPending) return;
-  log_.write(now, "standstill {} {:.0f} ms after the stop began, {:.0f} of them braking", name(result),
-             1e3 * to_s(now - stop_began_), 1e3 * to_s(stop_ends_ - stop_began_));
-  if (!standing) {
-    stop(StopCause::kNoStandstill, now);
-    state_.stop_result = result;
-    return;
-  }
-  enter(SafetyEvent::kStandstill);
-  if (state_.cause == StopCause::kFollowingError) {
-    // Something holds the arm off: holding the commanded place would go on pressing.
-    track_from(at_rest(measured_position_));
-  }
-  queue_.rest(commanded_.position, now);
-}
-
 void Cerebellum::control(Time now, body::SetPoints& set_points) {
   set_points.power = powered_;
   set_points.vacuum_on = vacuum_on_;
@@ -409,6 +325,7 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
     return;
   }
   AxisVector& torque = set_points.torque_nm;
+  const AxisState asked = laws_.asked();
   const ControlLaws::Now does{.arm = {.position = position_now_, .speed = speed_now_, .payload = payload_},
                               .commanded = commanded_,
                               .felt = wrist_.at_tip(),
@@ -422,7 +339,8 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
     laws_.yield(does, torque);
   else
     laws_.torques(does, driven_nm_, torque);
-  if (laws_.controller() == Controller::kAdmittance && limit_watch_.beyond(laws_.asked())) ++statistics_.violations;
+  if (laws_.controller() == Controller::kAdmittance && limit_watch_.breach_but_jerk(asked, laws_.asked(), dt_s_))
+    ++statistics_.violations;
   const AxisVector clamped = torque.cwiseMin(limits().torque_nm).cwiseMax(-limits().torque_nm);
   const auto share = [&](const AxisVector& of) { return of.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff(); };
   statistics_.asked_torque = std::max(statistics_.asked_torque, share(torque));

@@ -88,7 +88,8 @@ class Cerebellum {
   //   kContact         operational only, and forgotten when armed; negative, not finite or above
   //                    CollisionSettings::contact_max_n: protective stop kBadCommand
   //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
-  //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm.
+  //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm or a
+  //                    stop.
   //   kBelt            operational only, and forgotten when armed
   //   kProtectiveStop  any epoch, any state
   //   kReset           from a stop or recovery, at measured standstill, word and stop input released, and
@@ -137,7 +138,9 @@ class Cerebellum {
   bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
-  void track_from(const AxisState& state);
+  void leave_compliance();
+  double plan_stop();
+  void go_on_from(const AxisState& state);
   void hold_measured(Time now);
   void sample_stop(Time now);
   void judge_stop(Time now);
@@ -156,7 +159,7 @@ class Cerebellum {
   const Duration delay_;  // of the drives
   model::RobotModel model_;
   model::Payload payload_;  // told
-  AxisLimits limits_;       // in force: the robot's, or what recovery makes of them
+  AxisLimits limits_;       // in force: the robot's, and where the arm is outside them
   LimitWatch limit_watch_;
   CollisionWatch collision_;
   ControlLaws laws_;
@@ -173,6 +176,7 @@ class Cerebellum {
   // The commanded state as of the last step, at stepped_, for delay_ later; before_ is the one a step earlier.
   AxisState commanded_, before_;
   Time stepped_;
+  Duration stall_{0};  // so long no step was made before this one, where that is too long
   double dt_s_ = 0;
 
   // Measurement: the newest good one, and what it says of this tick (carried on by its speed).

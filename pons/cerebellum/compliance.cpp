@@ -143,24 +143,28 @@ void admittance(model::RobotModel& model, const link::Compliance& compliance, co
 
   // The tip is slowed with its axes, so that it does not believe to have gone where they have not.
   const AxisLimits& axes = room.limits;
-  const AxisVector change = speed - state.axis_speed;
-  const double harsh = share_of(change / dt_s, axes.acceleration_rad_s2 - commanded.acceleration.cwiseAbs());
-  if (harsh > 1) {
-    speed = state.axis_speed + change / harsh;
-    state.speed = before + (state.speed - before) / harsh;
-  }
   const AxisVector left = room.speed_share * axes.speed_rad_s - commanded.speed.cwiseAbs();
   const double hasty = share_of(speed, left.cwiseMin(kGivingShare * axes.speed_rad_s));
   if (hasty > 1) {
     speed /= hasty;
     state.speed /= hasty;
   }
-  const AxisVector next = (at + dt_s * speed).cwiseMax(axes.position_min).cwiseMin(axes.position_max);
-  const AxisVector& most = axes.acceleration_rad_s2;
-  reference.position = next;
+  const AxisVector change = speed - state.axis_speed;
+  const double harsh = share_of(change / dt_s, axes.acceleration_rad_s2 - commanded.acceleration.cwiseAbs());
+  if (harsh > 1) {
+    speed = state.axis_speed + change / harsh;
+    state.speed = before + (state.speed - before) / harsh;
+  }
+  reference.position = at + dt_s * speed;
   reference.speed = commanded.speed + speed;
-  reference.acceleration = (commanded.acceleration + (speed - state.axis_speed) / dt_s).cwiseMax(-most).cwiseMin(most);
-  state.axis_way = next - commanded.position;
+  reference.acceleration = commanded.acceleration + (speed - state.axis_speed) / dt_s;
+  for (Eigen::Index i = 0; i < at.size(); ++i) {
+    if (reference.position[i] > axes.position_min[i] && reference.position[i] < axes.position_max[i]) continue;
+    // Pushed to the end of its way, an axis stands there.
+    reference.position[i] = std::clamp(reference.position[i], axes.position_min[i], axes.position_max[i]);
+    reference.speed[i] = reference.acceleration[i] = speed[i] = 0;
+  }
+  state.axis_way = reference.position - commanded.position;
   state.axis_speed = speed;
   state.way += dt_s * state.speed;
 }

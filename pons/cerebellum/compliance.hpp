@@ -53,7 +53,8 @@ struct Room {
 // One tick of M ẍ = w_felt + w - D ẋ - K x (Hogan 1985), semi-implicitly, so that any damping is stable: `felt` is what
 // the surroundings exert on the tip (tip axes). `reference` becomes the commanded state and the way of the axes that
 // gives the tip that way, no faster than kAdmittanceSpeed, kGivingShare of each axis' speed, and what the commanded
-// motion leaves of speed and acceleration limits; position limits hold. Jerk is not bounded: a push comes as it comes.
+// motion leaves of speed and acceleration limits: acceleration first, where that leaves less speed than before.
+// Position limits hold. Jerk is not bounded: a push comes as it comes.
 void admittance(model::RobotModel& model, const link::Compliance& compliance, const ComplianceLimits& limits,
                 const Room& room, const AxisState& commanded, const Vector6& felt, double dt_s, Admittance& state,
                 AxisState& reference) PONS_NONBLOCKING;

@@ -238,6 +238,120 @@ TEST(Compliance, AStopBrakesAnArmOnASoftSpring) {
   }
 }
 
+// Likewise under admittance, which would go on by what it was pushed to, or swing back.
+TEST(Compliance, AStopLeavesAdmittanceWhereItIs) {
+  for (const double stiffness : {0.0, 500.0}) {
+    Bench bench({.step = 1ms});
+    bench.arm();
+    Hand hand(bench);
+    hand.hold(Vector6::Zero(), 20);
+    link::Compliance weak = springs(stiffness, stiffness / 10);
+    weak.damping = {0.1, 0.1, 0.1, 0.1, 0.1, 0.1};
+    bench.send(control_command(Controller::kAdmittance, weak));
+    hand.hold(along(2, 10), 150);
+    ASSERT_TRUE(bench.operational());
+    const Pose before = hand.tip();
+    bench.send(plain_command(CommandKind::kProtectiveStop));
+    hand.hold(Vector6::Zero(), 200);
+    EXPECT_EQ(bench.state().safety, link::SafetyState::kProtectiveStop);
+    EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+    const Pose stopped = hand.tip();
+    EXPECT_LT((before.inverse() * stopped).translation().norm(), 0.01);
+    hand.hold(Vector6::Zero(), 1000);
+    EXPECT_LT((stopped.inverse() * hand.tip()).translation().norm(), 1e-4);
+    EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
+  }
+}
+
+// An arm on a spring that is pushed along, axis 1 as fast as that; the joints feel nothing else.
+class OnASpring {
+ public:
+  explicit OnASpring(const PlantSettings& plant, double begin_rad = bench_robot().home[0]) : bench(plant) {
+    AxisVector place = bench_robot().home;
+    place[0] = begin_rad;
+    bench.plant.place(place);
+    bench.run(50ms);
+    bench.arm();
+    link::Command contact = plain_command(CommandKind::kContact);
+    contact.contact_n = 200;
+    bench.send(contact);
+    bench.run(20ms);
+    link::Compliance soft = springs(0, 0);
+    soft.damping = {0.1, 0.1, 0.1, 0.1, 0.1, 0.1};
+    bench.send(control_command(Controller::kImpedance, soft));
+    bench.run(20ms);
+    bench.plant.extra_torque_nm = AxisVector::Zero(6);
+    bench.plant.extra_torque_nm[0] = 15;
+    while (bench.operational() && bench.plant.sensors.speed[0] < 1) bench.tick();
+  }
+  [[nodiscard]] double error_rad() const {
+    return (bench.state().commanded.position - bench.plant.sensors.position).cwiseAbs().maxCoeff();
+  }
+  Bench bench;
+};
+
+// The stop begins where the arm is then, though drives act later, or the loop has slept: it is not drawn back or on.
+TEST(Compliance, AStopOfAPushedArmDrawsItNowhere) {
+  for (const Duration delay : {0ms, 4ms}) {
+    for (const Duration gap : {0ms, 30ms}) {
+      OnASpring arm({.step = 1ms, .drive_delay = delay, .told_delay = delay});
+      ASSERT_TRUE(arm.bench.operational());
+      if (gap > 0ms) {
+        arm.bench.now += gap;
+      } else {
+        arm.bench.send(plain_command(CommandKind::kProtectiveStop));
+      }
+      arm.bench.plant.extra_torque_nm.setZero();
+      double worst = 0;
+      for (int tick = 0; tick < 300; ++tick) {
+        arm.bench.tick();
+        const AxisVector lead = to_s(delay) * arm.bench.state().commanded.speed;
+        worst = std::max(
+            worst,
+            (arm.bench.state().commanded.position - lead - arm.bench.plant.sensors.position).cwiseAbs().maxCoeff());
+      }
+      std::printf("drives %.0f ms late, a gap of %.0f ms: %.2f mrad beside the stop\n", 1e3 * to_s(delay),
+                  1e3 * to_s(gap), 1e3 * worst);
+      EXPECT_EQ(arm.bench.state().cause, gap > 0ms ? StopCause::kLoopStalled : StopCause::kCommanded);
+      EXPECT_EQ(arm.bench.state().stop_result, link::StopResult::kConfirmed);
+      EXPECT_LT(worst, 5e-4);
+    }
+  }
+}
+
+TEST(Compliance, AnArmThatIsPushedOverItsLimitIsStoppedInTime) {
+  const double limit = bench_robot().limits.position_max[0];
+  OnASpring arm({.step = 1ms}, limit - 0.02);
+  EXPECT_FALSE(arm.bench.operational());
+  EXPECT_EQ(arm.bench.state().cause, StopCause::kLimit);
+  arm.bench.plant.extra_torque_nm.setZero();
+  arm.bench.run(500ms);
+  EXPECT_EQ(arm.bench.state().stop_result, link::StopResult::kConfirmed);
+  EXPECT_LT(arm.bench.plant.sensors.position[0], limit + 2e-3);
+  EXPECT_EQ(arm.bench.cerebellum.statistics().violations, 0U);
+}
+
+// Somebody comes while the arm moves and gives way: slowed within the limits, not at once.
+TEST(Compliance, WhoComesDuringMotionAndGivingWayBreaksNoLimit) {
+  Settings settings;
+  settings.zone_speed_share[0] = 0.3;
+  Bench bench({.step = 1ms}, settings);
+  bench.arm();
+  Hand hand(bench);
+  hand.hold(Vector6::Zero(), 20);
+  link::Compliance soft = springs(0, 0);
+  soft.damping = {20, 20, 20, 1, 1, 1};
+  bench.send(control_command(Controller::kAdmittance, soft));
+  hand.hold(Vector6::Zero(), 20);
+  bench.move(AxisVector(bench_robot().home.array() + 1.5));
+  hand.hold(along(0, 10), 350);
+  ASSERT_GT(bench.state().commanded.speed.cwiseQuotient(bench_robot().limits.speed_rad_s).maxCoeff(), 0.6);
+  bench.plant.sensors.zones_occupied = 1;
+  hand.hold(along(0, 10), 1000);
+  EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
+  EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
+}
+
 // Moved and pushed along at once, also where a zone allows less: motion and giving way together keep the limits.
 TEST(Compliance, MotionAndGivingWayShareTheLimits) {
   for (const double share : {1.0, 0.3}) {

@@ -37,12 +37,12 @@ class ControlLaws {
   [[nodiscard]] const AxisState& acting() const { return asked_.out(); }
   // The newest of these.
   [[nodiscard]] const AxisState& asked() const { return asked_.before(0); }
-  // What the commanded motion may have of the speed that is allowed: admittance adds to it.
+  // What the commanded motion may have of the speed that is allowed: giving way adds to it.
   [[nodiscard]] double motion_share() const {
-    return controller_ == link::Controller::kAdmittance ? 1 - kGivingShare : 1;
+    return controller_ == link::Controller::kTracking ? 1 : 1 - kGivingShare;
   }
-  // The arm is where `commanded` has it; what is on its way no longer counts.
-  void rest(const AxisState& commanded) PONS_NONBLOCKING { asked_.fill(commanded); }
+  // The arm is where `commanded` has it, or comes there at its speed; what is on its way no longer counts.
+  void rest(const AxisState& commanded, double period_s) PONS_NONBLOCKING;
 
   // What the arm does at this tick.
   struct Now {

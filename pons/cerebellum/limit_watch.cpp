@@ -39,7 +39,7 @@ std::string_view name(Limit limit) {
   return "unknown";
 }
 
-std::optional<Breach> LimitWatch::beyond(const AxisState& state) const PONS_NONBLOCKING {
+std::optional<Breach> LimitWatch::beyond(const AxisState& state) const {
   for (Eigen::Index i = 0; i < state.position.size(); ++i) {
     // Written so that a value that is not a number fails.
     if (!(state.position[i] >= limits_.position_min[i] - kPosition) ||
@@ -67,7 +67,20 @@ std::optional<Breach> LimitWatch::breach_now(const AxisState& previous, const Ax
   return std::nullopt;
 }
 
-std::optional<Breach> LimitWatch::breach_ahead(const AxisState& state) const {
+std::optional<Breach> LimitWatch::breach_but_jerk(const AxisState& previous, const AxisState& next,
+                                                  double dt_s) const PONS_NONBLOCKING {
+  if (const auto breach = beyond(next)) return breach;
+  for (Eigen::Index i = 0; i < next.position.size(); ++i) {
+    const bool at_the_end = next.position[i] <= limits_.position_min[i] || next.position[i] >= limits_.position_max[i];
+    // The motion's own acceleration changes within the tick.
+    const double most = limits_.acceleration_rad_s2[i] + limits_.jerk_rad_s3[i] * dt_s;
+    if (!at_the_end && std::abs(next.speed[i] - previous.speed[i]) > most * dt_s * kRate)
+      return Breach{i, Limit::kAcceleration};
+  }
+  return std::nullopt;
+}
+
+std::optional<Breach> LimitWatch::breach_ahead(const AxisState& state) const PONS_NONBLOCKING {
   for (Eigen::Index i = 0; i < state.position.size(); ++i) {
     const double acceleration = limits_.acceleration_rad_s2[i], jerk = limits_.jerk_rad_s3[i];
     const motion::AxisPoint point{state.position[i], state.speed[i], state.acceleration[i]};

@@ -49,15 +49,18 @@ class LimitWatch {
   // Tolerances: 1e-6 rad, 1e-6 of each rate, and what a seam may add (SeamTolerance).
   [[nodiscard]] std::optional<Breach> breach(const AxisState& previous, const AxisState& next,
                                              double dt_s) const PONS_NONBLOCKING;
-  // The first limit of position, speed or acceleration that a state is beyond.
-  [[nodiscard]] std::optional<Breach> beyond(const AxisState& state) const PONS_NONBLOCKING;
+  // The same of what bounds no jerk and looks at no way to stop.
+  [[nodiscard]] std::optional<Breach> breach_but_jerk(const AxisState& previous, const AxisState& next,
+                                                      double dt_s) const PONS_NONBLOCKING;
+  // Why no stop within the limits is left from a state, if so.
+  [[nodiscard]] std::optional<Breach> breach_ahead(const AxisState& state) const PONS_NONBLOCKING;
   // Records what was sent; counts it as a violation if it broke a limit all the same.
   void record(const AxisState& previous, const AxisState& next, double dt_s,
               Statistics& statistics) const PONS_NONBLOCKING;
 
  private:
   [[nodiscard]] std::optional<Breach> breach_now(const AxisState& previous, const AxisState& next, double dt_s) const;
-  [[nodiscard]] std::optional<Breach> breach_ahead(const AxisState& state) const;
+  [[nodiscard]] std::optional<Breach> beyond(const AxisState& state) const;
   const AxisLimits& limits_;
 };
 

@@ -128,6 +128,19 @@ TEST_F(Recovery, AStopOnTheWayInIsNoBreachOfLimits) {
   EXPECT_EQ(bench_.cerebellum.statistics().violations, 0U);
 }
 
+// Too near for an error that anybody would notice, and held there: a collision like any other.
+TEST_F(Recovery, WhatHoldsTheArmOutsideIsNotPushedFor) {
+  found_[0] = bench_robot().limits.position_max[0] + 0.005;
+  bench_.plant.place(found_);
+  bench_.run(50ms);
+  recover();
+  bench_.plant.blocked = true;
+  move(bench_robot().limits.position_max[0] - 0.02, 0.05);
+  bench_.run(1500ms);
+  EXPECT_EQ(bench_.state().safety, SafetyState::kProtectiveStop);
+  EXPECT_EQ(bench_.state().cause, StopCause::kCollision);
+}
+
 TEST_F(Recovery, EndsWithTheBridge) {
   recover();
   bench_.mute = true;

@@ -113,7 +113,8 @@ inline constexpr std::array kCauses = [] {
       {Cause::kHeartbeatLost, Event::kProtectiveStop, Resumes::kBridge, "no command for `heartbeat_timeout`"},
       {Cause::kFollowingError, Event::kProtectiveStop, Resumes::kBridge,
        "an axis further than `following_error_rad` from where it should be, for `following_time`"},
-      {Cause::kLimit, Event::kProtectiveStop, Resumes::kBridge, "the next tick of a motion would break a limit"},
+      {Cause::kLimit, Event::kProtectiveStop, Resumes::kBridge,
+       "the next tick of a motion would break a limit, or what pushes an arm on a spring does"},
       {Cause::kBadCommand, Event::kProtectiveStop, Resumes::kBridge,
        "a command that is not finite, not continuous, from the past, or of what cannot be"},
       {Cause::kBodySilent, Event::kEmergencyStop, Resumes::kPerson, "no good newer measurement for `silence_timeout`"},
@@ -124,7 +125,7 @@ inline constexpr std::array kCauses = [] {
       {Cause::kLoopStalled, Event::kProtectiveStop, Resumes::kBridge, "two steps further apart than `stall_timeout`"},
       {Cause::kZone, Event::kProtectiveStop, Resumes::kZone, "somebody is in a zone that stops"},
       {Cause::kNotSlowed, Event::kProtectiveStop, Resumes::kBridge,
-       "the motion could not be slowed for a zone within `slow_within`"},
+       "what moves the arm could not be slowed for a zone within `slow_within`"},
       {Cause::kCollision, Event::kProtectiveStop, Resumes::kBridge,
        "something pushes on the arm that neither motion, load nor an expected contact explains"},
   });

@@ -90,14 +90,14 @@ enum class StopCause : std::uint8_t {
   kStopInput,       // the body's stop input
   kHeartbeatLost,   // nothing from the bridge for 100 ms
   kFollowingError,  // the arm is not where it was told to be
-  kLimit,           // a command would have broken a limit
+  kLimit,           // a command would have broken a limit, or what pushes an arm on a spring
   kBadCommand,      // not finite, discontinuous, from the past
   kBodySilent,      // measurements stopped
   kNoStandstill,    // a stop, and no standstill measured in time
   kBodyWatchdog,    // the body heard nothing for too long and took the power off
   kLoopStalled,     // the loop itself was kept from its ticks
   kZone,            // somebody is in a zone that stops
-  kNotSlowed,       // the motion could not be slowed in time for a zone
+  kNotSlowed,       // what moves the arm could not be slowed in time for a zone
   kCollision,       // something pushes that neither motion, load nor an expected contact explains
 };
 

@@ -19,6 +19,9 @@ constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
 // So far outside its limits, by sagging or by a hand, an arm is brought in unasked: slowly, as any recovery.
 constexpr double kBroughtInUnasked_rad = 0.01;
 
+// Stops on the way included, which may be left again: something holds it outside.
+constexpr Duration kLongestRecovery = std::chrono::seconds(60);
+
 constexpr std::string_view kArm = "arm";  // the word after which no person is needed any more
 
 bool has(std::uint32_t zones, std::size_t i) { return ((zones >> i) & 1U) != 0; }
@@ -58,6 +61,7 @@ Expected<void> Arming::tick(Time now) {
   note_changes(state, now);
   if (operational) {
     stopped_since_.reset();
+    recovering_since_.reset();
     return {};
   }
   if (!stopped_since_) stopped_since_ = now;
@@ -88,12 +92,19 @@ Expected<void> Arming::lead_out(const link::State& state, Time now) {
 
 Expected<void> Arming::bring_in(Time now) {
   const double outside_rad = skills_.outside_rad();
-  if (recovery_ == Recovery::kRefused && outside_rad > kBroughtInUnasked_rad) {
+  if (!recovering_since_ && recovery_ == Recovery::kRefused && outside_rad > kBroughtInUnasked_rad) {
     return fail(fmt::format("an axis stands {:.3f} rad outside its position limits", outside_rad), "arm",
                 "see that its way in is clear and allow it with --recover, or bring it in by hand");
   }
-  if (!recovering_) bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
-  recovering_ = true;
+  if (!recovering_since_) {
+    bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
+    recovering_since_ = now;
+  }
+  if (now - *recovering_since_ > kLongestRecovery) {
+    return fail(fmt::format("after {} s an axis still stands {:.3f} rad outside its position limits",
+                            to_s(kLongestRecovery), outside_rad),
+                "arm", "see what holds it there, and bring it in by hand");
+  }
   return skills_.recover(now);
 }
 

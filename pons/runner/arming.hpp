@@ -62,12 +62,12 @@ class Arming {
   const SkillPort& skills_;
   const std::vector<world::Zone>& zones_;
   Recovery recovery_;
-  std::optional<Time> stopped_since_;
+  std::optional<Time> stopped_since_, recovering_since_;
   std::array<Time, kMaxZones> occupied_at_;  // when somebody was last seen there, or heard of
   std::uint32_t zones_occupied_ = 0, zones_entered_ = 0;
   std::int64_t stops_ = 0;
   bool needs_person_ = false;  // to reset and to arm
-  bool was_operational_ = false, recovering_ = false;
+  bool was_operational_ = false;
   bool took_over_ = false;  // and the arm has not settled since
   bool yielding_ = false;   // it still moves as it was told before
 };

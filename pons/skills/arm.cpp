@@ -138,10 +138,13 @@ Expected<void> Arm::recover(Time now) {
     return {};
   }
   const Time from = splice_time(now);
-  const AxisVector inside =
-      state_.commanded.position.cwiseMax((world_.robot.limits.position_min.array() + kInside_rad).matrix())
-          .cwiseMin((world_.robot.limits.position_max.array() - kInside_rad).matrix());
   AxisLimits slow = world_.robot.limits;
+  AxisVector inside = state_.commanded.position;  // but for those axes that are outside
+  for (Eigen::Index i = 0; i < inside.size(); ++i) {
+    const double low = slow.position_min[i], high = slow.position_max[i];
+    if (std::min(inside[i], state_.position[i]) < low) inside[i] = low + kInside_rad;
+    if (std::max(inside[i], state_.position[i]) > high) inside[i] = high - kInside_rad;
+  }
   slow.position_min = slow.position_min.cwiseMin(state_.commanded.position);
   slow.position_max = slow.position_max.cwiseMax(state_.commanded.position);
   slow.speed_rad_s *= kRecoverySpeed;

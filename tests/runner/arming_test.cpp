@@ -185,6 +185,28 @@ TEST_F(ArmingTest, ALittleOutsideItsLimitsTheArmIsBroughtInUnasked) {
   }
 }
 
+TEST_F(ArmingTest, ARecoveryThatHasBegunGoesOnAndEndsInTime) {
+  Arming arming(bridge_, port_, world_.zones, Recovery::kRefused);
+  state_.safety = SafetyState::kDisarmed;
+  outside_rad_ = 0.0099;
+  tick(arming);
+  state_.safety = SafetyState::kRecovery;
+  outside_rad_ = 0.0101;  // it has sagged when the brakes let go
+  const Time began = now_;
+  Expected<void> done;
+  while (done && now_ - began < from_s(70)) {
+    now_ += from_s(0.01);
+    // Stopped on its way again and again, by what the bridge may leave by itself.
+    state_.safety = now_.ns() / 1'000'000'000 % 2 == 0 ? SafetyState::kRecovery : SafetyState::kDisarmed;
+    done = arming.tick(now_);
+  }
+  ASSERT_FALSE(done) << "something holds it outside";
+  EXPECT_NEAR(to_s(now_ - began), 60, 0.1);
+  EXPECT_EQ(done.error().line(),
+            "arm: after 60 s an axis still stands 0.010 rad outside its position limits; see what holds it there, and "
+            "bring it in by hand");
+}
+
 // Zones 0 and 1 let the bridge go on after a while, zone 2 does not, zone 3 only slows.
 class ZonesTest : public ArmingTest {
  protected:
