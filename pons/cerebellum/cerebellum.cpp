@@ -281,7 +281,7 @@ void Cerebellum::advance(Time now) {
   before_ = commanded_;
   if (!powered_) {
     commanded_ = before_ = at_rest(seen_ ? measured_position_ : commanded_.position);
-    laws_.rest(commanded_, to_s(settings_.period));
+    laws_.rest(commanded_);
     return;
   }
   if (moves(state_.safety)) follow(now);

@@ -135,7 +135,7 @@ bool Cerebellum::take_control(const link::Command& command, Time now) {
   if (command.controller != laws_.controller()) {
     const AxisVector held = laws_.held(commanded_.position, position_now_);
     commanded_ = before_ = at_rest(held.cwiseMax(limits().position_min).cwiseMin(limits().position_max));
-    laws_.rest(commanded_, to_s(settings_.period));
+    laws_.rest(commanded_);
     queue_.rest(commanded_.position, stepped_);
     log_.write(now, "control: {}", name(command.controller));
   }
@@ -181,7 +181,7 @@ bool Cerebellum::begin(SafetyEvent event, Time now) {
   gives_way_ = false;
   commanded_ = before_ = at_rest(measured_position_);
   widen();
-  laws_.rest(commanded_, to_s(settings_.period));
+  laws_.rest(commanded_);
   queue_.rest(commanded_.position, stepped_);
   motion_time_.restart(stepped_ + delay_);
   heard_at_ = now;

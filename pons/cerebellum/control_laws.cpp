@@ -35,14 +35,6 @@ void ControlLaws::reset() PONS_NONBLOCKING {
   fading_nm_.setZero();
 }
 
-void ControlLaws::rest(const AxisState& commanded, double period_s) PONS_NONBLOCKING {
-  for (std::size_t ago = asked_.ticks() + 1; ago > 0; --ago) {
-    AxisState before = commanded;
-    before.position -= static_cast<double>(ago - 1) * period_s * commanded.speed;
-    asked_.push(before);
-  }
-}
-
 AxisVector ControlLaws::held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING {
   switch (controller_) {
     case Controller::kTracking:

@@ -41,8 +41,8 @@ class ControlLaws {
   [[nodiscard]] double motion_share() const {
     return controller_ == link::Controller::kTracking ? 1 : 1 - kGivingShare;
   }
-  // The arm is where `commanded` has it, or comes there at its speed; what is on its way no longer counts.
-  void rest(const AxisState& commanded, double period_s) PONS_NONBLOCKING;
+  // The arm is where `commanded` has it; what is on its way no longer counts.
+  void rest(const AxisState& commanded) PONS_NONBLOCKING { asked_.fill(commanded); }
 
   // What the arm does at this tick.
   struct Now {

@@ -76,7 +76,7 @@ double Cerebellum::plan_stop() {
 void Cerebellum::go_on_from(const AxisState& state) {
   commanded_ = before_ = state;
   widen();
-  laws_.rest(commanded_, to_s(settings_.period));
+  laws_.rest(commanded_);
 }
 
 void Cerebellum::hold_measured(Time now) {

@@ -101,7 +101,7 @@ Expected<void> Arming::bring_in(Time now) {
     recovering_since_ = now;
   }
   if (now - *recovering_since_ > kLongestRecovery) {
-    return fail(fmt::format("after {} s an axis still stands {:.3f} rad outside its position limits",
+    return fail(fmt::format("after {:.0f} s an axis still stands {:.3f} rad outside its position limits",
                             to_s(kLongestRecovery), outside_rad),
                 "arm", "see what holds it there, and bring it in by hand");
   }
