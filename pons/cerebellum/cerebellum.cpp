@@ -22,6 +22,8 @@ constexpr Duration kHastyTime = std::chrono::milliseconds(10);
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
 
+AxisVector clamped(const AxisVector& values, const AxisVector& most) { return values.cwiseMin(most).cwiseMax(-most); }
+
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
   settings.compliance = with_delay(settings.compliance, delay_s);
   return settings;
@@ -205,8 +207,8 @@ void Cerebellum::watch_springs(Time now) {
     return;
   }
   AxisState measured = at_rest(measured_position_);
-  measured.speed = measured_speed_;
-  if (const auto breach = limit_watch_.breach_ahead(measured); breach && breach->limit == Limit::kStoppingDistance) {
+  measured.speed = clamped(measured_speed_, limits().speed_rad_s);  // haste is looked at below
+  if (const auto breach = limit_watch_.breach_ahead(measured)) {
     if (stop(StopCause::kLimit, now)) log_.write(now, "axis {} is pushed over its position limit", breach->axis + 1);
     return;
   }
@@ -331,8 +333,7 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
                               .felt = wrist_.at_tip(),
                               .dt_s = dt_s_,
                               .limits = limits(),
-                              .speed_share = state_.speed_share,
-                              .presses = state_.safety == SafetyState::kOperational};
+                              .speed_share = state_.speed_share};
   if (is_silent(now))
     laws_.blind(does, torque);
   else if (gives_way_)

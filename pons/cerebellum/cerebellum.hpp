@@ -85,7 +85,7 @@ class Cerebellum {
   //                    kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from the last tick.
   //   kVacuum          operational only; a cup that the tool does not have: protective stop kBadCommand
   //   kPayload         any state; negative, not finite or above max_payload_kg: protective stop kBadCommand
-  //   kContact         operational only, and forgotten when armed; negative, not finite or above
+  //   kContact         operational or in recovery, and forgotten when either begins; negative, not finite or above
   //                    CollisionSettings::contact_max_n: protective stop kBadCommand
   //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
   //                    kBadCommand. The commanded position becomes the one that the arm is held at. Until kArm or a
@@ -138,7 +138,8 @@ class Cerebellum {
   bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
-  void leave_compliance();
+  bool leave_compliance();
+  void widen_to_stop();
   double plan_stop();
   void go_on_from(const AxisState& state);
   void hold_measured(Time now);

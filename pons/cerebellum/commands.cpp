@@ -52,7 +52,7 @@ bool Cerebellum::take(const link::Command& command, Time now) {
     case CommandKind::kPayload:
       return take_payload(command, now);
     case CommandKind::kContact:
-      return operational && take_contact(command, now);
+      return moves(state_.safety) && take_contact(command, now);
     case CommandKind::kControl:
       return operational && take_control(command, now);
     case CommandKind::kBelt:

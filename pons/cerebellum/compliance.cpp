@@ -141,6 +141,11 @@ void admittance(model::RobotModel& model, const link::Compliance& compliance, co
   gone.tail<3>() = tip.linear().transpose() * turn_between(tip.linear(), there.linear());
   AxisVector speed = jacobian.transpose() * square.llt().solve(Vector6(state.speed + kCloses_1_s * (state.way - gone)));
 
+  // An axis at its end goes no further, and holds up no other.
+  for (Eigen::Index i = 0; i < at.size(); ++i) {
+    if (at[i] >= room.limits.position_max[i]) speed[i] = std::min(speed[i], 0.0);
+    if (at[i] <= room.limits.position_min[i]) speed[i] = std::max(speed[i], 0.0);
+  }
   // The tip is slowed with its axes, so that it does not believe to have gone where they have not.
   const AxisLimits& axes = room.limits;
   const AxisVector left = room.speed_share * axes.speed_rad_s - commanded.speed.cwiseAbs();

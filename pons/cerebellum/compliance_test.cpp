@@ -263,6 +263,30 @@ TEST(Compliance, AStopLeavesAdmittanceWhereItIs) {
   }
 }
 
+// Nor does the acceleration of a blow that has just begun carry it on.
+TEST(Compliance, AStopAtTheBeginningOfAPushIsShort) {
+  Bench bench({.step = 1ms});
+  bench.arm();
+  Hand hand(bench);
+  link::Command contact = plain_command(CommandKind::kContact);
+  contact.contact_n = 200;
+  bench.send(contact);
+  hand.hold(Vector6::Zero(), 20);
+  link::Compliance soft = springs(0, 0);
+  soft.damping = {20, 20, 20, 1, 1, 1};
+  bench.send(control_command(Controller::kAdmittance, soft));
+  hand.hold(Vector6::Zero(), 20);
+  hand.hold(along(2, 60), 3);
+  ASSERT_TRUE(bench.operational());
+  const AxisVector before = bench.state().commanded.position;
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  hand.hold(Vector6::Zero(), 300);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  const double way = (bench.state().commanded.position - before).cwiseAbs().maxCoeff();
+  std::printf("%.2f mrad after a push of 3 ms\n", 1e3 * way);
+  EXPECT_LT(way, 2e-3);
+}
+
 // An arm on a spring that is pushed along, axis 1 as fast as that; the joints feel nothing else.
 class OnASpring {
  public:
@@ -282,10 +306,7 @@ class OnASpring {
     bench.run(20ms);
     bench.plant.extra_torque_nm = AxisVector::Zero(6);
     bench.plant.extra_torque_nm[0] = 15;
-    while (bench.operational() && bench.plant.sensors.speed[0] < 1) bench.tick();
-  }
-  [[nodiscard]] double error_rad() const {
-    return (bench.state().commanded.position - bench.plant.sensors.position).cwiseAbs().maxCoeff();
+    while (bench.operational() && bench.plant.sensors.speed[0] < 2.5) bench.tick();
   }
   Bench bench;
 };
@@ -314,14 +335,14 @@ TEST(Compliance, AStopOfAPushedArmDrawsItNowhere) {
                   1e3 * to_s(gap), 1e3 * worst);
       EXPECT_EQ(arm.bench.state().cause, gap > 0ms ? StopCause::kLoopStalled : StopCause::kCommanded);
       EXPECT_EQ(arm.bench.state().stop_result, link::StopResult::kConfirmed);
-      EXPECT_LT(worst, 5e-4);
+      EXPECT_LT(worst, gap > 0ms ? 7e-4 : 4.7e-4);
     }
   }
 }
 
 TEST(Compliance, AnArmThatIsPushedOverItsLimitIsStoppedInTime) {
   const double limit = bench_robot().limits.position_max[0];
-  OnASpring arm({.step = 1ms}, limit - 0.02);
+  OnASpring arm({.step = 1ms}, limit - 0.1);
   EXPECT_FALSE(arm.bench.operational());
   EXPECT_EQ(arm.bench.state().cause, StopCause::kLimit);
   arm.bench.plant.extra_torque_nm.setZero();
@@ -347,7 +368,11 @@ TEST(Compliance, WhoComesDuringMotionAndGivingWayBreaksNoLimit) {
   hand.hold(along(0, 10), 350);
   ASSERT_GT(bench.state().commanded.speed.cwiseQuotient(bench_robot().limits.speed_rad_s).maxCoeff(), 0.6);
   bench.plant.sensors.zones_occupied = 1;
-  hand.hold(along(0, 10), 1000);
+  hand.hold(along(0, 10), 600);
+  const double share =
+      bench.state().commanded.speed.cwiseAbs().cwiseQuotient(bench_robot().limits.speed_rad_s).maxCoeff();
+  EXPECT_GT(share, 0.1) << "it should be on its way yet";
+  EXPECT_LE(share, 0.3 * (1 - kGivingShare) * 1.01);
   EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
   EXPECT_EQ(bench.cerebellum.statistics().violations, 0U);
 }

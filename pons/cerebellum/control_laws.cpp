@@ -35,6 +35,14 @@ void ControlLaws::reset() PONS_NONBLOCKING {
   fading_nm_.setZero();
 }
 
+void ControlLaws::come(const AxisState& commanded, double period_s) PONS_NONBLOCKING {
+  for (std::size_t ago = asked_.ticks() + 1; ago > 0; --ago) {
+    AxisState before = commanded;
+    before.position -= static_cast<double>(ago - 1) * period_s * commanded.speed;
+    asked_.push(before);
+  }
+}
+
 AxisVector ControlLaws::held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING {
   switch (controller_) {
     case Controller::kTracking:
@@ -48,8 +56,6 @@ AxisVector ControlLaws::held(const AxisVector& commanded, const AxisVector& meas
 }
 
 void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING {
-  link::Compliance compliance = compliance_;
-  if (!now.presses) compliance.wrench = {};
   switch (controller_) {
     case Controller::kTracking:
       asked_.push(now.commanded);
@@ -57,11 +63,11 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
       break;
     case Controller::kImpedance:
       asked_.push(now.commanded);
-      impedance(model_, compliance, settings_.compliance, now.arm, acting(), torque_nm);
+      impedance(model_, compliance_, settings_.compliance, now.arm, acting(), torque_nm);
       break;
     case Controller::kAdmittance:
-      admittance(model_, compliance, settings_.compliance, {now.limits, now.speed_share}, now.commanded,
-                 now.presses ? now.felt : Vector6(Vector6::Zero()), now.dt_s, admittance_, reference_);
+      admittance(model_, compliance_, settings_.compliance, {now.limits, now.speed_share}, now.commanded, now.felt,
+                 now.dt_s, admittance_, reference_);
       asked_.push(reference_);
       computed_torque(model_, gains_, now.arm, reference_, acting(), now.dt_s, corrections_, torque_nm);
       break;

@@ -41,8 +41,10 @@ class ControlLaws {
   [[nodiscard]] double motion_share() const {
     return controller_ == link::Controller::kTracking ? 1 : 1 - kGivingShare;
   }
-  // The arm is where `commanded` has it; what is on its way no longer counts.
+  // The arm rests where `commanded` has it; what is on its way no longer counts.
   void rest(const AxisState& commanded) PONS_NONBLOCKING { asked_.fill(commanded); }
+  // Likewise, and comes there at its speed, a tick's way in each `period_s`.
+  void come(const AxisState& commanded, double period_s) PONS_NONBLOCKING;
 
   // What the arm does at this tick.
   struct Now {
@@ -52,7 +54,6 @@ class ControlLaws {
     double dt_s;
     const AxisLimits& limits;
     double speed_share;  // that is allowed of each speed limit
-    bool presses;  // false: the wrench that was asked for is not exerted, and felt ones move nothing: it is stopping
   };
   // Not clamped. `last_nm` are the torques of the tick before.
   void torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING;

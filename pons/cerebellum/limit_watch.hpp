@@ -23,7 +23,7 @@ struct Statistics {
   double measured_acceleration = 0;
   double following_error_rad = 0;        // largest
   std::uint64_t violations = 0;          // ticks in which a command sent to the arm broke a limit: must stay 0
-  double contact = 0;                    // largest share of what passes for no collision, while operational
+  double contact = 0;                    // largest share of what passes for no collision, while it moves
   std::uint64_t measured_overspeed = 0;  // fresh measurements above a speed limit
   std::uint64_t saturated = 0;           // ticks with a torque clamped
   std::uint64_t refused = 0;             // ticks in which a sample was refused before it was sent

@@ -4,7 +4,6 @@
 #include <string_view>
 
 #include "pons/cerebellum/cerebellum.hpp"
-#include "pons/motion/axis_plan.hpp"
 #include "pons/motion/stop.hpp"
 
 namespace pons::cerebellum {
@@ -28,9 +27,10 @@ bool Cerebellum::stop(StopCause cause, Time now) {
   state_.cause = cause;
   state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
   if (!is_braking(before)) {
-    leave_compliance();
+    const bool gave_way = leave_compliance();
     stop_began_ = stepped_;
     stop_ends_ = std::max(now, stop_began_ + from_s(plan_stop()));
+    if (gave_way) widen_to_stop();
     queue_.rest(commanded_.position, stop_ends_);
   }
   log_.write(now, "{} stop: {}",
@@ -40,25 +40,32 @@ bool Cerebellum::stop(StopCause cause, Time now) {
 
 // No stop relies on a spring and a damper that somebody asked for. Where admittance has brought the arm, its reference
 // says; where a spring has let it be pushed to, and how fast, only the measurement.
-void Cerebellum::leave_compliance() {
-  if (laws_.controller() == Controller::kTracking) return;
-  AxisState from = laws_.asked();
-  if (laws_.controller() == Controller::kImpedance) {
+bool Cerebellum::leave_compliance() {
+  const Controller law = laws_.controller();
+  if (law == Controller::kTracking) return false;
+  if (law == Controller::kAdmittance) {
+    const AxisVector motion = commanded_.acceleration;
+    commanded_ = laws_.asked();
+    commanded_.acceleration = motion;  // that of a push comes and goes with it
+  } else {
     // As of the last step, and when what is commanded acts.
-    from = at_rest(position_now_ + (to_s(delay_) - dt_s_) * speed_now_);
-    from.speed = speed_now_.cwiseMax(-limits().speed_rad_s).cwiseMin(limits().speed_rad_s);
+    commanded_ = at_rest(position_now_ + (to_s(delay_) - dt_s_) * speed_now_);
+    commanded_.speed = speed_now_.cwiseMax(-limits().speed_rad_s).cwiseMin(limits().speed_rad_s);
+    laws_.come(commanded_, to_s(settings_.period));
     laws_.forget();
   }
+  before_ = commanded_;
   laws_.reset();
-  go_on_from(from);
-  // What was pushed towards a limit may have to go beyond it: that breaks none.
-  for (Eigen::Index i = 0; i < from.position.size(); ++i) {
-    const auto bounds =
-        motion::AxisBounds::symmetric(limits_.speed_rad_s[i], limits_.acceleration_rad_s2[i], limits_.jerk_rad_s3[i]);
-    const motion::AxisPoint point{from.position[i], from.speed[i], from.acceleration[i]};
-    const double end = motion::SpeedPlan(point, 0, bounds).end_position();
-    limits_.position_min[i] = std::min(limits_.position_min[i], end);
-    limits_.position_max[i] = std::max(limits_.position_max[i], end);
+  return true;
+}
+
+// What is pushed towards a limit may have to go beyond it: that breaks none.
+void Cerebellum::widen_to_stop() {
+  widen();
+  for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
+    const auto extent = stop_profiles_[static_cast<std::size_t>(i)].extent();
+    limits_.position_min[i] = std::min(limits_.position_min[i], extent.position_min);
+    limits_.position_max[i] = std::max(limits_.position_max[i], extent.position_max);
   }
 }
 

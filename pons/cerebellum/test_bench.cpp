@@ -1,6 +1,7 @@
 #include "pons/cerebellum/test_bench.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -51,8 +52,11 @@ std::filesystem::path scaled_urdf(const std::filesystem::path& urdf, double by) 
       text.replace(at, length, std::to_string(std::stod(text.substr(at, length)) * by));
     }
   }
+  // Tests run side by side: nobody may read it half-written.
   const auto path = std::filesystem::path(testing::TempDir()) / ("scaled_" + std::to_string(by) + ".urdf");
-  std::ofstream(path) << text;
+  const auto mine = path.string() + "." + std::to_string(getpid());
+  std::ofstream(mine) << text;
+  std::filesystem::rename(mine, path);
   return path;
 }
 

@@ -120,16 +120,18 @@ Expected<SharedMemory> SharedMemory::make(const std::string& name, const Layout&
 
 Expected<void> SharedMemory::publish() {
   const std::string path = path_of(name_);
-  // A link does not replace what has the name: a dead owner's memory goes first, but not that of another maker, who was
-  // faster.
+  const std::string opened = fmt::format("/proc/self/fd/{}", file_);
+  const auto link = [&] { return linkat(AT_FDCWD, opened.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0; };
+  if (link()) return {};
+  if (errno != EEXIST) return system_error(path);
+  // A dead owner's memory makes room; that of another maker, who was faster, does not.
   if (const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC); file >= 0) {
     const bool taken = is_taken(file, Role::kOwner);
     close(file);
     if (taken) return fail("another process owns it", path, "end that one, or choose another name");
   }
   if (unlink(path.c_str()) != 0 && errno != ENOENT) return system_error(path);
-  const std::string opened = fmt::format("/proc/self/fd/{}", file_);
-  if (linkat(AT_FDCWD, opened.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) != 0) return system_error(path);
+  if (!link()) return system_error(path);
   return {};
 }
 

@@ -294,5 +294,18 @@ TEST_F(SharedMemoryTest, NamesAreNoPaths) {
   }
 }
 
+// Two that begin at once: the one that is published first has the name.
+TEST_F(SharedMemoryTest, OfTwoMakersOneHasTheName) {
+  const SharedMemory::Layout layout{4096, 1};
+  auto first = SharedMemory::make(name_, layout), second = SharedMemory::make(name_, layout);
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(second);
+  ASSERT_TRUE(first->publish());
+  const auto late = second->publish();
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().what, "another process owns it");
+  EXPECT_EQ(files().size(), 1U);
+}
+
 }  // namespace
 }  // namespace pons::rt

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "pons/cerebellum/safety_machine.hpp"
 
@@ -19,7 +20,7 @@ constexpr Duration kStandstillBeforeReset = std::chrono::milliseconds(500);
 // So far outside its limits, by sagging or by a hand, an arm is brought in unasked: slowly, as any recovery.
 constexpr double kBroughtInUnasked_rad = 0.01;
 
-// Stops on the way included, which may be left again: something holds it outside.
+// Stops on the way not counted: then something holds it outside.
 constexpr Duration kLongestRecovery = std::chrono::seconds(60);
 
 constexpr std::string_view kArm = "arm";  // the word after which no person is needed any more
@@ -61,7 +62,7 @@ Expected<void> Arming::tick(Time now) {
   note_changes(state, now);
   if (operational) {
     stopped_since_.reset();
-    recovering_since_.reset();
+    recovering_.reset();
     return {};
   }
   if (!stopped_since_) stopped_since_ = now;
@@ -81,6 +82,7 @@ void Arming::note_changes(const link::State& state, Time now) {
 
 Expected<void> Arming::lead_out(const link::State& state, Time now) {
   if (needs_person_) {
+    recovering_.reset();
     if (state.safety == SafetyState::kOperational) skills_.halt();
     return {};
   }
@@ -92,15 +94,17 @@ Expected<void> Arming::lead_out(const link::State& state, Time now) {
 
 Expected<void> Arming::bring_in(Time now) {
   const double outside_rad = skills_.outside_rad();
-  if (!recovering_since_ && recovery_ == Recovery::kRefused && outside_rad > kBroughtInUnasked_rad) {
+  if (!recovering_ && recovery_ == Recovery::kRefused && outside_rad > kBroughtInUnasked_rad) {
     return fail(fmt::format("an axis stands {:.3f} rad outside its position limits", outside_rad), "arm",
                 "see that its way in is clear and allow it with --recover, or bring it in by hand");
   }
-  if (!recovering_since_) {
+  if (!recovering_) {
     bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
-    recovering_since_ = now;
+    recovering_ = Recovering{.for_so_long = Duration{0}, .at = now};
   }
-  if (now - *recovering_since_ > kLongestRecovery) {
+  const Duration since = now - std::exchange(recovering_->at, now);
+  if (since < kStandstillBeforeReset) recovering_->for_so_long += since;  // else it was stopped in between
+  if (outside_rad > 0 && recovering_->for_so_long > kLongestRecovery) {
     return fail(fmt::format("after {:.0f} s an axis still stands {:.3f} rad outside its position limits",
                             to_s(kLongestRecovery), outside_rad),
                 "arm", "see what holds it there, and bring it in by hand");

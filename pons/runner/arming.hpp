@@ -62,7 +62,12 @@ class Arming {
   const SkillPort& skills_;
   const std::vector<world::Zone>& zones_;
   Recovery recovery_;
-  std::optional<Time> stopped_since_, recovering_since_;
+  std::optional<Time> stopped_since_;
+  struct Recovering {
+    Duration for_so_long;
+    Time at;
+  };
+  std::optional<Recovering> recovering_;     // since the arm was last operational, or in a person's hands
   std::array<Time, kMaxZones> occupied_at_;  // when somebody was last seen there, or heard of
   std::uint32_t zones_occupied_ = 0, zones_entered_ = 0;
   std::int64_t stops_ = 0;

@@ -142,8 +142,11 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
   // within the action that was under way, and before the end.
   Progress stopped() {
     if (path_ && !ending_ && whole()) finish(succeeded());
-    if (path_ && executed_ > oldest_ + kRounding)
-      oldest_ = (executed_ + std::min(std::floor(executed_ + motion::kSameProgress) + 1, total_)) / 2;
+    if (path_) {
+      const bool got_on = executed_ > oldest_ + kRounding;
+      const double next = std::min(std::floor(executed_ + motion::kSameProgress) + 1, total_);
+      oldest_ = got_on ? (executed_ + next) / 2 : oldest_ + 4 * kRounding;
+    }
     path_.reset();
     last_ = false;
     return ending_ ? verdict_ : Progress{};

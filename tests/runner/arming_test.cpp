@@ -207,6 +207,33 @@ TEST_F(ArmingTest, ARecoveryThatHasBegunGoesOnAndEndsInTime) {
             "bring it in by hand");
 }
 
+TEST_F(ArmingTest, ARecoveryIsNotHeldUpByWhoStopsIt) {
+  Arming arming(bridge_, port_, world_.zones, Recovery::kRefused);
+  outside_rad_ = 0.005;
+  const auto recover_for = [&](double seconds) {
+    state_.safety = SafetyState::kRecovery;
+    for (const Time until = now_ + from_s(seconds); now_ < until;) tick(arming);
+  };
+  recover_for(40);
+  stand(link::StopCause::kCollision);
+  for (int i = 0; i < 10'000; ++i) {
+    state_.safety = SafetyState::kStopping;
+    tick(arming);
+  }
+  recover_for(15);
+
+  // A person's hands may have moved it: what follows is another recovery, which nobody has allowed.
+  stand(link::StopCause::kStopInput);
+  tick(arming);
+  ASSERT_TRUE(arming.reset(now_));
+  state_ = {};
+  outside_rad_ = 0.4;
+  tick(arming);
+  ASSERT_TRUE(arming.arm(now_));
+  now_ += from_s(0.01);
+  EXPECT_FALSE(arming.tick(now_));
+}
+
 // Zones 0 and 1 let the bridge go on after a while, zone 2 does not, zone 3 only slows.
 class ZonesTest : public ArmingTest {
  protected:
