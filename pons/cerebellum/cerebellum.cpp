@@ -13,7 +13,6 @@ namespace {
 using link::Controller;
 using link::SafetyState;
 using link::StopCause;
-using link::StopResult;
 
 // Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
 constexpr double kTooFast = 1.01;
