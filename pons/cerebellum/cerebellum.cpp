@@ -21,8 +21,6 @@ constexpr Duration kHastyTime = std::chrono::milliseconds(10);
 // Beyond what a zone allows, from rounding and from a rate that is still settling.
 constexpr double kSlowTolerance = 0.01;
 
-AxisVector clamped(const AxisVector& values, const AxisVector& most) { return values.cwiseMin(most).cwiseMax(-most); }
-
 ControlSettings with_delay(ControlSettings settings, double delay_s) {
   settings.compliance = with_delay(settings.compliance, delay_s);
   return settings;
@@ -206,7 +204,8 @@ void Cerebellum::watch_springs(Time now) {
     return;
   }
   AxisState measured = at_rest(measured_position_);
-  measured.speed = clamped(measured_speed_, limits().speed_rad_s);  // haste is looked at below
+  // Haste is looked at below.
+  measured.speed = measured_speed_.cwiseMax(-limits().speed_rad_s).cwiseMin(limits().speed_rad_s);
   if (const auto breach = limit_watch_.breach_ahead(measured)) {
     if (stop(StopCause::kLimit, now)) log_.write(now, "axis {} is pushed over its position limit", breach->axis + 1);
     return;

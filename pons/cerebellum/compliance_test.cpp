@@ -39,6 +39,12 @@ link::Command control_command(Controller controller, const link::Compliance& com
   return command;
 }
 
+void expect_contact(Bench& bench, double force_n) {
+  link::Command command = plain_command(CommandKind::kContact);
+  command.contact_n = force_n;
+  bench.send(command);
+}
+
 // A push on the tip in its own axes, felt by joints and wrist.
 class Hand {
  public:
@@ -83,9 +89,7 @@ Vector6 along(int axis, double value) {
 double yields(Controller controller, double stiffness, int axis, double force) {
   Bench bench({.step = 1ms});
   bench.arm();
-  link::Command contact = plain_command(CommandKind::kContact);
-  contact.contact_n = 100;
-  bench.send(contact);
+  expect_contact(bench, 100);
   Hand hand(bench);
   hand.hold(Vector6::Zero(), 20);
   bench.send(control_command(controller, springs(stiffness, 60)));
@@ -166,9 +170,7 @@ TEST(Compliance, AdmittanceComesDownUntilItPressesAsAskedAndKeepsPressing) {
   Bench bench({.step = 1ms});
   bench.arm();
   Hand hand(bench);
-  link::Command contact = plain_command(CommandKind::kContact);
-  contact.contact_n = 100;
-  bench.send(contact);
+  expect_contact(bench, 100);
   hand.hold(Vector6::Zero(), 20);
   link::Compliance press = springs(2000, 100);
   press.stiffness[2] = 0;
@@ -215,9 +217,7 @@ TEST(Compliance, AStopBrakesAnArmOnASoftSpring) {
   for (const bool thrown_too_fast : {false, true}) {
     Bench bench({.step = 1ms});
     bench.arm();
-    link::Command contact = plain_command(CommandKind::kContact);
-    contact.contact_n = 200;
-    bench.send(contact);
+    expect_contact(bench, 200);
     Hand hand(bench);
     hand.hold(Vector6::Zero(), 20);
     link::Compliance soft = springs(0, 0);
@@ -229,7 +229,11 @@ TEST(Compliance, AStopBrakesAnArmOnASoftSpring) {
     const AxisVector& limit = bench_robot().limits.speed_rad_s;
     EXPECT_GT(bench.plant.sensors.speed.cwiseAbs().cwiseQuotient(limit).maxCoeff(), 0.2);
     if (!thrown_too_fast) bench.send(plain_command(CommandKind::kProtectiveStop));
-    hand.hold(Vector6::Zero(), 500);
+    int ticks = 0;
+    for (; ticks < 500 && bench.state().stop_result != link::StopResult::kConfirmed; ++ticks)
+      hand.hold(Vector6::Zero(), 1);
+    std::printf("at most %.2f of a speed limit, confirmed to stand after %d ms\n",
+                bench.cerebellum.statistics().measured_speed, ticks);
     EXPECT_EQ(bench.state().cause, thrown_too_fast ? StopCause::kLimit : StopCause::kCommanded);
     EXPECT_EQ(bench.state().safety, link::SafetyState::kProtectiveStop);
     EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
@@ -268,9 +272,7 @@ TEST(Compliance, AStopAtTheBeginningOfAPushIsShort) {
   Bench bench({.step = 1ms});
   bench.arm();
   Hand hand(bench);
-  link::Command contact = plain_command(CommandKind::kContact);
-  contact.contact_n = 200;
-  bench.send(contact);
+  expect_contact(bench, 200);
   hand.hold(Vector6::Zero(), 20);
   link::Compliance soft = springs(0, 0);
   soft.damping = {20, 20, 20, 1, 1, 1};
@@ -296,9 +298,7 @@ class OnASpring {
     bench.plant.place(place);
     bench.run(50ms);
     bench.arm();
-    link::Command contact = plain_command(CommandKind::kContact);
-    contact.contact_n = 200;
-    bench.send(contact);
+    expect_contact(bench, 200);
     bench.run(20ms);
     link::Compliance soft = springs(0, 0);
     soft.damping = {0.1, 0.1, 0.1, 0.1, 0.1, 0.1};
@@ -384,9 +384,7 @@ TEST(Compliance, MotionAndGivingWayShareTheLimits) {
     settings.zone_speed_share[0] = share;
     Bench bench({.step = 1ms}, settings);
     bench.arm();
-    link::Command contact = plain_command(CommandKind::kContact);
-    contact.contact_n = 200;
-    bench.send(contact);
+    expect_contact(bench, 200);
     Hand hand(bench);
     bench.plant.sensors.zones_occupied = 1;
     hand.hold(Vector6::Zero(), 20);
@@ -424,9 +422,7 @@ TEST(Compliance, ChangingTheLawDoesNotJerk) {
     Bench bench({.step = 1ms, .masses = 1.05});
     bench.arm();
     Hand hand(bench);
-    link::Command contact = plain_command(CommandKind::kContact);
-    contact.contact_n = 200;
-    bench.send(contact);
+    expect_contact(bench, 200);
     AxisVector to = bench_robot().home;
     for (auto& angle : to) angle += random.uniform(-0.4, 0.4);
     bench.move(to);
