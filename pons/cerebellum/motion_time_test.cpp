@@ -16,8 +16,6 @@ namespace pons::cerebellum {
 namespace {
 
 using namespace std::chrono_literals;
-using link::SafetyState;
-using link::StopCause;
 
 AxisState resting_at(const AxisVector& position) {
   return {position, AxisVector::Zero(position.size()), AxisVector::Zero(position.size())};
