@@ -24,9 +24,10 @@ struct SkillPort {
   std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
   std::function<void(Time)> rest;                              // once a period while no skill runs
   std::function<void(link::Belt)> belt;                        // once a period
-  std::function<void()> halt;                                  // a protective stop
-  std::function<void()> raise_emergency, release_emergency;    // the link's emergency word
-  std::function<bridge::Json()> carries;                       // what is on the cups; null when nothing is
+  std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
+  std::function<void()> halt;                                         // a protective stop
+  std::function<void()> raise_emergency, release_emergency;           // the link's emergency word
+  std::function<bridge::Json()> carries;                              // what is on the cups; null when nothing is
   // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
   // begun; and, each tick once the arm is armed, brings it to where others may move it from: true when that is done.
   // What that bridge alone had seen counts as an obstacle from restore() on.

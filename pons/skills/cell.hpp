@@ -14,6 +14,7 @@
 #include "pons/skills/arm.hpp"
 #include "pons/skills/route.hpp"
 #include "pons/task/policy.hpp"
+#include "pons/task/skill.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::skills {
@@ -63,6 +64,10 @@ class Cell {
   // Nothing is held any longer: likewise.
   void holds_nothing();
 
+  // Has the belt wait, as long as it is called every tick.
+  void hold_belt(Time now) { belt_held_ = now; }
+  [[nodiscard]] bool holds_belt(Time now) const { return belt_held_ && now < *belt_held_ + kBeltHeldFor; }
+
   // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
   // has ridden off the end.
   void left_on_belt(const Load& load, const Vector3& position);
@@ -75,6 +80,11 @@ class Cell {
   // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
   // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
+  // For the journal, of whatever task runs.
+  void note(std::string kind, task::Json detail) { notes_.push_back({std::move(kind), std::move(detail)}); }
+  // Since the last call, the motions that were sent among them.
+  [[nodiscard]] std::vector<task::Note> take_notes();
+
   // Taken off the belt: perception is told to let go of the track.
   void forget(std::uint32_t track) { forgotten_.push_back(track); }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
@@ -126,6 +136,9 @@ class Cell {
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
 
+  static constexpr Duration kBeltHeldFor = std::chrono::milliseconds(50);
+
+  std::optional<Time> belt_held_;
   std::optional<double> view_end_m_;  // on the belt; none: no camera watches it
   Time now_, seen_, looked_at_;
   [[nodiscard]] double gain_m(double ahead_s) const;
@@ -141,6 +154,7 @@ class Cell {
   };
   std::optional<Unseen> unseen_;
   std::vector<std::uint32_t> forgotten_;
+  std::vector<task::Note> notes_;
 };
 
 }  // namespace pons::skills

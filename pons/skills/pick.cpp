@@ -9,6 +9,7 @@
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
 #include "pons/skills/set_down.hpp"
+#include "pons/task/json_value.hpp"
 
 namespace pons::skills {
 namespace {
@@ -43,8 +44,7 @@ constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups sli
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
-constexpr double kLightest_kg = 0.01;
-constexpr double kUnweighable = 2.0;  // times the mass limit
+constexpr double kUnweighable = 2.0;   // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
@@ -56,7 +56,13 @@ constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits 
 class Pick final : public task::Skill {
  public:
   Pick(Cell& cell, std::string code, Time now)
-      : cell_(cell), code_(std::move(code)), started_(now), seen_(now), set_down_(cell), delay_(cell.arm) {}
+      : cell_(cell),
+        code_(std::move(code)),
+        started_(now),
+        seen_(now),
+        weighing_(cell),
+        set_down_(cell),
+        delay_(cell.arm) {}
 
   Progress tick(Time now) override {
     move_along(delay_.take());
@@ -114,12 +120,11 @@ class Pick final : public task::Skill {
   Progress find(Time now) {
     if (!cell_.world.robot.wrist_sensor)
       return {Status::kFailed, "the robot has no wrist sensor to weigh a load with: see robot.wrist_sensor", {}};
+    if (cell_.held && !weighing_.tick(now)) return {};
     cell_.keep_clear(now);
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
-      // A stop came before the scale had decided.
-      if (cell_.held->mass_kg <= 0) cell_.weighs(std::max(kLightest_kg, weigh_now(cell_)));
       const double mass = cell_.held->mass_kg;
       const bool wanted = cell_.held->code == code_;
       if (wanted && mass <= cell_.world.rules.max_mass_kg) return success(now);
@@ -252,6 +257,13 @@ class Pick final : public task::Skill {
 
   Progress start(const Grasp& grasp, const ObjectBelief& object, Time now) {
     if (auto sent = cell_.arm.stream(grasp.trajectory); !sent) return {Status::kRetry, sent.error().line(), {}};
+    cell_.note("plan", {{"to", "meet"},
+                        {"object_m", task::list_of(object.world_from_top.translation())},
+                        {"yaw_rad", yaw_of(object.world_from_top.linear())},
+                        {"sigma_m", object.position_sigma_m},
+                        {"seen_s", object.last_seen.s()},
+                        {"meets_m", task::list_of(grasp.contact_point)},
+                        {"meets_s", grasp.contact.s()}});
     grasp_ = grasp;
     target_ = object;
     planned_ = now;
@@ -311,7 +323,6 @@ class Pick final : public task::Skill {
 
   // Lets go of what is not lifted.
   Progress give_up(Time now, std::string why) {
-    cell_.arm.vacuum(false);
     cell_.missed = Miss{code_, now};
     begin_retreat(now, {Status::kRetry, std::move(why), {}});
     return {};
@@ -359,7 +370,6 @@ class Pick final : public task::Skill {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.holds_nothing();
-      cell_.arm.vacuum(false);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }
@@ -396,8 +406,10 @@ class Pick final : public task::Skill {
     return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
   }
 
-  // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along.
+  // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along. What
+  // is not held by then is let go: nobody would know of it.
   void begin_retreat(Time now, Progress verdict) {
+    if (!cell_.held) cell_.arm.vacuum(false);
     verdict_ = std::move(verdict);
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
@@ -452,6 +464,7 @@ class Pick final : public task::Skill {
   double lift_travel_m_ = 0;  // of the belt then
   double expected_kg_ = 0;    // of the load, by its size
   Scale scale_;
+  LateWeighing weighing_;
   SetDown set_down_;
   Delay delay_;
   Duration behind_{0};  // of the belt, since the cups set out for the contact

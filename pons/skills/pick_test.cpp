@@ -96,15 +96,75 @@ TEST_F(PickTest, WhatIsWeighedAfterAStopIsToldToTheLoop) {
   link::Command command;
   while (cerebellum_.receive(command)) {
   }
-  const Progress progress = start("P1")->tick(now_);
+  const auto skill = start("P1");
+  Progress progress;
+  for (int i = 0; i < 100 && progress.status == Status::kRunning; ++i) {
+    progress = skill->tick(now_);
+    EXPECT_EQ(cell_.holds_belt(now_), progress.status == Status::kRunning || i > 0) << "nothing comes against it";
+    tick_with({});
+  }
   EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
   std::optional<link::Command> told;
   while (cerebellum_.receive(command))
     if (command.kind == link::CommandKind::kPayload) told = command;
   ASSERT_TRUE(told);
-  EXPECT_NEAR(told->payload_kg, 0.4, 1e-9);
+  EXPECT_NEAR(told->payload_kg, 0.4, 1e-6);
   EXPECT_NEAR(told->payload_com_m[2], world_.robot.tool.flange_from_tip.translation().z() + 0.05, 1e-9);
   EXPECT_EQ(cell_.held->mass_kg, told->payload_kg);
+}
+
+// It stood on the belt yet when the arm was stopped: there the wrist feels nothing.
+TEST_F(PickTest, WhatMayStandOnTheBeltIsLiftedBeforeItIsWeighed) {
+  const double size_z_m = cell_.model.world_from_tip(rest().position).translation().z() - world_.belt.surface_z_m;
+  cell_.held = Held{"P1", {.size_m = {0.2, 0.15, size_z_m}}, 0};
+  grips_kg_ = 0;
+  tick_with({});
+  const auto skill = start("P1");
+  const auto height_m = [&] { return cell_.model.world_from_tip(cell_.arm.state().position).translation().z(); };
+  const double stood_m = height_m();
+  Progress progress;
+  for (int i = 0; i < 300 && progress.status == Status::kRunning; ++i) {
+    progress = skill->tick(now_);
+    if (height_m() > stood_m + 0.03) grips_kg_ = 2.5;
+    tick_with({});
+  }
+  EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+  EXPECT_GT(height_m(), stood_m + 0.05);
+  EXPECT_NEAR(cell_.held->mass_kg, 2.5, 0.1);
+}
+
+// With cups on it that have not lifted: nobody would know what hangs there.
+TEST_F(PickTest, WhatIsNotHeldYetIsLetGoOfWhenItIsBrokenOff) {
+  for (const bool stopped : {true, false}) {
+    const ObjectBelief object = parcel(1, 0.1, 0, {0.2, 0.15, 0.1});
+    tick_with({object});
+    const auto skill = start("P1");
+    const auto vacuum_told = [this] {
+      std::optional<bool> on;
+      for (link::Command command; cerebellum_.receive(command);)
+        if (command.kind == link::CommandKind::kVacuum) on = command.vacuum_on != 0;
+      return on;
+    };
+    bool on = false;
+    for (int i = 0; i < 500 && !on; ++i) {
+      ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+      on = vacuum_told().value_or(false);
+      tick_with({object});
+    }
+    ASSERT_TRUE(on);
+    if (stopped) {
+      safety_ = link::SafetyState::kProtectiveStop;
+      tick_with({object});
+      (void)skill->tick(now_);
+      safety_ = link::SafetyState::kOperational;
+      tick_with({object});
+      (void)skill->tick(now_);
+    } else {
+      skill->cancel(now_);
+    }
+    EXPECT_EQ(vacuum_told(), false) << (stopped ? "stopped" : "cancelled");
+    for (int i = 0; i < 300; ++i) tick_with({object});
+  }
 }
 
 TEST_F(PickTest, ARobotThatCannotWeighSaysSo) {

@@ -1,15 +1,10 @@
 #include "pons/skills/rest.hpp"
 
-#include <algorithm>
-
-#include "pons/skills/scale.hpp"
-
 namespace pons::skills {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(100);     // called later than that: a skill ran
 constexpr Duration kLeftAlone = std::chrono::milliseconds(500);  // then nobody wants what is held
-constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 
@@ -29,10 +24,10 @@ void Rest::tick(Time now) {
     if (now > cell_.arm.motion_end()) cell_.arm.control(link::Controller::kTracking);
     return;
   }
+  if (cell_.held && now >= since_ + kLeftAlone && !weighing_.tick(now)) return;
   cell_.keep_clear(now);
   if (!cell_.held || now < since_ + kLeftAlone) return;
   since_ = now;
-  if (cell_.held->mass_kg <= 0) cell_.weighs(std::max(kLightest_kg, weigh_now(cell_)));
   laying_ = set_down_.begin(now).has_value();
 }
 

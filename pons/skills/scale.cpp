@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pons/core/gravity.hpp"
+#include "pons/skills/grasp.hpp"
 
 namespace pons::skills {
 namespace {
@@ -31,6 +33,11 @@ Eigen::Vector2d moment_nm(const Cell& cell) {
   const Vector3 about_tip = torque - flange_from_tip.translation().cross(force);
   return (flange_from_tip.linear().transpose() * about_tip).head<2>();
 }
+
+constexpr double kFree_m = 0.06;     // between a load and the belt: it may hang lower than its size says
+constexpr double kFreed_m_s2 = 2.5;  // lifted so softly, it hardly swings
+constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
+constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 
@@ -82,6 +89,43 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   if (pull_ns <= 0) return Weight{whole_kg};
   const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, first, last);
   return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
+}
+
+// As if it were seen.
+ObjectBelief LateWeighing::held_at(const Pose& tip) const {
+  const Load& load = cell_.held->load;
+  ObjectBelief object;
+  object.track = std::numeric_limits<std::uint32_t>::max();  // nobody's
+  object.size_m = load.size_m;
+  object.world_from_top = tip * Eigen::Translation3d(load.offset_in_tip_m);
+  object.world_from_top.linear() =
+      Eigen::AngleAxisd(yaw_of(tip.linear()) - load.yaw_in_tip_rad, Vector3::UnitZ()).toRotationMatrix();
+  return object;
+}
+
+bool LateWeighing::tick(Time now) {
+  if (cell_.held->mass_kg > 0) return true;
+  cell_.hold_belt(now);  // or what rides along comes against it, and bears a part of it
+  const Time from = cell_.arm.splice_time(now);
+  const AxisState state = cell_.arm.planned(from);
+  const Pose tip = cell_.model.world_from_tip(state.position);
+  const double free_m = tip.translation().z() - cell_.held->load.size_m.z() - cell_.world.belt.surface_z_m;
+  const double most_kg = cell_.world.rules.max_mass_kg;
+  if (!rested_) {
+    rested_ = now;
+    scale_ = {};
+    if (free_m < kFree_m) {
+      const auto up = lift(cell_, state, from, tip.linear(), lift_offset(cell_, held_at(tip)), kFreed_m_s2);
+      if (up && cell_.arm.stream(up->trajectory)) rested_ = up->top;
+    }
+  }
+  if (now < *rested_) return false;
+  scale_.add(cell_);
+  const std::optional<Weight> weighed = scale_.weigh(cell_, most_kg);
+  if (!weighed && now < *rested_ + kWeighAtMost) return false;
+  cell_.weighs(weighed && free_m >= kFree_m / 2 ? std::max(kLightest_kg, weighed->mass_kg) : most_kg);
+  rested_.reset();
+  return true;
 }
 
 }  // namespace pons::skills

@@ -1,5 +1,6 @@
 // Somebody comes near, and an arm that is found where it should not be: in whole runs.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@ using ::testing::Not;
 std::vector<bridge::Event> events(const std::filesystem::path& file, std::string_view kind) {
   const auto journal = bridge::Journal::open_to_read(file);
   EXPECT_TRUE(journal);
-  auto all = (*journal)->events("");
+  auto all = (*journal)->notes();
   EXPECT_TRUE(all);
   std::erase_if(*all, [&](const bridge::Event& event) { return event.kind != kind; });
   return *all;
@@ -70,6 +71,35 @@ TEST(Safety, ARunWithVisitsSlowsAndStopsAndLosesNothing) {
   EXPECT_EQ(events(folder / "j.db", "armed").size(), stops.size() + 1) << "and it goes on by itself";
   EXPECT_THAT(read_text(folder / "log.txt"), HasSubstr("somebody is in zone 2"));
   EXPECT_THAT(read_text(folder / "log.txt"), Not(HasSubstr("collision"))) << "not of what was put back, either";
+}
+
+// From the last of the way down until the load hangs free: what was held is known of or let go, and what was not
+// weighed is not carried off as if it weighed nothing.
+TEST(Safety, StoppedAtAnyMomentOfAGraspItGoesOnWithWhatItHolds) {
+  const Folder folder;
+  double weighed_kg = 0;
+  for (int ms = 4460; ms <= 4760; ms += 25) {
+    const std::string name = std::to_string(ms);
+    const Finished run =
+        run_pons({"run", "parcel_cell", "--parcels", "3", "--seed", "13", "--quiet", "--report", folder / name,
+                  "--journal", folder / (name + ".db"), "--visit", fmt::format("gate@{:.3f}+0.3", 1e-3 * ms)});
+    EXPECT_EQ(run.code, 0) << ms << run.out << run.err;
+    const auto report = read_json(folder / name);
+    EXPECT_EQ(report["parcels"]["missorted"], 0) << ms << run.out;
+    EXPECT_EQ(report["limits"]["violations"], 0) << ms << run.out;
+    EXPECT_GE(report["parcels"]["sorted"], 2) << ms << run.out;
+    const auto journal = bridge::Journal::open_to_read(folder / (name + ".db"));
+    ASSERT_TRUE(journal);
+    const auto story = (*journal)->history("P000001");
+    ASSERT_TRUE(story);
+    for (const bridge::Event& event : *story) {
+      if (event.kind == "plan" && event.detail.at("to") == "carry") {
+        weighed_kg = event.detail.at("mass_kg").get<double>();
+        EXPECT_NEAR(weighed_kg, 1.6, 0.1) << ms << ": by its own lift, or by a second one";
+      }
+    }
+  }
+  EXPECT_GT(weighed_kg, 0);
 }
 
 TEST(Safety, AnArmOutsideItsLimitsIsBroughtInWhenThatIsAllowed) {
