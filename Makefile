@@ -11,8 +11,11 @@ ASAN_QUICK = record_test task_test world_test link_test gate_test bridge_test
 TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
+# What reads bytes that others wrote: fuzz/NAME.cpp.
+FUZZERS = journal task
+FUZZ_S ?= 30
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan gates bench bench-peers clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -82,6 +85,16 @@ rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
 	for name in $(LOOP); do build/rtsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; done
 	ctest --preset rtsan -R 'KnownBad|KnownGood|blocking_call' --no-tests=error
 
+fuzz: ## every fuzzer for FUZZ_S seconds
+	@tools/setup --check
+	cmake --preset fuzz
+	cmake --build --preset fuzz --parallel $(JOBS) --target $(addprefix fuzz_,$(FUZZERS))
+	for name in $(FUZZERS); do \
+	  mkdir -p build/fuzz/corpus/$$name; \
+	  build/fuzz/fuzz/fuzz_$$name -max_total_time=$(FUZZ_S) -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+	    -artifact_prefix=build/fuzz/$$name- build/fuzz/corpus/$$name fuzz/corpus/$$name || exit 1; \
+	done
+
 # Outside CMake: a peer is compiled from Debian's Eigen, of which nothing may enter our build.
 bench-peers: ## build what the benchmarks compare against
 	@tools/setup --bench
@@ -90,7 +103,7 @@ bench-peers: ## build what the benchmarks compare against
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
 
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
-	for program in control_step inverse_kinematics stop_latency wake_up; do build/release/bench/$$program --gate || exit 1; done
+	for program in control_step inverse_kinematics journal stop_latency wake_up; do build/release/bench/$$program --gate || exit 1; done
 	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose

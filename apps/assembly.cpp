@@ -40,28 +40,28 @@ constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
 constexpr std::string_view kAttached = "attached";  // a bridge to a body; in the journal
 
-bridge::Resumption resumption(skills::TakeUp::Fate fate) {
+bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
   using Fate = skills::TakeUp::Fate;
   switch (fate) {
     case Fate::kGoesOn:
-      return {};
+      return {.done = done};
     case Fate::kDone:
-      return {task::Outcome::kSucceeded, {}};
+      return {.done = done + 1};
     case Fate::kLost:
-      return {task::Outcome::kFailed, "lost from the cups while no bridge lived"};
+      return {done, task::Outcome::kFailed, "lost from the cups while no bridge lived"};
     case Fate::kBroken:
-      return {task::Outcome::kFailed, "its bridge was ended in the middle of it"};
+      return {done, task::Outcome::kFailed, "its bridge was ended in the middle of it"};
   }
-  return {task::Outcome::kFailed, "unknown"};
+  return {done, task::Outcome::kFailed, "unknown"};
 }
 
 // That of the body whose last bridge wrote this journal; empty in one that no bridge of such a body has opened.
 Expected<std::string> body_in(const bridge::Journal& journal) {
-  const auto events = journal.events("");
+  const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
   std::string body;
   for (const bridge::Event& event : *events) {
-    if (event.kind == kAttached) body = event.detail.value("body", std::string{});
+    if (event.kind == kAttached) body = task::text_of(event.detail, "body");
   }
   return body;
 }
@@ -168,7 +168,7 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   }
   journal = std::move(*opened);
   if (!options.body) return {};
-  if (auto noted = journal->event("", Time{}, kAttached, {{"body", body}}); !noted) return noted;
+  if (auto noted = journal->note(Time{}, kAttached, {{"body", body}}); !noted) return noted;
   return journal->commit();
 }
 
@@ -182,12 +182,14 @@ runner::SkillPort BridgeHalf::skill_port() {
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
           .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
+          .holds_belt = [this](Time now) { return cell->holds_belt(now); },
           .halt = [this] { cell->arm.halt(); },
           .raise_emergency = [this] { end.raise_emergency_stop(); },
           .release_emergency = [this] { end.clear_emergency_stop(); },
           .carries = [this] { return take_up->carries(); },
           .restore = [this](const task::Json& carried) { take_up->restore(carried); },
-          .resume = [this](const task::Task& task, std::size_t done) { return resumption(take_up->fate(task, done)); },
+          .resume = [this](const task::Task& task,
+                           std::size_t done) { return resumption(take_up->fate(task, done), done); },
           .settle = [this](Time now) { return take_up->settle(now); }};
 }
 

@@ -24,6 +24,7 @@ void add_bridge(CLI::App& app, Chosen& chosen);
 void add_worlds(CLI::App& app, Chosen& chosen);
 void add_skills(CLI::App& app, Chosen& chosen);
 void add_task(CLI::App& app, Chosen& chosen);
+void add_journal(CLI::App& app, Chosen& chosen);
 void add_robot(CLI::App& app, Chosen& chosen);
 void add_doctor(CLI::App& app, Chosen& chosen);
 void add_completion(CLI::App& app, Chosen& chosen);

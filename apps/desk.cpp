@@ -8,25 +8,29 @@
 
 #include "apps/journal_json.hpp"
 #include "pons/skills/follow_policy.hpp"
+#include "pons/task/json_value.hpp"
 
 namespace pons::apps {
 
 using bridge::Json;
+using task::list_of;
 
 namespace {
-
-Json list_of(const AxisVector& values) { return Json(std::vector<double>(values.begin(), values.end())); }
-Json list_of(const Vector3& values) { return {values.x(), values.y(), values.z()}; }
 
 // Its frame sits in the middle of the top face.
 Json to_json(const ObjectBelief& object) {
   const auto x_axis = object.world_from_top.linear().col(0);
   return {{"track", object.track},
           {"code", object.code},
-          {"position_m", list_of(Vector3(object.world_from_top.translation()))},
+          {"position_m", list_of(object.world_from_top.translation())},
           {"yaw_rad", std::atan2(x_axis.y(), x_axis.x())},
           {"velocity_m_s", list_of(object.velocity_m_s)},
           {"size_m", list_of(object.size_m)}};
+}
+
+bool tells_of_tasks(gate::Operation operation) {
+  using enum gate::Operation;
+  return operation == kSubmit || operation == kList || operation == kShow || operation == kHistory;
 }
 
 const Error kNoStream{"no stream goes on", "chunk_stream",
@@ -68,29 +72,42 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 }
 
 void Desk::attend(Time now) {
-  for (const gate::Request& request : socket_->poll()) request.reply(answer(request.text, now));
+  std::vector<std::pair<gate::Request, Json>> of_tasks;
+  for (gate::Request& request : socket_->poll()) {
+    const auto asked = gate::asked_from(request.text);
+    Json answered = asked ? answer(*asked, now) : gate::refusal(asked.error());
+    if (asked && tells_of_tasks(asked->operation)) {
+      of_tasks.emplace_back(std::move(request), std::move(answered));
+    } else {
+      request.reply(answered);
+    }
+  }
+  // Nobody hears of an acceptance or an outcome before the disk has it; all who came in this period wait for it
+  // together.
+  const auto kept = of_tasks.empty() || !bridge_.unkept() ? Expected<void>{} : bridge_.commit(now);
+  for (auto& [request, answered] : of_tasks) request.reply(kept ? answered : gate::refusal(kept.error()));
 }
 
-Json Desk::answer(const std::string& text, Time now) {
-  const auto asked = gate::asked_from(text);
-  if (!asked) return gate::refusal(asked.error());
-  switch (asked->operation) {
+Json Desk::answer(const gate::Asked& asked, Time now) {
+  switch (asked.operation) {
     case gate::Operation::kSubmit:
-      return submit(asked->task, now);
+      return submit(asked.task, now);
+    case gate::Operation::kHistory:
+      return history(asked.task);
     case gate::Operation::kList:
       return list();
     case gate::Operation::kShow:
-      return show(asked->task);
+      return show(asked.task);
     case gate::Operation::kObserve:
       return observe(now);
     case gate::Operation::kChunk:
-      return take(*asked, now);
+      return take(asked, now);
     case gate::Operation::kRobot:
     case gate::Operation::kStop:
     case gate::Operation::kEmergencyStop:
     case gate::Operation::kReset:
     case gate::Operation::kArm:
-      if (auto told = tell_arm(asked->operation, now); !told) return gate::refusal(told.error());
+      if (auto told = tell_arm(asked.operation, now); !told) return gate::refusal(told.error());
       return {{"ok", true}, {"robot", arming_.describe()}};
   }
   return gate::refusal({"unknown operation", "request", "pons/gate/request.hpp lists them"});
@@ -116,9 +133,15 @@ Json Desk::show(const std::string& id) const {
   const auto history = journal_.task(id);
   if (!history) return gate::refusal(history.error());
   if (!*history) return gate::refusal({"no task '" + id + "'", "show", "pons task list shows those there are"});
-  Json events = Json::array();
-  for (const bridge::Event& event : (*history)->events) events.push_back(to_json(event));
-  return {{"ok", true}, {"task", to_json((*history)->record)}, {"events", std::move(events)}};
+  return {{"ok", true}, {"task", to_json((*history)->record)}, {"events", to_json((*history)->events)}};
+}
+
+Json Desk::history(const std::string& order) const {
+  const auto events = journal_.history(order);
+  if (!events) return gate::refusal(events.error());
+  if (events->empty())
+    return gate::refusal({"nothing is known of '" + order + "'", "history", "pons task list shows the tasks"});
+  return {{"ok", true}, {"events", to_json(*events)}};
 }
 
 Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {

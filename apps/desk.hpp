@@ -21,14 +21,16 @@ class Desk {
   // All but the socket must outlive it.
   Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
        runner::Arming& arming, Stream stream);
-  // On the bridge's thread, once a period: answers what has come. Never waits.
+  // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
+  // nothing.
   void attend(Time now);
 
  private:
-  [[nodiscard]] bridge::Json answer(const std::string& text, Time now);
+  [[nodiscard]] bridge::Json answer(const gate::Asked& asked, Time now);
   [[nodiscard]] bridge::Json submit(const std::string& task, Time now);
   [[nodiscard]] bridge::Json list() const;
   [[nodiscard]] bridge::Json show(const std::string& id) const;
+  [[nodiscard]] bridge::Json history(const std::string& order) const;
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);

@@ -69,13 +69,13 @@ _pons() {
   local -a asked=()
   case $before in
     --world) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
-    --manifest|--journal|--report|--log|--picture|--socket|submit) COMPREPLY=($(compgen -f -- "$current")); return ;;
+    --manifest|--journal|--report|--log|--picture|--socket|submit|check|compact|upgrade) COMPREPLY=($(compgen -f -- "$current")); return ;;
     run|body|bridge) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
     skills) COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
     completion) COMPREPLY=($(compgen -W "bash zsh" -- "$current")); return ;;
   esac
   case $command in
-    task|robot) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
+    task|robot|journal) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
     *) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 2 ? 0 : 1))}") ;;
   esac
   COMPREPLY=($(compgen -W "$(_pons_words "${asked[@]}")" -- "$current"))

@@ -31,6 +31,7 @@ int run_command_line(int argc, char** argv) {
   add_worlds(app, chosen);
   add_skills(app, chosen);
   add_task(app, chosen);
+  add_journal(app, chosen);
   add_robot(app, chosen);
   add_doctor(app, chosen);
   add_completion(app, chosen);
@@ -58,7 +59,8 @@ bool said_all() { return std::fflush(stdout) == 0 || errno == EPIPE; }
 }  // namespace pons::apps
 
 int main(int argc, char** argv) {
-  std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves must not stop a robot
+  std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves must not stop a robot,
+  std::signal(SIGXFSZ, SIG_IGN);  // nor a file that may grow no more: who writes it hears of that
   try {
     const int code = pons::apps::run_command_line(argc, argv);
     if (pons::apps::said_all()) return code;

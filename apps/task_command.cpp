@@ -9,6 +9,7 @@
 #include "apps/commands.hpp"
 #include "apps/journal_json.hpp"
 #include "apps/paths.hpp"
+#include "apps/story_text.hpp"
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/task/json_text.hpp"
@@ -24,6 +25,7 @@ constexpr std::streamsize kLargestTask = 64 * 1024;
 struct TaskOptions {
   fs::path socket, journal;
   std::string file, id;
+  bool json = false;
 };
 
 Expected<Json> ask(const TaskOptions& options, const Json& request) {
@@ -87,10 +89,17 @@ Expected<Json> from_journal(const fs::path& file, const std::string& id) {
   const auto history = (*journal)->task(id);
   if (!history) return std::unexpected(history.error());
   if (!*history) return fail("no task '" + id + "'", file.string(), "pons task list shows those there are");
-  answer["task"] = to_json((*history)->record);
-  answer["events"] = Json::array();
-  for (const bridge::Event& event : (*history)->events) answer["events"].push_back(to_json(event));
-  return answer;
+  return Json{{"task", to_json((*history)->record)}, {"events", to_json((*history)->events)}};
+}
+
+Expected<Json> story_from_journal(const fs::path& file, const std::string& order) {
+  const auto journal = bridge::Journal::open_to_read(file);
+  if (!journal) return std::unexpected(journal.error());
+  const auto events = (*journal)->history(order);
+  if (!events) return std::unexpected(events.error());
+  if (events->empty())
+    return fail("nothing is known of '" + order + "'", file.string(), "pons task list shows the tasks");
+  return Json{{"events", to_json(*events)}};
 }
 
 int list(const TaskOptions& options) {
@@ -109,6 +118,18 @@ int show(const TaskOptions& options) {
     fmt::print("  {:>10.3f} s  {:<12} {}\n", event.value("time_s", 0.0), event.value("kind", std::string{}),
                event.contains("detail") ? event.at("detail").dump() : "");
   }
+  return kExitGood;
+}
+
+int history(const TaskOptions& options) {
+  const auto answer = options.journal.empty() ? ask(options, {{"op", "history"}, {"id", options.id}})
+                                              : story_from_journal(options.journal, options.id);
+  if (!answer) return bad_input(answer.error());
+  if (options.json) {
+    fmt::print("{}\n", answer->at("events").dump(2));
+    return kExitGood;
+  }
+  for (const Json& event : answer->at("events")) fmt::print("{}\n", story_line(event));
   return kExitGood;
 }
 
@@ -136,6 +157,14 @@ void add_task(CLI::App& app, Chosen& chosen) {
   common(show_command);
   show_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
   show_command->callback([options, &chosen] { chosen = [options] { return show(*options); }; });
+
+  CLI::App* history_command = task->add_subcommand(
+      "history", "Tell the story of one order: what was seen, planned, tried, and what became of it");
+  history_command->add_option("id", options->id, "The order's id, or a task's")->required();
+  common(history_command);
+  history_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
+  history_command->add_flag("--json", options->json, "All that is known, as JSON");
+  history_command->callback([options, &chosen] { chosen = [options] { return history(*options); }; });
 }
 
 }  // namespace pons::apps

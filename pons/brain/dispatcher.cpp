@@ -206,6 +206,7 @@ Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tr
   // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner.
   const double nominal_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
   return {{"id", id_of(belief.code, tries)},
+          {"order", belief.code},
           {"priority", order.priority >= kExpressPriority ? order.priority : kOrdinaryPriority},
           {"deadline_s", now.s() + nominal_s + kBeltStands_s},
           {"steps",

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 #include <utility>
 
+#include "pons/bridge/journal/story.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge {
@@ -21,22 +23,6 @@ std::vector<std::string> names(const std::vector<world::Resource>& resources) {
   std::vector<std::string> result;
   for (const world::Resource& resource : resources) result.push_back(resource.name);
   return result;
-}
-
-std::string_view word(task::Status status) {
-  switch (status) {
-    case task::Status::kRunning:
-      return "running";
-    case task::Status::kSucceeded:
-      return "succeeded";
-    case task::Status::kRetry:
-      return "retry";
-    case task::Status::kFailed:
-      return "failed";
-    case task::Status::kException:
-      return "exception";
-  }
-  return "unknown";
 }
 
 }  // namespace
@@ -87,6 +73,7 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
     set_fault(accepted.error());
     return std::unexpected(accepted.error());
   }
+  unkept_ = true;
   std::string id = task->id;
   enqueue(std::move(*task), now);
   return Admission{std::move(id), *accepted};
@@ -126,26 +113,33 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
       return taken;
     }
   }
-  keep_notes(now);
-  if (fault_) return std::unexpected(*fault_);
-  return {};
+  return commit(now);
 }
 
 Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Time now) {
-  const auto events = journal_.events(task.id);
+  const auto events = journal_.history(task.id);
   if (!events) return std::unexpected(events.error());
-  std::size_t done = 0;
+  Story story;
   for (const Event& event : *events) {
-    if (event.kind == "attempt_ended" && event.detail.value("status", std::string{}) == word(task::Status::kSucceeded))
-      done = std::max(done, event.detail.value("step", std::size_t{0}) + 1);
+    if (event.task != task.id) continue;
+    if (auto taken = story.take(event); !taken) {
+      finish_unopened(task.id, task::Outcome::kFailed, taken.error().line(), now);
+      return {};
+    }
   }
-  done = std::min(done, task.steps.size());
-  const Resumption what = done == task.steps.size() ? Resumption{task::Outcome::kSucceeded, {}} : resume(task, done);
+  const std::size_t last = task.steps.size();
+  Resumption what{.done = story.done()};
+  if (what.done < last) what = resume(task, what.done);
+  assert(what.done >= story.done() && what.done <= last);
+  for (std::size_t step = story.done(); step < what.done; ++step)
+    keep(journal_.event(task.id, now, kFoundDoneEvent, {{"step", step}}));
+  if (!what.outcome && what.done == last) what.outcome = task::Outcome::kSucceeded;
   if (what.outcome) {
     finish_unopened(task.id, *what.outcome, what.reason, now);
     return {};
   }
-  keep(journal_.event(task.id, now, "resumed", {{"step", done}}));
+  const std::size_t done = what.done;
+  keep(journal_.event(task.id, now, kResumedEvent, {{"step", done}}));
   arbiter_.add(task.id, kResumedPriority, std::nullopt, resources_of(task));
   auto open = std::make_unique<Open>();
   open->accepted = now;
@@ -158,7 +152,7 @@ Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Tim
 void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now) {
   const auto written = journal_.outcome(id, outcome, reason, now);
   keep(written);
-  if (written) outcomes_.push_back({id, outcome, reason, Json::object()});
+  if (written) ended_.push_back({id, outcome, reason, Json::object()});
 }
 
 Expected<void> Bridge::cancel(std::string_view id, Time now, std::string_view reason) {
@@ -187,7 +181,7 @@ void Bridge::cancel_running(Open& open, Time now, std::string_view reason) {
   open.cancelled = true;
   open.cancel_reason = reason;
   open.give_up_at = std::min(open.give_up_at, now + kCancelGrace);
-  keep(journal_.event(open.task.id, now, "cancelling", {{"reason", open.cancel_reason}}));
+  keep(journal_.event(open.task.id, now, kCancellingEvent, {{"reason", open.cancel_reason}}));
   open.root->cancel(now);
 }
 
@@ -198,7 +192,7 @@ void Bridge::tick(Time now) {
   tick_trees(running(), now);
   expire(now);
   tick_trees(start_granted(now), now);
-  if (now - last_commit_ >= kCommitPeriod) keep_notes(now);
+  if (unkept_ || now - last_commit_ >= kCommitPeriod) keep(commit(now));
   if (!fault_) return;
   for (auto& [id, open] : open_) cancel_running(*open, now, "the bridge has stopped: " + fault_->what);
   for (const std::string& id : arbiter_.queue()) {
@@ -220,24 +214,26 @@ std::vector<std::string> Bridge::start_granted(Time now) {
   for (const std::string& id : granted) {
     Open& open = *open_.find(id)->second;
     keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
-    open.observer = [this, id](const tree::Attempt& attempt, Time when) { journal_attempt(id, attempt, when); };
+    open.observer = [this, id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); };
     const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
                                        open.task.steps.end());
     open.root = tree::from_steps(left, skills_, open.observer);
     open.give_up_at = now;
     for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
   }
-  // Before anything moves: after a crash nobody may take these for tasks that have not begun.
-  keep_notes(now);
   return granted;
 }
 
 void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
     Open& open = *open_.find(id)->second;
-    // Never begun, and the journal could not say that it would.
-    if (fault_ && open.attempts == 0) cancel_running(open, now, "the bridge has stopped: " + fault_->what);
     const task::Progress progress = open.root->tick(now);
+    // Never begun, because the journal could not say that it would: it stays open there.
+    if (fault_ && open.attempts == 0) {
+      arbiter_.release(id);
+      open_.erase(id);
+      continue;
+    }
     if (progress.status != task::Status::kRunning) {
       conclude(id, open, progress, now);
     } else if (give_up(open, now)) {
@@ -276,33 +272,51 @@ void Bridge::finish(const std::string& id, task::Outcome outcome, std::string re
   const std::string& name = closed.key();
   const auto written = journal_.outcome(name, outcome, reason, now, detail);
   keep(written);
-  if (written) outcomes_.push_back({name, outcome, std::move(reason), std::move(detail)});
+  unkept_ = true;
+  if (written) ended_.push_back({name, outcome, std::move(reason), std::move(detail)});
 }
 
-void Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {
+Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {
   Open& open = *open_.find(id)->second;
+  if (attempt.note != nullptr) {
+    assert(!tells_state(attempt.note->kind));
+    keep(journal_.event(id, now, attempt.note->kind, attempt.note->detail));
+    return {};
+  }
   Json detail{{"step", open.done + attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};
   if (attempt.ended == nullptr) {
+    if (fault_) return std::unexpected(*fault_);
+    keep(journal_.event(id, now, kAttemptEvent, detail));
+    // Before anything moves: whoever reads this after a crash must know what may have been moved, and what was done
+    // before it.
+    if (auto kept = commit(now); !kept) return kept;
     ++open.attempts;
     if (attempt.number > 1) ++retries_;
-    keep(journal_.event(id, now, "attempt", detail));
-    return;
+    return {};
   }
   open.steps.push_back(
-      {{"skill", attempt.skill}, {"status", word(attempt.ended->status)}, {"detail", attempt.ended->detail}});
-  detail["status"] = word(attempt.ended->status);
+      {{"skill", attempt.skill}, {"status", task::name(attempt.ended->status)}, {"detail", attempt.ended->detail}});
+  detail["status"] = task::name(attempt.ended->status);
   detail["reason"] = attempt.ended->reason;
   detail["detail"] = attempt.ended->detail;
-  keep(journal_.event(id, now, "attempt_ended", detail));
+  keep(journal_.event(id, now, kAttemptEndedEvent, detail));
+  return {};
 }
 
 // ---- out ----
 
-void Bridge::note(std::string_view kind, const Json& detail, Time now) { keep(journal_.event("", now, kind, detail)); }
+void Bridge::note(std::string_view kind, const Json& detail, Time now, std::string_view order) {
+  keep(journal_.note(now, kind, detail, order));
+}
 
-void Bridge::keep_notes(Time now) {
+Expected<void> Bridge::commit(Time now) {
   last_commit_ = now;
-  keep(journal_.commit());
+  unkept_ = false;
+  const auto durable = journal_.commit();
+  keep(durable);
+  if (durable) std::ranges::move(ended_, std::back_inserter(outcomes_));
+  ended_.clear();
+  return durable;
 }
 
 std::vector<OutcomeReport> Bridge::take_outcomes() { return std::exchange(outcomes_, {}); }

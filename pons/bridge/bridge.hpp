@@ -1,8 +1,8 @@
 // The bridge: admits tasks, journals them, waits for their resources, runs their trees, and writes exactly one outcome
 // for each. It knows skills only by their contract.
 //
-// One thread. Call tick() every 10 ms. Nobody hears of an acceptance or an outcome before the journal holds it; a task
-// is journalled as started before its first skill may move anything.
+// One thread. Call tick() every 10 ms. Nobody hears of an outcome before the journal holds it for good, and no skill
+// starts before the journal holds that it does, and all that happened until then.
 #pragma once
 
 #include <cstdint>
@@ -43,10 +43,11 @@ struct OutcomeReport {
 
 // What shall become of a task that a bridge which is no more had begun.
 struct Resumption {
-  std::optional<task::Outcome> outcome;  // nothing: it goes on
+  std::size_t done = 0;                  // so many of its first steps have succeeded, by the look of the world
+  std::optional<task::Outcome> outcome;  // nothing: it goes on with the next step; when there is none, it SUCCEEDED
   std::string reason;                    // of the outcome
 };
-// `done`: so many of its first steps have succeeded.
+// Looks at the world. `done`: of so many of its first steps the journal has it, and no fewer are to be answered.
 using Resume = std::function<Resumption(const task::Task& task, std::size_t done)>;
 
 class Bridge {
@@ -57,8 +58,9 @@ class Bridge {
 
   void add_reviewer(Reviewer reviewer);
 
-  // Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge is stopping, or
-  // the journal cannot be written. An error leaves nothing behind.
+  // The task is for good in the journal after the next commit(), which tick() calls: tell a sender who may not hear it
+  // otherwise then. Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge
+  // is stopping, or the journal cannot be written. An error leaves nothing behind.
   [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);
   // Takes up what the journal's last owner left open, before the first tick. Tasks not begun wait again; of those
   // begun, `resume` says which go on, with the first step that is not known to have succeeded and before all others,
@@ -73,12 +75,14 @@ class Bridge {
   enum class Hold : std::uint8_t { kOff, kOn };
   void hold(Hold hold) { hold_ = hold; }
 
-  // A journal entry of no task.
-  void note(std::string_view kind, const Json& detail, Time now);
-  // Makes all that was noted so far durable.
-  void keep_notes(Time now);
+  // A journal entry of no task; `order` is what it belongs to, if anything.
+  void note(std::string_view kind, const Json& detail, Time now, std::string_view order = {});
+  // Makes all that happened so far durable. Error: the journal cannot be written, which is then fault(), too.
+  [[nodiscard]] Expected<void> commit(Time now);
+  // Whether an acceptance or an outcome waits for that, or never will be durable: tell nobody of tasks before.
+  [[nodiscard]] bool unkept() const { return unkept_ || fault_; }
 
-  // Since the last call, in the order of their writing.
+  // Since the last call, in the order of their writing; none before the journal holds it for good.
   [[nodiscard]] std::vector<OutcomeReport> take_outcomes();
 
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
@@ -108,7 +112,7 @@ class Bridge {
   void cancel_running(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
   void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now);
-  void journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
+  [[nodiscard]] Expected<void> journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
   void keep(const Expected<void>& written);
   void set_fault(Error error);
 
@@ -117,11 +121,12 @@ class Bridge {
   Review review_;
   Arbiter arbiter_;
   std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
-  std::vector<OutcomeReport> outcomes_;
+  std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
   Time last_commit_;
   std::int64_t retries_ = 0, refused_ = 0;
   Hold hold_ = Hold::kOff;
+  bool unkept_ = false;  // an acceptance or an outcome waits for commit()
   bool stopping_ = false;
 };
 

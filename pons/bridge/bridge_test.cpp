@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <csignal>
 
+#include "pons/bridge/journal/story.hpp"
 #include "pons/bridge/test_kit.hpp"
 #include "pons/core/random.hpp"
 
@@ -43,7 +46,7 @@ class BridgeTest : public testing::Test {
   }
   std::vector<std::string> kinds(const std::string& id) {
     std::vector<std::string> result;
-    const auto events = journal_->events(id).value();
+    const auto events = id.empty() ? journal_->notes().value() : journal_->task(id).value()->events;
     for (const Event& event : events) result.push_back(event.kind);
     return result;
   }
@@ -86,6 +89,75 @@ TEST_F(BridgeTest, RunsATaskFromSubmissionToOutcome) {
   EXPECT_TRUE(bridge_->idle());
 }
 
+// While it lives no file of this process grows.
+class FullDisk {
+ public:
+  FullDisk() {
+    before_ = std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &limit_), 0);
+    const rlimit none{0, limit_.rlim_max};
+    EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &none), 0);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &limit_);
+    std::signal(SIGXFSZ, before_);
+  }
+
+ private:
+  rlimit limit_{};
+  void (*before_)(int) = nullptr;
+};
+
+TEST_F(BridgeTest, AnOutcomeThatTheDiskDoesNotTakeIsNotTold) {
+  ASSERT_TRUE(submit("a", "pick"));
+  for (int i = 0; i < 3; ++i) bridge_->tick(now_ += from_s(0.01));
+  {
+    const FullDisk full;
+    EXPECT_TRUE(run().empty());
+  }
+  ASSERT_TRUE(bridge_->fault());
+  EXPECT_NE(bridge_->fault()->line().find("no space is left"), std::string::npos) << bridge_->fault()->line();
+  reopen();
+  EXPECT_FALSE(recorded("a"));
+}
+
+TEST_F(BridgeTest, AnAcceptanceThatTheDiskDoesNotTakeIsNoneAndNeverStarts) {
+  {
+    const FullDisk full;
+    ASSERT_TRUE(submit("a", "pick"));
+    const auto kept = bridge_->commit(now_);
+    ASSERT_FALSE(kept);
+    EXPECT_NE(kept.error().line().find("no space is left"), std::string::npos) << kept.error().line();
+  }
+  run();
+  EXPECT_TRUE(pick_.log.started.empty());
+  EXPECT_FALSE(submit("b", "pick"));
+  reopen();
+  EXPECT_EQ(journal_->counts().value().accepted, 0);
+}
+
+TEST_F(BridgeTest, ABeginningThatTheDiskDoesNotTakeMovesNothing) {
+  ASSERT_TRUE(submit("a", "pick"));
+  ASSERT_TRUE(bridge_->commit(now_));
+  {
+    const FullDisk full;
+    run();
+  }
+  EXPECT_TRUE(pick_.log.started.empty());
+  reopen();
+  EXPECT_FALSE(journal_->task("a").value()->record.started);
+}
+
+TEST_F(BridgeTest, WhatASkillNotesIsPartOfItsTasksStory) {
+  Actor plans("plans", {{.ticks = 2, .end = {Status::kSucceeded, "", Json::object(), {{"plan", {{"to", "b"}}}}}}});
+  skills_.add(plans.type());
+  reopen();
+  ASSERT_TRUE(submit("a", "plans"));
+  run();
+  EXPECT_EQ(kinds("a"), (std::vector<std::string>{"started", "attempt", "plan", "attempt_ended"}));
+  EXPECT_EQ(journal_->task("a").value()->events.at(2).detail, (Json{{"to", "b"}}));
+}
+
 // A bridge is ended while its second step runs; the next one opens the journal.
 TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   const auto task = [](const std::string& id) {
@@ -93,14 +165,14 @@ TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   };
   ASSERT_TRUE(bridge_->submit(task("begun"), now_));
   for (int i = 0; i < 20; ++i) bridge_->tick(now_ += from_s(0.01));
-  bridge_->keep_notes(now_);
+  ASSERT_TRUE(bridge_->commit(now_));
   ASSERT_TRUE(submit("waits", "pick"));
   reopen();
   std::vector<std::pair<std::string, std::size_t>> asked;
   ASSERT_TRUE(bridge_->recover(
       [&](const task::Task& begun, std::size_t done) -> Resumption {
         asked.emplace_back(begun.id, done);
-        return {};
+        return {.done = done};
       },
       now_));
   EXPECT_EQ(asked, (std::vector<std::pair<std::string, std::size_t>>{{"begun", 1}}));
@@ -110,11 +182,27 @@ TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   EXPECT_EQ(bridge_->running(), std::vector<std::string>{"begun"});
   EXPECT_EQ(pick_.log.started.size(), picks) << "not done twice";
   EXPECT_EQ(slow_.log.started.size(), slows + 1);
-  const auto events = journal_->events("begun").value();
+  const auto events = journal_->task("begun").value()->events;
   EXPECT_EQ(events.back().detail.at("step"), 1) << "counted from the task's first";
   const auto reports = run();
   ASSERT_EQ(reports.size(), 2U);
   EXPECT_EQ(reports[1].outcome, Outcome::kSucceeded);
+}
+
+TEST_F(BridgeTest, WhatTheWorldShowsAsDoneIsNotDoneAgain) {
+  for (const char* id : {"half", "whole"}) {
+    ASSERT_TRUE(
+        bridge_->submit(fmt::format(R"({{"id":"{}","steps":[{{"skill":"slow"}},{{"skill":"pick"}}]}})", id), now_));
+    bridge_->tick(now_);
+    reopen();
+    const std::size_t shown = std::string_view(id) == "half" ? 1 : 2;
+    ASSERT_TRUE(bridge_->recover([&](const task::Task&, std::size_t) { return Resumption{.done = shown}; }, now_));
+    run();
+    EXPECT_EQ(recorded(id)->outcome, Outcome::kSucceeded) << id;
+  }
+  EXPECT_EQ(slow_.log.started.size(), 2u);
+  EXPECT_EQ(pick_.log.started.size(), 1u) << "the second step of the first";
+  EXPECT_EQ(audit(*journal_), std::vector<std::string>{});
 }
 
 TEST_F(BridgeTest, WhatCannotGoOnEndsWhenAnotherBridgeComes) {
@@ -122,7 +210,7 @@ TEST_F(BridgeTest, WhatCannotGoOnEndsWhenAnotherBridgeComes) {
   bridge_->tick(now_);
   reopen();
   ASSERT_TRUE(bridge_->recover(
-      [](const task::Task&, std::size_t) { return Resumption{Outcome::kFailed, "nothing held"}; }, now_));
+      [](const task::Task&, std::size_t) { return Resumption{0, Outcome::kFailed, "nothing held"}; }, now_));
   EXPECT_TRUE(bridge_->idle());
   EXPECT_EQ(recorded("a")->outcome, Outcome::kFailed);
   EXPECT_EQ(recorded("a")->reason, "nothing held");
@@ -152,7 +240,7 @@ TEST_F(BridgeTest, CountsAndJournalsRetries) {
   ASSERT_TRUE(submit("a", "misses"));
   EXPECT_EQ(run().at(0).outcome, Outcome::kSucceeded);
   EXPECT_EQ(bridge_->retries(), 2);
-  const auto events = journal_->events("a").value();
+  const auto events = journal_->task("a").value()->events;
   ASSERT_EQ(events.size(), 7u);
   EXPECT_EQ(events[2].detail.at("reason"), "no vacuum");
   EXPECT_EQ(events[5].detail.at("attempt"), 3);
@@ -238,19 +326,48 @@ TEST_F(BridgeTest, ASkillThatDoesNotEndIsGivenUpAndStopsTheBridge) {
   EXPECT_FALSE(submit("c", "pick"));
 }
 
-TEST_F(BridgeTest, StartedIsInTheJournalBeforeTheSkillMoves) {
-  bool was_started = false;
+// As a crash would find it: read from a copy of the file and its log.
+TEST_F(BridgeTest, AnAttemptIsOnTheDiskBeforeItsSkillMoves) {
+  std::vector<std::string> on_disk;
   task::SkillType type = pick_.type();
   type.name = "looks";
-  type.start = [this, &was_started, start = pick_.type().start](const Json& arguments, Time now) {
-    was_started = journal_->task("a").value()->record.started;
+  type.start = [&, start = pick_.type().start](const Json& arguments, Time now) {
+    for (const char* suffix : {"", "-wal"}) {
+      std::filesystem::copy_file(folder_ / (std::string("day.db") + suffix),
+                                 folder_ / (std::string("copy.db") + suffix),
+                                 std::filesystem::copy_options::overwrite_existing);
+    }
+    const auto copy = Journal::open(folder_ / "copy.db").value()->task("a").value();
+    on_disk.clear();
+    for (const Event& event : copy->events) on_disk.push_back(event.kind);
     return start(arguments, now);
   };
   skills_.add(type);
   reopen();
-  ASSERT_TRUE(submit("a", "looks"));
+  ASSERT_TRUE(bridge_->submit(R"({"id":"a","steps":[{"skill":"pick"},{"skill":"looks"}]})", now_));
   run();
-  EXPECT_TRUE(was_started);
+  EXPECT_EQ(on_disk, (std::vector<std::string>{"started", "attempt", "attempt_ended", "attempt"}));
+}
+
+// In the middle of a task: it stays open, whether there is room again or not, and the next bridge goes on.
+TEST_F(BridgeTest, AFullDiskBetweenTwoStepsEndsNothing) {
+  ASSERT_TRUE(bridge_->submit(R"({"id":"a","steps":[{"skill":"pick"},{"skill":"place"}]})", now_));
+  ASSERT_TRUE(submit("b", "pick"));
+  for (int i = 0; i < 3; ++i) bridge_->tick(now_ += from_s(0.01));
+  {
+    const FullDisk full;
+    for (int i = 0; i < 5; ++i) bridge_->tick(now_ += from_s(0.01));
+  }
+  EXPECT_TRUE(run().empty());
+  EXPECT_TRUE(place_.log.started.empty());
+  EXPECT_FALSE(submit("b", "pick")) << "nothing is said of tasks any more";
+  reopen();
+  EXPECT_EQ(audit(*journal_), std::vector<std::string>{});
+  EXPECT_EQ(kinds("a"), (std::vector<std::string>{"started", "attempt"}));
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t) { return Resumption{.done = 1}; }, now_));
+  EXPECT_EQ(run().size(), 2u);
+  EXPECT_EQ(recorded("a")->outcome, Outcome::kSucceeded);
+  EXPECT_EQ(audit(*journal_), std::vector<std::string>{});
 }
 
 TEST_F(BridgeTest, RefusesAFullQueueAndForgetsWhatItRefused) {

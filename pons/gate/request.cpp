@@ -1,12 +1,14 @@
 #include "pons/gate/request.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <array>
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "pons/task/json_text.hpp"
 #include "pons/task/schema.hpp"
@@ -20,7 +22,8 @@ using task::Schema;
 constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
-    "op": {"enum": ["submit", "list", "show", "observe", "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
+    "op": {"enum": ["submit", "list", "show", "history", "observe", "chunk", "robot", "stop", "emergency_stop", "reset",
+                    "arm"]},
     "task": {"type": "object"},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
     "stream": {"type": "integer", "minimum": 0, "maximum": 1000000000},
@@ -47,22 +50,19 @@ const Schema& schema() {
   return compiled;
 }
 
-// Which operation each member belongs to; all but "last" are needed there.
-constexpr std::array<std::pair<const char*, std::string_view>, 7> kMembers{{{"task", "submit"},
-                                                                            {"id", "show"},
-                                                                            {"stream", "chunk"},
-                                                                            {"observed", "chunk"},
-                                                                            {"period_ms", "chunk"},
-                                                                            {"actions", "chunk"},
-                                                                            {"last", "chunk"}}};
+// Which operations each member belongs to; all but "last" are needed there.
+const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
+    {"task", {"submit"}},     {"id", {"show", "history"}}, {"stream", {"chunk"}}, {"observed", {"chunk"}},
+    {"period_ms", {"chunk"}}, {"actions", {"chunk"}},      {"last", {"chunk"}}};
 constexpr std::string_view kOptional = "last";
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
-    const bool belongs = operation == belongs_to, needed = belongs && member != kOptional;
+    const bool belongs = std::ranges::find(belongs_to, operation) != belongs_to.end();
+    const bool needed = belongs && member != kOptional;
     if (json.contains(member) ? belongs : !needed) continue;
     return fail(fmt::format("'{}' {}", member, needed ? "is missing" : "does not belong there"),
-                fmt::format("/{}", member), fmt::format("give it with {}, only", belongs_to));
+                fmt::format("/{}", member), fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
   }
   return {};
 }
@@ -93,6 +93,7 @@ Expected<Asked> asked_from(std::string_view text) {
   if (auto good = check_members(*json, operation); !good) return std::unexpected(good.error());
   if (operation == "submit") return Asked{.operation = Operation::kSubmit, .task = json->at("task").dump()};
   if (operation == "show") return Asked{.operation = Operation::kShow, .task = json->at("id").get<std::string>()};
+  if (operation == "history") return Asked{.operation = Operation::kHistory, .task = json->at("id").get<std::string>()};
   if (operation == "chunk") return chunk_from(*json);
   return Asked{.operation = kBare.at(operation)};
 }

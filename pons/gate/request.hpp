@@ -2,6 +2,8 @@
 //   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already"}
 //   {"op":"list"}                → {"ok":true,"tasks":[…]}
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
+//   {"op":"history","id":"P000123"}
+//                                → {"ok":true,"events":[…]}, of every task of that order
 //   {"op":"observe"}             → {"ok":true,"stream":1,"time_s":…,"executed":…,"enough_s":…,"position":[…],
 //                                   "speed":[…],"objects":[…]}
 //   {"op":"chunk","stream":1,"observed":…,"period_ms":…,"actions":[[…],…],"last":false}
@@ -26,6 +28,7 @@ enum class Operation : std::uint8_t {
   kSubmit,
   kList,
   kShow,
+  kHistory,
   kObserve,
   kChunk,
   kRobot,
@@ -37,7 +40,7 @@ enum class Operation : std::uint8_t {
 
 struct Asked {
   Operation operation = Operation::kList;
-  std::string task;          // kSubmit: the task's JSON text; kShow: the id
+  std::string task;          // kSubmit: the task's JSON text; kShow, kHistory: the id
   std::uint64_t stream = 0;  // kChunk
   Chunk chunk;               // kChunk; finite, and otherwise as it came
 };

@@ -14,6 +14,9 @@ TEST(AskedFrom, ReadsEachQuestion) {
   const auto show = asked_from(R"({"op":"show","id":"a"})");
   EXPECT_EQ(show->operation, Operation::kShow);
   EXPECT_EQ(show->task, "a");
+  const auto history = asked_from(R"({"op":"history","id":"a"})");
+  EXPECT_EQ(history->operation, Operation::kHistory);
+  EXPECT_EQ(history->task, "a");
   EXPECT_EQ(asked_from(R"({"op":"robot"})")->operation, Operation::kRobot);
   EXPECT_EQ(asked_from(R"({"op":"stop"})")->operation, Operation::kStop);
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);
@@ -50,6 +53,8 @@ TEST(AskedFrom, RefusesEverythingElse) {
                            R"({"op":"list","id":"a"})",
                            R"({"op":"stop","id":"a"})",
                            R"({"op":"show"})",
+                           R"({"op":"history"})",
+                           R"({"op":"history","id":"a","stream":1})",
                            R"({"op":"show","id":""})",
                            R"({"op":"show","id":"a","task":{}})",
                            R"({"op":"chunk"})",

@@ -57,13 +57,13 @@ Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
   for (const bridge::TaskRecord& record : *tasks) {
     for (const std::string& object : objects_of(record.task)) take_in(entries[object], record.outcome);
   }
-  const auto events = journal.events("");
+  const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
   for (const bridge::Event& event : *events) {
     if (event.kind != "ride") continue;
-    Entry& entry = entries[event.detail.value("code", std::string{})];
+    Entry& entry = entries[task::text_of(event.detail, "code")];
     entry.ride = true;
-    if (entry.tasks == 0) entry.last_reason = event.detail.value("reason", std::string{});
+    if (entry.tasks == 0) entry.last_reason = task::text_of(event.detail, "reason");
   }
   return entries;
 }

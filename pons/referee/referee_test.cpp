@@ -34,9 +34,7 @@ class RefereeTest : public ::testing::Test {
     ASSERT_TRUE(journal_->accept(task, Time{}));
   }
   void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
-  void ride(const std::string& code) {
-    ASSERT_TRUE(journal_->event("", Time{}, "ride", {{"code", code}, {"reason", "r"}}));
-  }
+  void ride(const std::string& code) { ASSERT_TRUE(journal_->note(Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
 
   Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
     auto verdict = referee::judge(parcels, arm_, *journal_, {120, 0.6}, end);

@@ -150,16 +150,18 @@ bool Arming::zones_are_empty(const link::State& state, Time now) const {
 
 void Arming::recall(std::string_view word) { needs_person_ = word != kArm; }
 
-// Durable at once: a bridge that comes after this one must wait for the same person.
+// Durable at once: a bridge that comes after this one must wait for the same person. What cannot be written shows in
+// the bridge's next tick.
 void Arming::note_person(std::string_view word, Time now) {
   bridge_.note("person", {{"asks", word}}, now);
-  bridge_.keep_notes(now);
+  (void)bridge_.commit(now);
 }
 
+// The arm first: a disk may keep one waiting.
 void Arming::stop(Time now) {
-  note_person("stop", now);
-  needs_person_ = true;
   skills_.halt();
+  needs_person_ = true;
+  note_person("stop", now);
 }
 
 void Arming::emergency_stop(Time now) {

@@ -1,8 +1,11 @@
 #include "pons/runner/bridge_side.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
+
+#include "pons/task/json_value.hpp"
 
 namespace pons::runner {
 namespace {
@@ -29,13 +32,13 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
     dispatcher_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
-  const auto events = journal.events("");
+  const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
   bool armed_before = false;
   for (const bridge::Event& event : *events) {
     armed_before = armed_before || event.kind == "armed";
-    if (event.kind == "ride") dispatcher_.recall_ride(event.detail.value("code", std::string{}));
-    if (event.kind == "person") arming_.recall(event.detail.value("asks", std::string{}));
+    if (event.kind == "ride") dispatcher_.recall_ride(task::text_of(event.detail, "code"));
+    if (event.kind == "person") arming_.recall(task::text_of(event.detail, "asks"));
     if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
   skills_.refresh(now, {}, seen_.belt_seen);
@@ -55,13 +58,13 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   if (auto good = arming_.tick(now); !good) return good;
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What stands beside an arm that is being brought out must not be pushed against it.
-  skills_.belt(belt_waits || arming_.settles() ? link::Belt::kWaits : link::Belt::kRuns);
+  skills_.belt(belt_waits || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits : link::Belt::kRuns);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
   if (bridge_.running().empty() && !arming_.settles()) skills_.rest(now);
-  note_carried(now);
+  if (auto noted = note_carried(now); !noted) return noted;
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
@@ -99,27 +102,45 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   const brain::Decisions decisions = dispatcher_.observe(objects, now);
   for (const Json& task : decisions.tasks) {
+    note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
       const auto id = task.at("id").get<std::string>();
       const std::string& code = task.at("steps").at(0).at("arguments").at("object").get_ref<const std::string&>();
-      bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now);
+      bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
       dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
     if (ride.code.empty()) ++unlabelled_;
-    bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now);
+    bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now, ride.code);
   }
   return decisions.belt_waits;
 }
 
+// What the brain decided on.
+void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now) {
+  const auto object = std::ranges::find(objects, code, &ObjectBelief::code);
+  if (object == objects.end()) return;
+  const auto x_axis = object->world_from_top.linear().col(0);
+  bridge_.note("seen",
+               {{"track", object->track},
+                {"position_m", task::list_of(object->world_from_top.translation())},
+                {"yaw_rad", std::atan2(x_axis.y(), x_axis.x())},
+                {"size_m", task::list_of(object->size_m)},
+                {"sigma_m", object->position_sigma_m},
+                {"frames", object->frames_seen},
+                {"seen_s", object->last_seen.s()}},
+               now, code);
+}
+
 // Durable at once: a bridge that comes after this one must know what hangs there.
-void BridgeSide::note_carried(Time now) {
+Expected<void> BridgeSide::note_carried(Time now) {
   Json carries = skills_.carries();
-  if (carries == carried_) return;
+  if (carries == carried_) return {};
+  const std::string code = task::text_of(carries.is_object() ? carries : carried_, "code");
   carried_ = std::move(carries);
-  bridge_.note("carries", {{"load", carried_}}, now);
-  bridge_.keep_notes(now);
+  bridge_.note("carries", {{"load", carried_}}, now, code);
+  return bridge_.commit(now);
 }
 
 void BridgeSide::stop(Time now, const std::string& reason) {
@@ -136,7 +157,7 @@ void BridgeSide::close(Time now) {
   for (const std::string& code : unseen) {
     bridge_.note("ride",
                  {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},
-                 now);
+                 now, code);
   }
   bridge_.note("closed", {{"never_identified", unseen.size()}, {"unlabelled_rides", unlabelled_}}, now);
 }

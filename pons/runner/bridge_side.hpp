@@ -50,7 +50,8 @@ class BridgeSide {
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
-  void note_carried(Time now);
+  void note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now);
+  [[nodiscard]] Expected<void> note_carried(Time now);
 
   bridge::Bridge& bridge_;
   brain::Dispatcher& dispatcher_;

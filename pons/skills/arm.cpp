@@ -5,11 +5,14 @@
 namespace pons::skills {
 namespace {
 
+constexpr std::size_t kSentRemembered = 64;  // until somebody asks
 constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
 // Of an arm that is brought in from outside its limits: so slowly, so far inside, and at rest so long before it is
 // asked where it stands.
 constexpr double kRecoverySpeed = 0.05, kInside_rad = 0.02;
 constexpr Duration kRecoveredRest = std::chrono::milliseconds(200);
+
+std::int64_t tick_of(Time time) { return time.ns() / std::chrono::nanoseconds(std::chrono::milliseconds(1)).count(); }
 
 }  // namespace
 
@@ -74,6 +77,8 @@ Expected<void> Arm::stream(const motion::Trajectory& trajectory) {
     asked_.push_back(segment);
     first = false;
   }
+  if (sent_.size() == kSentRemembered) sent_.erase(sent_.begin());
+  if (!trajectory.empty()) sent_.push_back({tick_of(trajectory.front().start), tick_of(trajectory.back().end())});
   return {};
 }
 

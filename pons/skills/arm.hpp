@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "pons/core/error.hpp"
 #include "pons/link/link.hpp"
@@ -11,6 +12,11 @@
 #include "pons/world/world.hpp"
 
 namespace pons::skills {
+
+// A motion that was sent to the loop, in the loop's ticks of a millisecond since the run's begin.
+struct SentMotion {
+  std::int64_t first_tick = 0, last_tick = 0;
+};
 
 // From the moment a motion is planned to its begin: two bridge periods, one for the command to arrive, one in reserve.
 inline constexpr Duration kSpliceLead = std::chrono::milliseconds(20);
@@ -45,6 +51,8 @@ class Arm {
 
   // Replaces what was asked for from trajectory.front().start on. Error: the link is full.
   [[nodiscard]] Expected<void> stream(const motion::Trajectory& trajectory);
+  // What was sent since the last call.
+  [[nodiscard]] std::vector<SentMotion> take_sent() { return std::exchange(sent_, {}); }
   // From the splice time to standstill along the limits.
   [[nodiscard]] Expected<void> stop(Time now);
 
@@ -77,7 +85,8 @@ class Arm {
   Duration splice_lead_;
   link::State state_;
   motion::Trajectory asked_;  // in the motion's time
-  AxisState rest_;            // in force when nothing was asked for since arming
+  std::vector<SentMotion> sent_;
+  AxisState rest_;  // in force when nothing was asked for since arming
   std::uint64_t sequence_ = 0;
   double contact_n_ = 0;
   link::Controller controlled_before_ = link::Controller::kTracking;

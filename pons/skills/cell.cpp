@@ -138,6 +138,12 @@ void Cell::holds_nothing() {
   arm.payload(0, Vector3::Zero());
 }
 
+std::vector<task::Note> Cell::take_notes() {
+  for (const SentMotion& motion : arm.take_sent())
+    note("motion", {{"first_tick", motion.first_tick}, {"last_tick", motion.last_tick}});
+  return std::exchange(notes_, {});
+}
+
 void Cell::left_on_belt(const Load& load, const Vector3& position) {
   ObjectBelief object;
   object.stamp = now_;

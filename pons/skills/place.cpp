@@ -115,6 +115,8 @@ class Place final : public task::Skill {
     way_ = std::move(*way);
     arrives_ = way_.back().end();
     entry_ = entry;
+    cell_.note("plan",
+               {{"to", "carry"}, {"place", name_}, {"mass_kg", cell_.held->mass_kg}, {"arrives_s", arrives_.s()}});
     return {};
   }
 

@@ -4,6 +4,22 @@
 
 namespace pons::task {
 
+std::string_view name(Status status) {
+  switch (status) {
+    case Status::kRunning:
+      return "running";
+    case Status::kSucceeded:
+      return "succeeded";
+    case Status::kRetry:
+      return "retry";
+    case Status::kFailed:
+      return "failed";
+    case Status::kException:
+      return "exception";
+  }
+  return "unknown";
+}
+
 void SkillRegistry::add(SkillType type) {
   assert(!type.name.empty() && type.start && type.attempts >= 1 && type.timeout > Duration{0});
   std::string name = type.name;

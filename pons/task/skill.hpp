@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pons/core/error.hpp"
@@ -21,10 +22,19 @@ enum class Status : std::uint8_t {
   kException,  // handled, but not as asked (an overweight parcel put back): ends the task as EXCEPTION
 };
 
+[[nodiscard]] std::string_view name(Status status);  // "running", "succeeded", …
+
+// For the journal, at any tick: what the skill believes, plans, and does.
+struct Note {
+  std::string kind;  // "plan", "motion"
+  Json detail;
+};
+
 struct Progress {
   Status status = Status::kRunning;
   std::string reason;            // for everything but kRunning and kSucceeded
-  Json detail = Json::object();  // for the journal: measured mass, place of the grasp …
+  Json detail = Json::object();  // for the journal, when it ends: measured mass, place of the grasp …
+  std::vector<Note> notes = {};
 };
 
 // One use of a skill. tick() is called every bridge period (10 ms) until it says something else than kRunning.

@@ -42,6 +42,7 @@ Expected<Outcome> outcome_from(std::string_view name) {
 
 Json to_json(const Task& task) {
   Json json{{"id", task.id}, {"priority", task.priority}, {"steps", Json::array()}};
+  if (!task.order.empty()) json["order"] = task.order;
   if (task.deadline) json["deadline_s"] = task.deadline->s();
   for (const Step& step : task.steps) json["steps"].push_back({{"skill", step.skill}, {"arguments", step.arguments}});
   return json;
@@ -51,6 +52,7 @@ Expected<Task> task_from(const Json& json) {
   if (auto fits = task_schema().check(json); !fits) return std::unexpected(fits.error());
   Task task;
   task.id = json.at("id").get<std::string>();
+  task.order = json.value("order", std::string{});
   // Through double: JSON Schema calls 50.0 an integer, too.
   if (json.contains("priority")) task.priority = static_cast<int>(json.at("priority").get<double>());
   if (json.contains("deadline_s")) task.deadline = Time(from_s(json.at("deadline_s").get<double>()));

@@ -21,10 +21,11 @@ struct Step {
   Json arguments = Json::object();
 };
 
-// What a brain asks for: {"id":"P000123","priority":50,"deadline_s":12.5,
+// What a brain asks for: {"id":"P000123.2","order":"P000123","priority":50,"deadline_s":12.5,
 //   "steps":[{"skill":"pick","arguments":{"object":"P000123"}},…]}
 struct Task {
   std::string id;                // 1–64 of A–Z a–z 0–9 - _ . :
+  std::string order;             // what it is part of, under which its story is told; likewise, or empty: its id
   int priority = 50;             // 0 … 100, higher first
   std::optional<Time> deadline;  // of no use afterwards; among equal priorities the earlier goes first
   std::vector<Step> steps;       // run in order

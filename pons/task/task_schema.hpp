@@ -22,6 +22,13 @@ inline constexpr std::string_view kTaskSchema = R"({
       "maxLength": 64,
       "pattern": "^[A-Za-z0-9._:-]+$"
     },
+    "order": {
+      "description": "What it is part of, where that is more than this task: another try of it, another piece of it.",
+      "type": "string",
+      "minLength": 1,
+      "maxLength": 64,
+      "pattern": "^[A-Za-z0-9._:-]+$"
+    },
     "priority": {
       "description": "Higher goes first.",
       "type": "integer",

@@ -44,7 +44,7 @@ class Interrupt : public ::testing::Test {
     const auto tasks = (*journal)->tasks();
     ASSERT_TRUE(tasks) << tasks.error().line();
     for (const bridge::TaskRecord& record : *tasks) EXPECT_TRUE(record.outcome) << record.task.id;
-    const auto events = (*journal)->events("");
+    const auto events = (*journal)->notes();
     ASSERT_TRUE(events) << events.error().line();
     const auto count = [&](std::string_view kind) {
       return std::count_if(events->begin(), events->end(), [&](const bridge::Event& e) { return e.kind == kind; });

@@ -29,7 +29,7 @@ inline std::map<std::string, std::string> outcomes(const std::filesystem::path& 
     const std::string parcel = record.task.id.substr(0, record.task.id.find('.'));
     found[parcel] = record.outcome ? std::string(task::name(record.outcome->outcome)) : "none";
   }
-  const auto events = (*journal)->events("");
+  const auto events = (*journal)->notes();
   EXPECT_TRUE(events);
   for (const bridge::Event& event : *events) {
     if (event.kind != "ride") continue;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/journal/story.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/rt/periodic_loop.hpp"
 #include "tests/end_to_end/outcomes.hpp"
@@ -55,9 +55,13 @@ class Processes : public ::testing::Test {
       if (!task.value("started", false) || !task.value("outcome", std::string{}).empty()) continue;
       const auto shown = gate::ask(folder_ / "s", {{"op", "show"}, {"id", task.at("id")}});
       if (!shown || !shown->value("ok", false) || shown->at("events").empty()) continue;
-      const auto& last = shown->at("events").back();
-      if (last.value("kind", std::string{}) == kind && last.at("detail").value("skill", std::string{}) == skill)
-        return task.at("id");
+      // What a skill notes meanwhile says nothing of where the task stands.
+      for (auto last = shown->at("events").rbegin(); last != shown->at("events").rend(); ++last) {
+        const std::string is = last->value("kind", std::string{});
+        if (!bridge::tells_state(is)) continue;
+        if (is == kind && last->at("detail").value("skill", std::string{}) == skill) return task.at("id");
+        break;
+      }
     }
     return {};
   }
@@ -133,7 +137,7 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
   EXPECT_EQ(outcomes(folder_ / "j.db").at(carried.substr(0, carried.find('.'))), "SUCCEEDED") << told.out;
   const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
   ASSERT_TRUE(journal) << journal.error().line();
-  const auto events = (*journal)->events(carried);
+  const auto events = (*journal)->history(carried);
   ASSERT_TRUE(events);
   const auto resumed = std::ranges::find(*events, "resumed", &bridge::Event::kind);
   ASSERT_NE(resumed, events->end()) << "what is in the hand goes on, and is not asked for again";

@@ -1,8 +1,11 @@
 // What a visitor with a socket may ask of a run, and what it must not do to the run's own work.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include "pons/gate/local_socket.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::tests {
@@ -10,6 +13,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class Visitor : public ::testing::Test {
  protected:
@@ -46,6 +50,88 @@ TEST_F(Visitor, SubmitsAndReadsWhatBecameOfIt) {
   });
   EXPECT_THAT(show("home-1").out, HasSubstr("SUCCEEDED"));
   EXPECT_EQ(report_["parcels"]["lost"], 0);
+}
+
+// From what was seen to what became of it, over the socket as from the journal.
+TEST_F(Visitor, ReadsTheStoryOfAParcel) {
+  std::string early;
+  during_a_run([&] {
+    for (int i = 0; i < 2000 && early.empty(); ++i)
+      early = run_pons({"task", "history", "P000001", "--socket", folder_ / "s"}).out;
+  });
+  EXPECT_THAT(early, AllOf(HasSubstr("seen"), HasSubstr("accepted")));
+  const Finished told = run_pons({"task", "history", "P000001", "--journal", folder_ / "j.db"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  std::size_t at = 0;
+  for (const char* what :
+       {" seen ", "± ", " accepted ", R"(pick {"object":"P000001"})", " started ", "step 0, pick, try 1",
+        "take it at (", "ticks ", "the cups hold P000001", "step 0, pick, try 1: succeeded", "step 1, place, try 1",
+        "carry 0.", " ended ", "SUCCEEDED"}) {
+    at = told.out.find(what, at);
+    ASSERT_NE(at, std::string::npos) << what << " is not there, or not in order:\n" << told.out;
+  }
+  const Finished raw = run_pons({"task", "history", "P000001", "--json", "--journal", folder_ / "j.db"});
+  EXPECT_EQ(nlohmann::json::parse(raw.out).front().at("kind"), "seen");
+  const Finished unknown = run_pons({"task", "history", "P9", "--journal", folder_ / "j.db"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("nothing is known of 'P9'"));
+}
+
+TEST_F(Visitor, ChecksAndShortensTheJournalAfterwards) {
+  during_a_run([] {});
+  const auto journal = [&](const std::vector<std::string>& words) {
+    std::vector<std::string> line{"journal"};
+    line.insert(line.end(), words.begin(), words.end());
+    return run_pons(line);
+  };
+  const Finished whole = journal({"check", folder_ / "j.db"});
+  EXPECT_EQ(whole.code, 0) << whole.err;
+  EXPECT_THAT(whole.out, HasSubstr("whole: "));
+  EXPECT_EQ(journal({"compact", folder_ / "j.db", "--keep", "1"}).code, 0);
+  EXPECT_EQ(journal({"check", folder_ / "j.db"}).code, 0);
+  EXPECT_THAT(show("P000001").out, AllOf(HasSubstr("SUCCEEDED"), Not(HasSubstr("attempt"))));
+  EXPECT_EQ(journal({"upgrade", folder_ / "j.db"}).code, 0);
+  for (const char* word : {"check", "compact", "upgrade"}) {
+    const Finished missing = journal({word, folder_ / "none.db"});
+    EXPECT_EQ(missing.code, 2) << word;
+    EXPECT_THAT(missing.err, HasSubstr("there is no such journal")) << word;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "none.db")) << word;
+  }
+  EXPECT_EQ(journal({"compact", folder_ / "j.db", "--keep", "-1"}).code, 2);
+}
+
+// Until the disk is full. Told is what is there, and nothing else.
+TEST_F(Visitor, HearsAcceptedOnlyOfWhatTheDiskHas) {
+  std::vector<std::string> told;
+  std::string refusal;
+  const Finished run = run_pons_and(
+      {"run", "small_cell", "--parcels", "8", "--seed", "3", "--lockstep", "--socket", folder_ / "s", "--journal",
+       folder_ / "j.db"},
+      1, [&](pid_t run_id) {
+        // Stopped, it starts nothing: what is written is what is submitted.
+        EXPECT_EQ(robot("stop").code, 0);
+        const rlimit full{std::filesystem::file_size(folder_ / "j.db-wal") + 200'000, RLIM_INFINITY};
+        ASSERT_EQ(::prlimit(run_id, RLIMIT_FSIZE, &full, nullptr), 0);
+        for (int i = 0; i < 1000 && refusal.empty(); ++i) {
+          const std::string id = fmt::format("home-{}", i);
+          const auto answer = gate::ask(
+              folder_ / "s",
+              {{"op", "submit"},
+               {"task", {{"id", id}, {"steps", {{{"skill", "move_to"}, {"arguments", {{"place", "home"}}}}}}}}});
+          if (answer && answer->value("ok", false)) {
+            told.push_back(id);
+          } else {
+            refusal = answer ? answer->value("error", std::string{}) : answer.error().line();
+          }
+        }
+      });
+  EXPECT_EQ(run.code, 1);
+  EXPECT_THAT(run.err, HasSubstr("no space is left for the journal"));
+  EXPECT_FALSE(refusal.empty());
+  ASSERT_GT(told.size(), 1U);
+  for (const std::string& id : told) EXPECT_EQ(show(id).code, 0) << id;
+  EXPECT_EQ(show(fmt::format("home-{}", told.size())).code, 2) << "was refused";
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
 }
 
 TEST_F(Visitor, HearsOfANameThatIsNotThere) {

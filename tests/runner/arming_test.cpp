@@ -281,7 +281,7 @@ TEST_F(ZonesTest, AVisitThatNoPeriodSawCountsAsWell) {
   tick(arming);
   visit(arming, 0b0001, 0);
   EXPECT_NEAR(leads_out_after_s(arming).value_or(60), 2, 0.02);
-  const auto events = journal_->events("").value();
+  const auto events = journal_->notes().value();
   EXPECT_EQ(std::count_if(events.begin(), events.end(), [](const auto& event) { return event.kind == "zone"; }), 2)
       << "it came and went";
 }

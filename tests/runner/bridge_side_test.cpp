@@ -41,7 +41,7 @@ class TakeOverTest : public testing::Test {
             .settle = [this](Time) { return settled_; }};
   }
   void SetUp() override {
-    ASSERT_TRUE(journal_->event("", at(0), "armed", {{"epoch", 1}}));
+    ASSERT_TRUE(journal_->note(at(0), "armed", {{"epoch", 1}}));
     ASSERT_TRUE(journal_->commit());
   }
   void tick() {

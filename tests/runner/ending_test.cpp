@@ -41,7 +41,7 @@ class EndingTest : public ::testing::Test {
   }
   std::vector<std::string> shutdowns() const {
     std::vector<std::string> reasons;
-    const auto events = cell_->above->journal->events("");
+    const auto events = cell_->above->journal->notes();
     EXPECT_TRUE(events);
     for (const bridge::Event& event : *events) {
       if (event.kind == "shutdown") reasons.push_back(event.detail.at("reason"));

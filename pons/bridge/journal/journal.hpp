@@ -1,5 +1,9 @@
-// The only truth about tasks: one SQLite file, in WAL mode with synchronous=FULL. What accept(), outcome() and commit()
-// have returned from survives a killed process and a lost power supply; events may wait for the next of these.
+// The only truth about tasks: what happened, event by event, in one SQLite file (WAL, synchronous=FULL). Nothing in it
+// is ever changed; what a task's state is, its events say. A task's first event is its acceptance, its last its
+// outcome, and the file's own indexes refuse a second of either.
+//
+// Writing makes an event part of the journal at once, and durable with the next commit(): it then survives a killed
+// process and a lost power supply. Tell nobody before. One commit costs one wait for the disk, whatever it holds.
 //
 // Times are run time, which begins at zero in every run; (run, time) orders what a file holds over several runs.
 // One thread. One process at a time may own a file.
@@ -7,6 +11,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +20,7 @@
 
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
+#include "pons/task/json_value.hpp"
 #include "pons/task/task.hpp"
 
 namespace pons::bridge {
@@ -45,6 +51,7 @@ struct TaskRecord {
 struct Event {
   std::int64_t sequence = 0;  // grows with every event of the file
   std::string task;           // empty: of no task
+  std::string order;          // of an acceptance or a note: what it belongs to; a task that names none is its own
   std::int64_t run = 0;
   Time stamp;
   std::string kind;
@@ -53,51 +60,76 @@ struct Event {
 
 struct TaskHistory {
   TaskRecord record;
-  std::vector<Event> events;  // as written
+  std::vector<Event> events;  // as written, acceptance and outcome apart
 };
 
 struct Counts {
   std::int64_t accepted = 0, open = 0, succeeded = 0, failed = 0, cancelled = 0, exception = 0, events = 0;
 };
 
-inline constexpr std::string_view kStartedEvent = "started";  // the task has left the queue: it may have moved things
+// Kinds that the journal itself writes and reads. Others are whoever's that notes them.
+inline constexpr std::string_view kAcceptedEvent = "accepted";  // detail: the task
+inline constexpr std::string_view kStartedEvent = "started";    // the task has left the queue: it may have moved things
+inline constexpr std::string_view kEndedEvent = "ended";        // detail: {"outcome", "reason", "detail"}
+inline constexpr std::string_view kCompactedEvent = "compacted";   // {"events": how many were dropped}
+inline constexpr std::string_view kClockBackEvent = "clock_back";  // {"by_s"}: until it has caught up, time stands
 
 class Journal {
  public:
-  static constexpr int kVersion = 1;
+  static constexpr int kVersion = 2;
   static constexpr std::int32_t kApplicationId = 0x506f6e73;  // "Pons"
 
   // Opens `file` or creates it, and begins a new run. ":memory:" keeps everything in memory, for runs that need no
   // file. Errors: missing directory, not writable, not a database, another program's database, another version, in use
-  // by another process. A refused file is left as it was.
-  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open(const std::filesystem::path& file);
-  // For looking only: the file must exist and nobody may own it now. What writes then fails.
+  // by another process. A refused file is left as it was. `vfs` names the SQLite VFS that holds the file; none is the
+  // operating system's.
+  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open(const std::filesystem::path& file,
+                                                               const char* vfs = nullptr);
+  // For looking only: the file must exist, be of this version, and nobody may own it now. What writes then fails.
   [[nodiscard]] static Expected<std::unique_ptr<Journal>> open_to_read(const std::filesystem::path& file);
+  // Brings a file of an older version to this one, wholly or, after an error, not at all.
+  [[nodiscard]] static Expected<void> upgrade(const std::filesystem::path& file);
+  // Commits what is pending.
   ~Journal();
 
-  // Durable when it returns. Error: another task has this id, or the file cannot be written.
+  // Error: another task has this id, or the file cannot be written.
   [[nodiscard]] Expected<Accepted> accept(const task::Task& task, Time now);
   // Whether accept() would say kAlready. Error: another task has this id, or the file cannot be read.
   [[nodiscard]] Expected<bool> holds(const task::Task& task) const;
-  // One thing that happened, to the task of that id or (empty id) to none. Durable after the next commit().
+  // One thing that happened to an open task. Error: there is no such open task, or the file cannot be written.
   [[nodiscard]] Expected<void> event(std::string_view id, Time now, std::string_view kind,
                                      const Json& detail = Json::object());
-  // The task's one outcome. Durable when it returns. Error: no such task, it has an outcome, or the file cannot be
-  // written.
+  // One thing that happened to no task; `order` is what it belongs to, if anything.
+  [[nodiscard]] Expected<void> note(Time now, std::string_view kind, const Json& detail = Json::object(),
+                                    std::string_view order = {});
+  // The task's one outcome, and its last event. Errors: as of event().
   [[nodiscard]] Expected<void> outcome(std::string_view id, task::Outcome outcome, std::string_view reason, Time now,
                                        const Json& detail = Json::object());
-  // Makes every event so far durable; costs nothing when there is none.
+  // Makes everything so far durable; costs nothing when there is nothing. Error: this or an earlier write failed. Then
+  // whatever was written since the last commit is not part of the journal, and nothing is written any more: open it
+  // anew. (What a disk had taken of a commit that failed may come to light there: send the same again.)
   [[nodiscard]] Expected<void> commit();
 
   // In the order of acceptance.
   [[nodiscard]] Expected<std::vector<TaskRecord>> tasks() const;
   // Nothing when there is no such task.
   [[nodiscard]] Expected<std::optional<TaskHistory>> task(std::string_view id) const;
-  // Those of no task when `id` is empty.
-  [[nodiscard]] Expected<std::vector<Event>> events(std::string_view id) const;
+  // Those of no task.
+  [[nodiscard]] Expected<std::vector<Event>> notes() const;
+  // All that belongs to an order, of whatever task or of none; a task's own id will do as well.
+  [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order) const;
+  // Every event, task by task in the order of their ids, those of no task first. Stops at the first error of `take`.
+  [[nodiscard]] Expected<void> each_event(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<Counts> counts() const;
   // Of this opening; the first is 1.
   [[nodiscard]] std::int64_t run() const;
+
+  // Drops what happened to ended tasks between acceptance and outcome, but for the `keep` (0 or more) that ended last;
+  // ids stay taken and outcomes known. Then gives the freed space back to the disk. Returns how many events were
+  // dropped; a note says so, too. Error: the file cannot be written, it holds what it held; or no space was freed.
+  [[nodiscard]] Expected<std::int64_t> compact(std::int64_t keep);
+  // Whether the file itself is whole, as far as SQLite can tell. Error: what is not.
+  [[nodiscard]] Expected<void> check_storage() const;
 
  private:
   struct Impl;

@@ -1,79 +1,9 @@
 #include "pons/bridge/journal/journal.hpp"
 
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-#include <sqlite3.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-#include <csignal>
-
-#include <fstream>
-#include <functional>
-#include <sstream>
-
-#include "pons/bridge/test_kit.hpp"
+#include "pons/bridge/journal/test_journal.hpp"
 
 namespace pons::bridge {
 namespace {
-
-namespace fs = std::filesystem;
-
-task::Task sample(const std::string& id, int priority = 50) {
-  return {.id = id, .priority = priority, .deadline = at(12.5), .steps = {{"pick", {{"object", id}}}}};
-}
-
-std::string bytes(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-void execute(const fs::path& file, const char* sql) {
-  sqlite3* database = nullptr;
-  ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
-  EXPECT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
-  sqlite3_close(database);
-}
-
-// Runs `work` in a process of its own, which then says so and waits to be killed.
-void in_a_process_that_is_killed(const std::function<bool()>& work) {
-  int pipe_ends[2];
-  ASSERT_EQ(::pipe(pipe_ends), 0);
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    const char said = work() ? 'y' : 'n';
-    if (::write(pipe_ends[1], &said, 1) == 1) ::pause();
-    ::_exit(1);
-  }
-  ::close(pipe_ends[1]);
-  char said = 0;
-  EXPECT_EQ(::read(pipe_ends[0], &said, 1), 1);
-  EXPECT_EQ(said, 'y');
-  ::close(pipe_ends[0]);
-  ::kill(child, SIGKILL);
-  ::waitpid(child, nullptr, 0);
-}
-
-class JournalTest : public testing::Test {
- protected:
-  [[nodiscard]] std::unique_ptr<Journal> open() const {
-    auto journal = Journal::open(file_);
-    EXPECT_TRUE(journal) << journal.error().line();
-    return std::move(*journal);
-  }
-  // Opens `file`, which must fail, and gives the line a person reads.
-  [[nodiscard]] static std::string refusal(const fs::path& file) {
-    const auto journal = Journal::open(file);
-    EXPECT_FALSE(journal);
-    return journal ? "" : journal.error().line();
-  }
-
-  TemporaryFolder folder_;
-  fs::path file_ = folder_ / "day.db";
-};
 
 TEST_F(JournalTest, KeepsTasksEventsAndOutcomesOverARestart) {
   {
@@ -82,7 +12,7 @@ TEST_F(JournalTest, KeepsTasksEventsAndOutcomesOverARestart) {
     EXPECT_EQ(journal->accept(sample("a"), at(1)), Accepted::kNew);
     EXPECT_EQ(journal->accept(sample("b"), at(2)), Accepted::kNew);
     EXPECT_TRUE(journal->event("a", at(3), kStartedEvent, {{"waited_s", 2}}));
-    EXPECT_TRUE(journal->event("", at(3.5), "ride", {{"reason", "label unreadable"}}));
+    EXPECT_TRUE(journal->note(at(3.5), "ride", {{"reason", "label unreadable"}}, "a"));
     EXPECT_TRUE(journal->outcome("a", task::Outcome::kException, "too heavy", at(4), {{"mass_kg", 6.5}}));
   }
   const auto journal = open();
@@ -108,24 +38,25 @@ TEST_F(JournalTest, KeepsTasksEventsAndOutcomesOverARestart) {
   EXPECT_EQ(history->events[0].kind, kStartedEvent);
   EXPECT_EQ(history->events[0].detail, (Json{{"waited_s", 2}}));
   EXPECT_EQ(journal->task("b").value()->events.at(0).run, 2);
-  EXPECT_EQ(journal->events("").value().at(0).kind, "ride");
+  EXPECT_EQ(journal->notes().value().at(0).kind, "ride");
   EXPECT_FALSE(journal->task("c").value());
 
   const Counts counts = journal->counts().value();
   EXPECT_EQ(counts.accepted, 2);
   EXPECT_EQ(counts.open, 1);
   EXPECT_EQ(counts.exception, 1);
-  EXPECT_EQ(counts.events, 3);
+  EXPECT_EQ(counts.succeeded + counts.failed + counts.cancelled, 0);
+  EXPECT_EQ(counts.events, 6) << "acceptances and outcomes among them";
 }
 
-TEST_F(JournalTest, AnAcceptedTaskSurvivesAKill) {
+TEST_F(JournalTest, WhatWasCommittedSurvivesAKillAndNothingElse) {
   in_a_process_that_is_killed([this] {
     auto journal = Journal::open(file_);
-    const bool accepted = journal && (*journal)->accept(sample("a"), at(1)) && (*journal)->accept(sample("b"), at(1)) &&
-                          (*journal)->event("b", at(1), "kept") &&
-                          (*journal)->outcome("b", task::Outcome::kFailed, "no", at(2)) &&
-                          (*journal)->event("a", at(3), "pending");
-    return accepted && journal->release() != nullptr;  // nothing is closed
+    const bool written = journal && (*journal)->accept(sample("a"), at(1)) && (*journal)->accept(sample("b"), at(1)) &&
+                         (*journal)->event("b", at(1), "kept") &&
+                         (*journal)->outcome("b", task::Outcome::kFailed, "no", at(2)) && (*journal)->commit() &&
+                         (*journal)->event("a", at(3), "pending") && (*journal)->accept(sample("c"), at(3));
+    return written && journal->release() != nullptr;  // nothing is closed
   });
   const auto journal = open();
   const auto tasks = journal->tasks().value();
@@ -140,10 +71,10 @@ TEST_F(JournalTest, AnAcceptedTaskSurvivesAKill) {
 TEST_F(JournalTest, CommittedEventsSurviveAKill) {
   in_a_process_that_is_killed([this] {
     auto journal = Journal::open(file_);
-    const bool done = journal && (*journal)->event("", at(1), "ride") && (*journal)->commit() && (*journal)->commit();
+    const bool done = journal && (*journal)->note(at(1), "ride") && (*journal)->commit() && (*journal)->commit();
     return done && journal->release() != nullptr;
   });
-  EXPECT_EQ(open()->events("").value().size(), 1u);
+  EXPECT_EQ(open()->notes().value().size(), 1u);
 }
 
 TEST_F(JournalTest, TheSameTaskAgainIsHarmlessAndAnotherUnderItsIdIsRefused) {
@@ -163,6 +94,7 @@ TEST_F(JournalTest, ATaskHasOneOutcome) {
   EXPECT_EQ(journal->outcome("a", task::Outcome::kFailed, "no", at(3)).error().what, "there is no open task 'a'");
   EXPECT_FALSE(journal->outcome("b", task::Outcome::kFailed, "no", at(3)));
   EXPECT_FALSE(journal->event("b", at(3), "odd"));
+  EXPECT_EQ(journal->event("a", at(3), "odd").error().what, "there is no open task 'a'") << "nothing after its outcome";
   EXPECT_EQ(journal->task("a").value()->record.outcome->outcome, task::Outcome::kSucceeded);
   EXPECT_EQ(journal->counts().value().succeeded, 1);
 }
@@ -178,24 +110,31 @@ TEST_F(JournalTest, TheTablesHoldThemselvesToIt) {
   const auto refused = [database](const char* sql) {
     return (sqlite3_exec(database, sql, nullptr, nullptr, nullptr) & 0xff) == SQLITE_CONSTRAINT;
   };
-  EXPECT_TRUE(refused("INSERT INTO outcome VALUES(1, 'FAILED', '', '{}', 1, 0)"));
-  EXPECT_TRUE(refused("UPDATE outcome SET outcome = 'MAYBE'"));
-  EXPECT_TRUE(refused("INSERT INTO task(id, run, accepted_ns, body) VALUES('a', 1, 0, '{}')"));
-  EXPECT_TRUE(refused("INSERT INTO task(id, run, accepted_ns, body) VALUES('b', 1, 'soon', '{}')"));
+  const auto insert = [&](const std::string& values) {
+    return refused(("INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(" + values + ")").c_str());
+  };
+  EXPECT_FALSE(insert("1, 3, 'z', 'z', 'odd', '{}'")) << "a good one is taken";
+  EXPECT_TRUE(insert("1, 3, 'a', 'a', 'ended', '{}'")) << "a second outcome";
+  EXPECT_TRUE(insert("1, 3, 'a', 'a', 'accepted', '{}'")) << "a second acceptance";
+  EXPECT_TRUE(insert("1, 3, '', '', 'accepted', '{}'")) << "of no task";
+  EXPECT_TRUE(insert("1, 'soon', 'b', 'b', 'accepted', '{}'")) << "a time that is none";
+  EXPECT_TRUE(refused("UPDATE event SET detail = '{}' WHERE task = 'z'")) << "changed";
+  EXPECT_TRUE(refused("DELETE FROM event WHERE kind = 'ended'")) << "dropped";
+  EXPECT_TRUE(refused("DELETE FROM event WHERE kind = 'accepted'")) << "dropped";
   sqlite3_close(database);
 }
 
 TEST_F(JournalTest, KeepsTextThatIsNotUtf8InSomeForm) {
   const auto journal = open();
-  EXPECT_TRUE(journal->event("", at(1), "ride", {{"code", "P\xff"}}));
-  EXPECT_EQ(journal->events("").value().at(0).detail.at("code"), "P\xef\xbf\xbd");
+  EXPECT_TRUE(journal->note(at(1), "ride", {{"code", "P\xff"}}));
+  EXPECT_EQ(journal->notes().value().at(0).detail.at("code"), "P\xef\xbf\xbd");
 }
 
 TEST_F(JournalTest, RefusesAnotherVersionAndLeavesItAlone) {
   (void)open();
   execute(file_, "PRAGMA user_version = 99");
   const std::string before = bytes(file_);
-  EXPECT_NE(refusal(file_).find("this journal has version 99, this program reads version 1"), std::string::npos);
+  EXPECT_NE(refusal(file_).find("this journal has version 99, this program reads version 2"), std::string::npos);
   EXPECT_EQ(bytes(file_), before);
 }
 
@@ -236,12 +175,12 @@ TEST_F(JournalTest, HasOneOwnerAtATime) {
 
 TEST_F(JournalTest, CanBeOpenedToReadOnly) {
   EXPECT_NE(Journal::open_to_read(file_).error().what.find("no such journal"), std::string::npos);
-  ASSERT_TRUE(open()->accept(sample("a"), at(1)));
+  ASSERT_TRUE(open()->accept(sample("a"), at(1)));  // closing commits
   const auto reader = Journal::open_to_read(file_);
   ASSERT_TRUE(reader) << reader.error().line();
   EXPECT_EQ((*reader)->tasks().value().size(), 1u);
   EXPECT_FALSE((*reader)->accept(sample("b"), at(1)));
-  EXPECT_FALSE((*reader)->event("", at(1), "odd"));
+  EXPECT_FALSE((*reader)->note(at(1), "odd"));
 }
 
 TEST_F(JournalTest, ReadingLeavesNothingBehindWhateverItIsCalled) {
@@ -257,7 +196,7 @@ TEST_F(JournalTest, ReadingLeavesNothingBehindWhateverItIsCalled) {
 
 TEST_F(JournalTest, ARecordThatIsNoJsonIsNamed) {
   ASSERT_TRUE(open()->accept(sample("a"), at(1)));
-  execute(file_, "UPDATE task SET body='{'");
+  execute(file_, "DROP TRIGGER event_stays; UPDATE event SET detail='{'");
   const auto reader = Journal::open_to_read(file_);
   ASSERT_TRUE(reader) << reader.error().line();
   EXPECT_NE((*reader)->tasks().error().line().find("a task is not JSON"), std::string::npos);
@@ -270,34 +209,68 @@ TEST_F(JournalTest, WorksInMemory) {
   EXPECT_EQ((*journal)->tasks().value().size(), 1u);
 }
 
-TEST_F(JournalTest, WhenTheDiskIsFullWhatWasAcceptedIsThereAndNothingElse) {
-  std::string accepted;
-  int pipe_ends[2];
-  ASSERT_EQ(::pipe(pipe_ends), 0);
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const auto journal = Journal::open(file_);
-    const rlimit limit{200'000, 200'000};
-    if (!journal || ::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(1);
-    for (int i = 0; i < 10'000; ++i) {
-      task::Task task = sample(fmt::format("t{}", i));
-      task.steps[0].arguments["object"] = std::string(900, 'x');
-      if (!(*journal)->accept(task, at(i))) ::_exit(0);
-      if (::write(pipe_ends[1], "a", 1) != 1) ::_exit(1);
-    }
-    ::_exit(1);
+TEST_F(JournalTest, TellsTheStoryOfAnOrder) {
+  const auto journal = open();
+  task::Task again = sample("P1.2");
+  again.order = "P1";
+  ASSERT_TRUE(journal->note(at(0), "seen", {}, "P1"));
+  ASSERT_TRUE(journal->accept(sample("P1"), at(1)));
+  ASSERT_TRUE(journal->accept(sample("P2"), at(1)));
+  ASSERT_TRUE(journal->outcome("P1", task::Outcome::kFailed, "dropped", at(2)));
+  ASSERT_TRUE(journal->accept(again, at(3)));
+  ASSERT_TRUE(journal->event("P1.2", at(4), kStartedEvent));
+  ASSERT_TRUE(journal->note(at(5), "closed"));
+  const auto told = [&](std::string_view order) {
+    std::vector<std::string> kinds;
+    const auto events = journal->history(order).value();
+    for (const Event& event : events) kinds.push_back(event.task + " " + event.kind);
+    return kinds;
+  };
+  EXPECT_EQ(told("P1"),
+            (std::vector<std::string>{" seen", "P1 accepted", "P1 ended", "P1.2 accepted", "P1.2 started"}));
+  EXPECT_EQ(told("P1.2"), (std::vector<std::string>{"P1.2 accepted", "P1.2 started"}));
+  EXPECT_EQ(told("P3"), std::vector<std::string>{});
+  EXPECT_EQ(told(""), std::vector<std::string>{}) << "what belongs to nothing is nobody's story";
+}
+
+TEST_F(JournalTest, CompactedItStillKnowsEveryIdAndOutcome) {
+  const auto fill = [](Journal& journal, const std::string& id) {
+    ASSERT_TRUE(journal.accept(sample(id), at(2)));
+    for (int i = 0; i < 200; ++i) ASSERT_TRUE(journal.event(id, at(2), "odd", {{"what", std::string(100, 'x')}}));
+  };
+  {
+    const auto journal = open();
+    for (const char* id : {"a", "b", "c", "open"}) fill(*journal, id);
+    ASSERT_TRUE(journal->note(at(2), "ride"));
+    for (const char* id : {"c", "a", "b"}) ASSERT_TRUE(journal->outcome(id, task::Outcome::kSucceeded, "", at(3)));
+    ASSERT_TRUE(journal->commit());
+    ASSERT_EQ(journal->compact(1), 400);
+    EXPECT_EQ(journal->compact(1), 0);
+    EXPECT_EQ(journal->compact(100), 0);
   }
-  ::close(pipe_ends[1]);
-  char byte = 0;
-  while (::read(pipe_ends[0], &byte, 1) == 1) accepted += byte;
-  ::close(pipe_ends[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  EXPECT_EQ(WEXITSTATUS(status), 0);
-  EXPECT_GT(accepted.size(), 10u);
-  EXPECT_EQ(open()->tasks().value().size(), accepted.size());
+  const auto journal = open();
+  EXPECT_TRUE(journal->task("a").value()->events.empty());
+  EXPECT_TRUE(journal->task("c").value()->events.empty());
+  EXPECT_EQ(journal->task("b").value()->events.size(), 200u) << "ended last";
+  EXPECT_EQ(journal->task("open").value()->events.size(), 200u);
+  EXPECT_EQ(journal->task("a").value()->record.outcome->outcome, task::Outcome::kSucceeded);
+  EXPECT_EQ(journal->accept(sample("c"), at(4)), Accepted::kAlready);
+  const auto notes = journal->notes().value();
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_EQ(notes[1].kind, kCompactedEvent);
+  EXPECT_EQ(notes[1].detail, (Json{{"events", 400}}));
+}
+
+TEST_F(JournalTest, CompactingGivesTheDiskBackWhatItFrees) {
+  {
+    const auto journal = open();
+    ASSERT_TRUE(journal->accept(sample("a"), at(1)));
+    for (int i = 0; i < 500; ++i) ASSERT_TRUE(journal->event("a", at(2), "odd", {{"what", std::string(100, 'x')}}));
+    ASSERT_TRUE(journal->outcome("a", task::Outcome::kFailed, "no", at(3)));
+  }
+  const auto size = fs::file_size(file_);
+  EXPECT_EQ(open()->compact(0), 500);
+  EXPECT_LT(fs::file_size(file_), size / 2);
 }
 
 }  // namespace

@@ -4,11 +4,22 @@
 #include <sqlite3.h>
 
 #include <cassert>
+#include <cerrno>
 #include <filesystem>
 #include <utility>
 
 namespace pons::bridge {
 namespace {
+
+// Why the last call to the operating system for the log failed; 0 where that is not known.
+int errno_of_log(sqlite3* database) {
+  sqlite3_file* log = nullptr;
+  int reason = 0;
+  const bool there = sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log) == SQLITE_OK &&
+                     log != nullptr && log->pMethods != nullptr;
+  if (there) (void)log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &reason);
+  return reason;
+}
 
 // One clear line for each way a file can be wrong.
 std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
@@ -30,6 +41,13 @@ std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
       return fail("no space is left for the journal", file, "free some space on the disk");
     case SQLITE_CORRUPT:
       return fail("the journal is damaged", file, "restore a copy, or name another file");
+    case SQLITE_IOERR: {
+      // SQLite itself calls only ENOSPC full.
+      const int reason = errno_of_log(database);
+      if (reason == EFBIG || reason == EDQUOT)
+        return fail("no space is left for the journal", file, "free some space on the disk, or raise the limit");
+      return fail(fmt::format("the journal failed: {}", sqlite3_errmsg(database)), file, "check the disk");
+    }
     default:
       return fail(fmt::format("the journal failed: {}", sqlite3_errmsg(database)), file, "check the disk");
   }
@@ -121,13 +139,13 @@ bool Statement::is_null(int column) const { return sqlite3_column_type(statement
 
 Database::~Database() { sqlite3_close(database_); }
 
-Expected<void> Database::open(const std::string& file, Mode mode) {
+Expected<void> Database::open(const std::string& file, Mode mode, const char* vfs) {
   file_ = file;
   const bool create = mode == Mode::kCreate;
   const int flags = SQLITE_OPEN_NOMUTEX |
                     (create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
   const std::string name = create ? file : reading_uri(file);
-  if (sqlite3_open_v2(name.c_str(), &database_, flags, nullptr) != SQLITE_OK) {
+  if (sqlite3_open_v2(name.c_str(), &database_, flags, vfs) != SQLITE_OK) {
     return failure(database_, file_);
   }
   return {};
@@ -166,6 +184,11 @@ Expected<std::string> Database::text(std::string_view sql) const {
 bool Database::read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
 
 bool Database::in_transaction() const { return sqlite3_get_autocommit(database_) == 0; }
+
+bool Database::moved() const {
+  int moved = 0;
+  return sqlite3_file_control(database_, "main", SQLITE_FCNTL_HAS_MOVED, &moved) == SQLITE_OK && moved != 0;
+}
 
 std::int64_t Database::changes() const { return sqlite3_changes64(database_); }
 

@@ -62,7 +62,8 @@ class Database {
   Database& operator=(const Database&) = delete;
   ~Database();
 
-  [[nodiscard]] Expected<void> open(const std::string& file, Mode mode);
+  // `vfs` by its name; none is the operating system's.
+  [[nodiscard]] Expected<void> open(const std::string& file, Mode mode, const char* vfs = nullptr);
   [[nodiscard]] Expected<Statement> prepare(std::string_view sql) const;
   // Statements without parameters; rows are thrown away.
   [[nodiscard]] Expected<void> execute(const char* sql) const;
@@ -72,6 +73,8 @@ class Database {
 
   [[nodiscard]] bool read_only() const;
   [[nodiscard]] bool in_transaction() const;
+  // Whether the file that is open no longer lies where it did.
+  [[nodiscard]] bool moved() const;
   [[nodiscard]] std::int64_t changes() const;  // rows of the last statement
 
  private:

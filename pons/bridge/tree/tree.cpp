@@ -118,11 +118,15 @@ class Action final : public Node {
   Progress tick(Time now) override {
     if (!skill_) {
       if (cancelled_) return broken_off();
-      observer_({step_, type_.name, ++attempts_, nullptr}, now);
+      if (auto told = observer_({step_, type_.name, ++attempts_}, now); !told) {
+        return {Status::kFailed, told.error().line(), Json::object()};
+      }
       skill_ = type_.start(arguments_, now);
       if (!skill_) return end({Status::kFailed, "the skill did not start", Json::object()}, now);
     }
     Progress progress = skill_->tick(now);
+    for (const task::Note& note : std::exchange(progress.notes, {}))
+      (void)observer_({step_, type_.name, attempts_, nullptr, &note}, now);
     return progress.status == Status::kRunning ? progress : end(std::move(progress), now);
   }
   void cancel(Time now) override {
@@ -137,7 +141,7 @@ class Action final : public Node {
 
  private:
   Progress end(Progress progress, Time now) {
-    observer_({step_, type_.name, attempts_, &progress}, now);
+    (void)observer_({step_, type_.name, attempts_, &progress}, now);
     return progress;
   }
 

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
 #include "pons/task/skill.hpp"
 
@@ -40,14 +41,17 @@ class Node {
 
 using NodePtr = std::unique_ptr<Node>;
 
-// What an Action tells of one attempt.
+// What an Action tells of one attempt: that it starts, what its skill notes, that it has ended.
 struct Attempt {
   std::size_t step = 0;  // from 0
   std::string_view skill;
-  int number = 0;                   // from 1
-  const Progress* ended = nullptr;  // nullptr when it starts
+  int number = 0;  // from 1
+  const Progress* ended = nullptr;
+  const task::Note* note = nullptr;
 };
-using Observer = std::function<void(const Attempt& attempt, Time now)>;
+// Error of an attempt that starts: it could not be written down, and must not start. Others are told whatever becomes
+// of it.
+using Observer = std::function<Expected<void>(const Attempt& attempt, Time now)>;
 
 [[nodiscard]] NodePtr sequence(std::vector<NodePtr> children);
 [[nodiscard]] NodePtr fallback(std::vector<NodePtr> children);

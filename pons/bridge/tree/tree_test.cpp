@@ -34,8 +34,10 @@ class TreeTest : public testing::Test {
 
   Time now_;
   std::vector<std::string> seen_;
-  Observer observer_ = [this](const Attempt& attempt, Time) {
-    seen_.push_back(std::string(attempt.skill) + std::to_string(attempt.number) + (attempt.ended ? "e" : "s"));
+  Observer observer_ = [this](const Attempt& attempt, Time) -> Expected<void> {
+    const char* const what = attempt.ended != nullptr ? "e" : (attempt.note != nullptr ? "n" : "s");
+    seen_.push_back(std::string(attempt.skill) + std::to_string(attempt.number) + what);
+    return {};
   };
   std::vector<std::unique_ptr<task::SkillType>> types_;
 
@@ -52,6 +54,21 @@ TEST_F(TreeTest, SequenceRunsAllInOrderAndStartsTheNextInTheSameTick) {
   EXPECT_EQ(run(*node).status, Status::kSucceeded);
   EXPECT_EQ(seen_, (std::vector<std::string>{"good1s", "good1e", "other1s", "other1e"}));
   EXPECT_EQ(now_, at(0.04));
+}
+
+TEST_F(TreeTest, AnAttemptThatCannotBeWrittenDownDoesNotStart) {
+  const Observer deaf = [](const Attempt&, Time) -> Expected<void> { return fail("the disk is full"); };
+  const auto progress = run(*action(add(good_), Json::object(), 0, deaf));
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_EQ(progress.reason, "the disk is full");
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
+TEST_F(TreeTest, WhatASkillNotesIsToldBeforeItsEnd) {
+  Actor notes("notes", {{.ticks = 1, .end = {Status::kSucceeded, "", Json::object(), {{"plan", 1}, {"plan", 2}}}}});
+  const Progress progress = run(*leaf(notes));
+  EXPECT_TRUE(progress.notes.empty()) << "told once";
+  EXPECT_EQ(seen_, (std::vector<std::string>{"notes1s", "notes1n", "notes1n", "notes1e"}));
 }
 
 TEST_F(TreeTest, SequenceEndsWithTheFirstThatDoesNotSucceed) {

@@ -1,0 +1,80 @@
+// pons journal: whether one is whole, less of it, and one of an older version.
+
+#include <fmt/format.h>
+#include <filesystem>
+
+#include "apps/commands.hpp"
+#include "pons/bridge/journal/story.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using bridge::Journal;
+
+struct JournalOptions {
+  fs::path file;
+  std::int64_t keep = 0;
+};
+
+int check(const JournalOptions& options) {
+  const auto journal = Journal::open_to_read(options.file);
+  if (!journal) return bad_input(journal.error());
+  const auto wrong = bridge::audit(**journal);
+  if (!wrong.empty()) {
+    for (const std::string& line : wrong) say(stderr, fmt::format("pons: {}: {}\n", options.file.string(), line));
+    return kExitBadRun;
+  }
+  const auto counts = (*journal)->counts();
+  if (!counts) return bad_run(counts.error());
+  say(stdout,
+      fmt::format("whole: {} tasks ({} succeeded, {} failed, {} cancelled, {} exceptions, {} open), {} events\n",
+                  counts->accepted, counts->succeeded, counts->failed, counts->cancelled, counts->exception,
+                  counts->open, counts->events));
+  return kExitGood;
+}
+
+// Opening for writing would create one.
+Expected<void> existing(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::exists(file, ignored)) return {};
+  return fail("there is no such journal", file.string(), "name the file that a run was given with --journal");
+}
+
+int compact(const JournalOptions& options) {
+  if (auto there = existing(options.file); !there) return bad_input(there.error());
+  const auto journal = Journal::open(options.file);
+  if (!journal) return bad_input(journal.error());
+  const auto dropped = (*journal)->compact(options.keep);
+  if (!dropped) return bad_run(dropped.error());
+  say(stdout, fmt::format("{} events dropped; ids and outcomes are kept\n", *dropped));
+  return kExitGood;
+}
+
+int upgrade(const JournalOptions& options) {
+  if (auto there = existing(options.file); !there) return bad_input(there.error());
+  if (auto upgraded = Journal::upgrade(options.file); !upgraded) return bad_input(upgraded.error());
+  say(stdout, fmt::format("of version {} now\n", Journal::kVersion));
+  return kExitGood;
+}
+
+}  // namespace
+
+void add_journal(CLI::App& app, Chosen& chosen) {
+  auto options = std::make_shared<JournalOptions>();
+  CLI::App* journal = app.add_subcommand("journal", "Check, shorten, or upgrade a journal that no run owns");
+  journal->require_subcommand(1);
+  const auto add = [&](const char* name, const char* what, int (*run)(const JournalOptions&)) {
+    CLI::App* command = journal->add_subcommand(name, what);
+    command->add_option("file", options->file, "The file that a run was given with --journal")->required();
+    command->callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
+    return command;
+  };
+  add("check", "Whether it is whole: the file, each task's story, each record", check);
+  add("compact", "Drop what happened to ended tasks between acceptance and outcome", compact)
+      ->add_option("--keep", options->keep, "All of so many tasks that ended last (0)")
+      ->check(CLI::NonNegativeNumber);
+  add("upgrade", "Bring one of an older version to this program's", upgrade);
+}
+
+}  // namespace pons::apps

@@ -1,0 +1,123 @@
+#include "apps/story_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <functional>
+#include <map>
+#include <string_view>
+#include <vector>
+
+namespace pons::apps {
+namespace {
+
+using task::Json;
+
+// Journals may be of other programs' events: what is not there, or of another form, is passed over.
+std::string text(const Json& detail, const char* key) {
+  const auto found = detail.is_object() ? detail.find(key) : detail.end();
+  if (found == detail.end()) return {};
+  return found->is_string() ? found->get<std::string>() : found->dump();
+}
+
+double number(const Json& detail, const char* key) {
+  const auto found = detail.is_object() ? detail.find(key) : detail.end();
+  return found != detail.end() && found->is_number() ? found->get<double>() : 0.0;
+}
+
+std::string metres(const Json& detail, const char* key) {
+  const auto found = detail.is_object() ? detail.find(key) : detail.end();
+  if (found == detail.end() || !found->is_array()) return "?";
+  std::vector<double> values;
+  for (const Json& value : *found) {
+    if (value.is_number()) values.push_back(value.get<double>());
+  }
+  return fmt::format("{:.3f}", fmt::join(values, ", "));
+}
+
+std::string seen(const Json& d) {
+  return fmt::format("at ({}) m, {:.0f}° turned, ± {:.1f} mm; {} m large; in {} frames, the last at {:.3f} s",
+                     metres(d, "position_m"), number(d, "yaw_rad") * 180 / 3.14159265, 1e3 * number(d, "sigma_m"),
+                     metres(d, "size_m"), text(d, "frames"), number(d, "seen_s"));
+}
+
+std::string accepted(const Json& d) {
+  std::string line = fmt::format("priority {}:", text(d, "priority"));
+  const auto steps = d.is_object() ? d.find("steps") : d.end();
+  if (steps == d.end() || !steps->is_array()) return line;
+  for (const Json& step : *steps) {
+    const auto arguments = step.is_object() ? step.find("arguments") : step.end();
+    const bool any = arguments != step.end() && !arguments->empty();
+    line += fmt::format(" {}{}{}", text(step, "skill"), any ? " " : "", any ? arguments->dump() : "");
+  }
+  return line;
+}
+
+std::string started(const Json& d) { return fmt::format("after waiting {:.2f} s", number(d, "waited_s")); }
+
+std::string reason(const Json& d) { return text(d, "reason"); }
+
+std::string step(const Json& d) { return fmt::format("step {}", text(d, "step")); }
+
+std::string attempt(const Json& d) {
+  return fmt::format("step {}, {}, try {}", text(d, "step"), text(d, "skill"), text(d, "attempt"));
+}
+
+std::string attempt_ended(const Json& d) {
+  const std::string why = text(d, "reason");
+  const auto detail = d.is_object() ? d.find("detail") : d.end();
+  const bool more = detail != d.end() && !detail->empty();
+  return fmt::format("{}: {}{}{}{}{}", attempt(d), text(d, "status"), why.empty() ? "" : ", ", why, more ? " " : "",
+                     more ? detail->dump() : "");
+}
+
+std::string plan(const Json& d) {
+  if (text(d, "to") == "meet") {
+    return fmt::format("take it at ({}) m at {:.3f} s; believed at ({}) m, ± {:.1f} mm", metres(d, "meets_m"),
+                       number(d, "meets_s"), metres(d, "object_m"), 1e3 * number(d, "sigma_m"));
+  }
+  if (text(d, "to") == "carry") {
+    return fmt::format("carry {:.2f} kg over {} by {:.3f} s", number(d, "mass_kg"), text(d, "place"),
+                       number(d, "arrives_s"));
+  }
+  return d.dump();
+}
+
+std::string motion(const Json& d) {
+  return fmt::format("ticks {} to {} of the control loop", text(d, "first_tick"), text(d, "last_tick"));
+}
+
+std::string carries(const Json& d) {
+  const auto load = d.is_object() ? d.find("load") : d.end();
+  if (load == d.end() || !load->is_object()) return "the cups hold nothing";
+  const double mass_kg = number(*load, "mass_kg");
+  return mass_kg > 0 ? fmt::format("the cups hold {}, {:.2f} kg", text(*load, "code"), mass_kg)
+                     : fmt::format("the cups hold {}, not weighed yet", text(*load, "code"));
+}
+
+std::string ended(const Json& d) {
+  const std::string why = text(d, "reason");
+  return fmt::format("{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why);
+}
+
+const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
+    {"seen", seen},       {"accepted", accepted}, {"started", started},
+    {"attempt", attempt}, {"plan", plan},         {"motion", motion},
+    {"carries", carries}, {"ride", reason},       {"attempt_ended", attempt_ended},
+    {"resumed", step},    {"found_done", step},   {"cancelling", reason},
+    {"ended", ended}};
+
+}  // namespace
+
+std::string story_line(const Json& event) {
+  const std::string kind = text(event, "kind");
+  const auto detail = event.is_object() ? event.find("detail") : event.end();
+  const auto teller = kTellers.find(kind);
+  std::string told;
+  if (detail != event.end()) {
+    told = teller != kTellers.end() ? teller->second(*detail) : (detail->empty() ? "" : detail->dump());
+  }
+  return fmt::format("{:>10.3f} s  {:<14} {:<13} {}", number(event, "time_s"), text(event, "task"), kind, told);
+}
+
+}  // namespace pons::apps

@@ -1,0 +1,58 @@
+// A task as a brain may write it: any bytes. What is refused is refused in one readable line; what is taken survives
+// the way into the journal and back.
+
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "pons/bridge/review/review.hpp"
+
+namespace {
+
+using namespace pons;
+
+[[noreturn]] void found(const std::string& what) {
+  std::fprintf(stderr, "fuzz_task: %s\n", what.c_str());
+  std::abort();
+}
+
+const task::SkillRegistry& skills() {
+  static const task::SkillRegistry registry = [] {
+    task::SkillRegistry made;
+    made.add({.name = "pick",
+              .schema = task::Json::parse(R"({"type":"object","additionalProperties":false,"required":["object"],
+                "properties":{"object":{"type":"string","maxLength":64,"pattern":"^[A-Z0-9]+$"},
+                              "speed":{"type":"number","minimum":0,"maximum":1},
+                              "via":{"type":"array","maxItems":3,"items":{"type":"integer"}},
+                              "how":{"enum":["fast","soft",null]}}})"),
+              .resources = {"arm"},
+              .timeout = std::chrono::seconds(1),
+              .start = [](const task::Json&, Time) { return nullptr; }});
+    return made;
+  }();
+  return registry;
+}
+
+void expect_readable(const Error& error) {
+  const std::string line = error.line();
+  if (line.empty() || line.size() > 2000) found("an error of " + std::to_string(line.size()) + " bytes");
+  if (line.find('\n') != line.npos) found("an error of several lines: " + line);
+  (void)task::Json(line).dump();  // throws unless it is UTF-8
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const bridge::Review review(skills(), {"arm"});
+  const auto task = bridge::Review::parse({reinterpret_cast<const char*>(data), size});
+  if (!task) {
+    expect_readable(task.error());
+    return 0;
+  }
+  const auto again = task::task_from(task::Json::parse(task::to_json(*task).dump()));
+  if (!again) found("it does not come back: " + again.error().line());
+  if (task::to_json(*again) != task::to_json(*task)) found("it comes back as another");
+  if (const auto good = review.check(*task, Time{}); !good) expect_readable(good.error());
+  return 0;
+}

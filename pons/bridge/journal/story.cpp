@@ -1,0 +1,124 @@
+#include "pons/bridge/journal/story.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "pons/task/json_value.hpp"
+#include "pons/task/skill.hpp"
+
+namespace pons::bridge {
+namespace {
+
+std::unexpected<Error> impossible(const Event& event, std::string_view why) {
+  return fail(fmt::format("event {} ({}) of task '{}' {}", event.sequence, event.kind, event.task, why));
+}
+
+// Of an attempt; what is no number is no step that any task has.
+std::size_t step_of(const Event& event) {
+  const auto found = event.detail.is_object() ? event.detail.find("step") : event.detail.end();
+  const bool is_step = found != event.detail.end() && found->is_number_integer() && *found >= 0;
+  return is_step ? found->get<std::size_t>() : std::numeric_limits<std::size_t>::max();
+}
+
+}  // namespace
+
+bool tells_state(std::string_view kind) {
+  constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent, kAttemptEvent,   kAttemptEndedEvent,
+                              kCancellingEvent, kResumedEvent, kFoundDoneEvent, kEndedEvent};
+  return std::ranges::find(kKinds, kind) != kKinds.end();
+}
+
+Expected<void> Story::take(const Event& event) {
+  if (event.sequence <= sequence_) return impossible(event, "is out of order");
+  if (event.run < run_) return impossible(event, fmt::format("is of run {}, after one of run {}", event.run, run_));
+  if (event.run == run_ && event.stamp < stamp_) {
+    return impossible(event, fmt::format("is of {:.3f} s, after one of {:.3f} s", event.stamp.s(), stamp_.s()));
+  }
+  if (ended_) return impossible(event, "comes after its outcome");
+  if (!accepted_ && event.kind != kAcceptedEvent) return impossible(event, "comes before its acceptance");
+
+  Expected<void> taken;
+  if (event.kind == kAcceptedEvent) taken = take_acceptance(event);
+  if (event.kind == kStartedEvent) started_ = true;
+  if (event.kind == kAttemptEvent) taken = take_attempt(event);
+  if (event.kind == kAttemptEndedEvent) taken = take_attempt_end(event);
+  if (event.kind == kFoundDoneEvent) taken = take_found_done(event);
+  if (event.kind == kEndedEvent) taken = take_end(event);
+  if (event.kind == kCancellingEvent && !started_) taken = impossible(event, "comes before it was started");
+  // What the bridge before was at, nobody saw end.
+  if (event.kind == kResumedEvent) trying_.reset();
+  if (!taken) return taken;
+  sequence_ = event.sequence;
+  run_ = event.run;
+  stamp_ = event.stamp;
+  return {};
+}
+
+Expected<void> Story::take_acceptance(const Event& event) {
+  if (accepted_) return impossible(event, "comes twice");
+  const auto task = task::task_from(event.detail);
+  if (!task) return impossible(event, "holds no task: " + task.error().line());
+  if (task->id != event.task) return impossible(event, fmt::format("holds the task '{}'", task->id));
+  steps_ = task->steps.size();
+  accepted_ = true;
+  return {};
+}
+
+Expected<void> Story::take_attempt(const Event& event) {
+  const std::size_t step = step_of(event);
+  if (!started_) return impossible(event, "comes before it was started");
+  if (step >= steps_) return impossible(event, "is of a step that it does not have");
+  if (step < done_) return impossible(event, fmt::format("starts step {} again, which has succeeded", step));
+  if (step > done_) return impossible(event, fmt::format("starts step {} before step {} has succeeded", step, done_));
+  if (trying_) return impossible(event, fmt::format("comes while step {} goes on", *trying_));
+  trying_ = step;
+  return {};
+}
+
+Expected<void> Story::take_attempt_end(const Event& event) {
+  const std::size_t step = step_of(event);
+  if (trying_ != step) return impossible(event, "ends a step that does not go on");
+  trying_.reset();
+  if (task::text_of(event.detail, "status") == task::name(task::Status::kSucceeded)) done_ = std::max(done_, step + 1);
+  return {};
+}
+
+Expected<void> Story::take_found_done(const Event& event) {
+  const std::size_t step = step_of(event);
+  if (!started_ || step >= steps_ || step != done_) return impossible(event, "is of a step that was never begun");
+  trying_.reset();
+  done_ = std::max(done_, step + 1);
+  return {};
+}
+
+Expected<void> Story::take_end(const Event& event) {
+  const auto outcome = task::outcome_from(task::text_of(event.detail, "outcome"));
+  if (!outcome) return impossible(event, "holds no outcome: " + outcome.error().line());
+  // A compacted story has only its first and last event.
+  if (*outcome == task::Outcome::kSucceeded && started_ && done_ < steps_) {
+    return impossible(event, fmt::format("says SUCCEEDED after {} of {} steps", done_, steps_));
+  }
+  ended_ = true;
+  return {};
+}
+
+std::vector<std::string> audit(const Journal& journal) {
+  std::vector<std::string> wrong;
+  if (auto whole = journal.check_storage(); !whole) wrong.push_back(whole.error().line());
+  std::string id;
+  Story story;
+  const auto read = journal.each_event([&](const Event& event) -> Expected<void> {
+    if (event.task.empty()) return {};
+    if (event.task != id) story = {};
+    id = event.task;
+    if (auto taken = story.take(event); !taken) wrong.push_back(taken.error().line());
+    return {};
+  });
+  if (!read) wrong.push_back(read.error().line());
+  return wrong;
+}
+
+}  // namespace pons::bridge

@@ -1,0 +1,54 @@
+// What the events of one task come to: where it stands, and whether they can have happened in that order.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+#include "pons/bridge/journal/journal.hpp"
+
+namespace pons::bridge {
+
+// Kinds that a bridge notes of a task that runs, apart from kStartedEvent.
+inline constexpr std::string_view kAttemptEvent = "attempt";             // {"step","skill","attempt"}: a skill starts
+inline constexpr std::string_view kAttemptEndedEvent = "attempt_ended";  // and {"status","reason","detail"}
+inline constexpr std::string_view kCancellingEvent = "cancelling";       // {"reason"}
+inline constexpr std::string_view kResumedEvent = "resumed";  // {"step"}: another bridge goes on, with this step
+// {"step"}: nobody saw this step end, but the world shows that it had succeeded.
+inline constexpr std::string_view kFoundDoneEvent = "found_done";
+
+// Whether events of that kind say where a task stands; others only tell of it.
+[[nodiscard]] bool tells_state(std::string_view kind);
+
+// Takes one task's events, in the order of their writing.
+class Story {
+ public:
+  // Error: it cannot follow what was taken before: a second acceptance or outcome, a step that starts though it has
+  // succeeded, time that runs back. The story is then as it was.
+  [[nodiscard]] Expected<void> take(const Event& event);
+
+  [[nodiscard]] bool started() const { return started_; }
+  [[nodiscard]] bool ended() const { return ended_; }
+  // So many of its first steps have succeeded.
+  [[nodiscard]] std::size_t done() const { return done_; }
+
+ private:
+  [[nodiscard]] Expected<void> take_acceptance(const Event& event);
+  [[nodiscard]] Expected<void> take_attempt(const Event& event);
+  [[nodiscard]] Expected<void> take_attempt_end(const Event& event);
+  [[nodiscard]] Expected<void> take_found_done(const Event& event);
+  [[nodiscard]] Expected<void> take_end(const Event& event);
+
+  std::size_t steps_ = 0;
+  std::size_t done_ = 0;
+  std::optional<std::size_t> trying_;  // the step whose skill runs
+  std::int64_t sequence_ = 0, run_ = 0;
+  Time stamp_;
+  bool accepted_ = false, started_ = false, ended_ = false;
+};
+
+// Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and
+// every record's form.
+[[nodiscard]] std::vector<std::string> audit(const Journal& journal);
+
+}  // namespace pons::bridge

@@ -1,0 +1,152 @@
+#include "pons/bridge/journal/story.hpp"
+
+#include <gtest/gtest.h>
+
+#include "pons/bridge/journal/test_journal.hpp"
+
+namespace pons::bridge {
+namespace {
+
+class StoryTest : public testing::Test {
+ protected:
+  // Of a task of two steps.
+  StoryTest() { event(kAcceptedEvent, task::to_json({.id = "a", .steps = {{"pick"}, {"place"}}})); }
+
+  // What is wrong with it; empty when it can follow.
+  std::string event(std::string_view kind, const Json& detail = Json::object()) {
+    Event event{++sequence_, "a", "a", run_, now_, std::string(kind), detail};
+    const auto taken = story_.take(event);
+    return taken ? "" : taken.error().line();
+  }
+  std::string attempt(std::size_t step) { return event(kAttemptEvent, {{"step", step}}); }
+  std::string attempt_ended(std::size_t step, task::Status status) {
+    return event(kAttemptEndedEvent, {{"step", step}, {"status", task::name(status)}});
+  }
+  std::string ended(task::Outcome outcome) {
+    return event(kEndedEvent, {{"outcome", task::name(outcome)}, {"reason", ""}, {"detail", {}}});
+  }
+
+  Story story_;
+  std::int64_t sequence_ = 0, run_ = 1;
+  Time now_ = at(1);
+};
+
+TEST_F(StoryTest, GoesFromAcceptanceToOutcome) {
+  EXPECT_EQ(event(kStartedEvent), "");
+  EXPECT_EQ(attempt(0), "");
+  EXPECT_EQ(event("whatever"), "");
+  EXPECT_EQ(attempt_ended(0, task::Status::kRetry), "");
+  EXPECT_EQ(story_.done(), 0u);
+  EXPECT_EQ(attempt(0), "");
+  EXPECT_EQ(attempt_ended(0, task::Status::kSucceeded), "");
+  EXPECT_EQ(story_.done(), 1u);
+  EXPECT_EQ(attempt(1), "");
+  EXPECT_EQ(attempt_ended(1, task::Status::kSucceeded), "");
+  EXPECT_FALSE(story_.ended());
+  EXPECT_EQ(ended(task::Outcome::kSucceeded), "");
+  EXPECT_TRUE(story_.started() && story_.ended());
+}
+
+TEST_F(StoryTest, NothingIsDoneTwice) {
+  EXPECT_EQ(event(kStartedEvent), "");
+  EXPECT_EQ(attempt(0), "");
+  EXPECT_NE(attempt(0).find("while step 0 goes on"), std::string::npos);
+  EXPECT_EQ(attempt_ended(0, task::Status::kSucceeded), "");
+  EXPECT_EQ(attempt(0), "event 6 (attempt) of task 'a' starts step 0 again, which has succeeded");
+  EXPECT_NE(event(kAcceptedEvent, task::to_json({.id = "a", .steps = {{"pick"}}})).find("twice"), std::string::npos);
+  EXPECT_EQ(ended(task::Outcome::kFailed), "");
+  EXPECT_NE(ended(task::Outcome::kFailed).find("after its outcome"), std::string::npos);
+  EXPECT_NE(event("odd").find("after its outcome"), std::string::npos);
+}
+
+TEST_F(StoryTest, NothingIsClaimedThatDidNotHappen) {
+  EXPECT_NE(attempt(0).find("before it was started"), std::string::npos);
+  EXPECT_EQ(event(kStartedEvent), "");
+  EXPECT_NE(attempt_ended(0, task::Status::kSucceeded).find("does not go on"), std::string::npos);
+  EXPECT_NE(attempt(2).find("does not have"), std::string::npos);
+  EXPECT_NE(attempt(1).find("starts step 1 before step 0 has succeeded"), std::string::npos);
+  EXPECT_NE(event(kAttemptEvent, {{"step", "one"}}).find("does not have"), std::string::npos);
+  EXPECT_NE(event(kAttemptEvent, "no object").find("does not have"), std::string::npos);
+  EXPECT_NE(ended(task::Outcome::kSucceeded).find("SUCCEEDED after 0 of 2 steps"), std::string::npos);
+  EXPECT_NE(event(kEndedEvent, {{"outcome", "MAYBE"}}).find("holds no outcome"), std::string::npos);
+  EXPECT_EQ(ended(task::Outcome::kCancelled), "");
+}
+
+TEST_F(StoryTest, AnotherBridgeGoesOnOrFindsDoneWhatNobodySawEnd) {
+  EXPECT_EQ(event(kStartedEvent), "");
+  EXPECT_EQ(attempt(0), "");
+  ++run_;
+  now_ = at(0.5);
+  EXPECT_EQ(event(kResumedEvent, {{"step", 0}}), "");
+  EXPECT_EQ(attempt(0), "") << "the attempt before has no end";
+  EXPECT_EQ(attempt_ended(0, task::Status::kSucceeded), "");
+  EXPECT_EQ(attempt(1), "");
+  EXPECT_EQ(event(kFoundDoneEvent, {{"step", 1}}), "");
+  EXPECT_EQ(story_.done(), 2u);
+  EXPECT_EQ(ended(task::Outcome::kSucceeded), "");
+}
+
+TEST_F(StoryTest, TimeDoesNotRunBack) {
+  now_ = at(0.9);
+  EXPECT_EQ(event(kStartedEvent), "event 2 (started) of task 'a' is of 0.900 s, after one of 1.000 s");
+  run_ = 0;
+  EXPECT_NE(event(kStartedEvent).find("of run 0, after one of run 1"), std::string::npos);
+  run_ = 1, now_ = at(1), sequence_ = 0;
+  EXPECT_NE(event(kStartedEvent).find("out of order"), std::string::npos);
+  sequence_ = 9;
+  EXPECT_EQ(event(kStartedEvent), "");
+}
+
+class AuditTest : public JournalTest {
+ protected:
+  [[nodiscard]] std::vector<std::string> found() const { return audit(*open()); }
+};
+
+TEST_F(AuditTest, FindsAWholeJournalWhole) {
+  {
+    const auto journal = open();
+    for (const char* id : {"a", "b"}) {
+      ASSERT_TRUE(journal->accept(sample(id), at(1)));
+      ASSERT_TRUE(journal->event(id, at(1), kStartedEvent));
+      ASSERT_TRUE(journal->event(id, at(1), kAttemptEvent, {{"step", 0}}));
+      ASSERT_TRUE(journal->event(id, at(2), kAttemptEndedEvent, {{"step", 0}, {"status", "succeeded"}}));
+    }
+    ASSERT_TRUE(journal->outcome("a", task::Outcome::kSucceeded, "", at(2)));
+  }
+  EXPECT_EQ(found(), std::vector<std::string>{});
+  EXPECT_EQ(open()->compact(0), 3);
+  EXPECT_EQ(found(), std::vector<std::string>{}) << "compacted";
+}
+
+TEST_F(AuditTest, NamesEachImpossibleEvent) {
+  {
+    const auto journal = open();
+    for (const char* id : {"a", "b"}) ASSERT_TRUE(journal->accept(sample(id), at(1)));
+    ASSERT_TRUE(journal->event("a", at(1), kAttemptEvent, {{"step", 0}}));
+    ASSERT_TRUE(journal->event("b", at(1), kCancellingEvent));
+    ASSERT_TRUE(journal->event("b", at(1), kStartedEvent));
+    ASSERT_TRUE(journal->event("b", at(1), kFoundDoneEvent, {{"step", 1}}));
+  }
+  EXPECT_EQ(found(), (std::vector<std::string>{"event 3 (attempt) of task 'a' comes before it was started",
+                                               "event 4 (cancelling) of task 'b' comes before it was started",
+                                               "event 6 (found_done) of task 'b' is of a step that was never begun"}));
+}
+
+TEST_F(AuditTest, FindsAFileThatSqliteFindsDamaged) {
+  {
+    const auto journal = open();
+    for (int i = 0; i < 300; ++i) ASSERT_TRUE(journal->accept(sample(fmt::format("t{}", i)), at(i)));
+  }
+  std::fstream file(file_, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(static_cast<std::streamoff>(fs::file_size(file_) - 5000));
+  file << std::string(3000, '\x5a');
+  file.close();
+  const auto journal = Journal::open(file_);
+  ASSERT_TRUE(journal) << journal.error().line();
+  const auto wrong = audit(**journal);
+  ASSERT_FALSE(wrong.empty());
+  EXPECT_NE(wrong[0].find("damaged"), std::string::npos) << wrong[0];
+}
+
+}  // namespace
+}  // namespace pons::bridge
