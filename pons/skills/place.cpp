@@ -49,6 +49,7 @@ class Place final : public task::Skill {
 
   Progress tick(Time now) override {
     move_along(delay_.take());
+    if (!let_go_.empty() && !cell_.held) return gone(now);
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       phase_ = Phase::kPlan;
@@ -115,6 +116,7 @@ class Place final : public task::Skill {
     way_ = std::move(*way);
     arrives_ = way_.back().end();
     entry_ = entry;
+    let_go_.clear();
     cell_.note("plan",
                {{"to", "carry"}, {"place", name_}, {"mass_kg", cell_.held->mass_kg}, {"arrives_s", arrives_.s()}});
     return {};
@@ -207,6 +209,7 @@ class Place final : public task::Skill {
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
+    let_go_ = cell_.held->code;
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
@@ -239,10 +242,14 @@ class Place final : public task::Skill {
     if (now < arrives_ + kRested || !cell_.arm.cups().open) return late(now);
     const double felt_kg = weigh_now(cell_);
     if (felt_kg > std::max(kGoneLeast_kg, kGoneShare * cell_.held->mass_kg)) return late(now);
-    const std::string code = cell_.held->code;
     cell_.holds_nothing();
+    return gone(now);
+  }
+
+  // Let go of over its mouth, whether a stop came then or not.
+  Progress gone(Time now) {
     cell_.arm.expect_contact(0);
-    return {Status::kSucceeded, {}, {{"place", name_}, {"object", code}, {"seconds", to_s(now - started_)}}};
+    return {Status::kSucceeded, {}, {{"place", name_}, {"object", let_go_}, {"seconds", to_s(now - started_)}}};
   }
 
   Progress late(Time now) {
@@ -252,6 +259,7 @@ class Place final : public task::Skill {
 
   Cell& cell_;
   std::string name_, object_;
+  std::string let_go_;  // what the cups were told to let go of over the mouth
   Time started_, arrives_, looked_at_;
   Delay delay_;
   motion::Trajectory way_;

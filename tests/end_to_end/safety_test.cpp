@@ -102,6 +102,17 @@ TEST(Safety, StoppedAtAnyMomentOfAGraspItGoesOnWithWhatItHolds) {
   EXPECT_GT(weighed_kg, 0);
 }
 
+// What was let go over its mouth has arrived, though the arm was stopped before it had made sure.
+TEST(Safety, StoppedAtAnyMomentOfLettingGoItKnowsWhatItPlaced) {
+  const Folder folder;
+  for (int ms = 5100; ms <= 5190; ms += 30) {
+    const Finished run = run_pons({"run", "parcel_cell", "--parcels", "4", "--seed", "1", "--quiet", "--report",
+                                   folder / "r.json", "--visit", fmt::format("gate@{:.3f}+0.1", 1e-3 * ms)});
+    EXPECT_EQ(run.code, 0) << ms << run.out << run.err;
+    EXPECT_EQ(read_json(folder / "r.json")["parcels"]["sorted"], 4) << ms << run.out;
+  }
+}
+
 TEST(Safety, AnArmOutsideItsLimitsIsBroughtInWhenThatIsAllowed) {
   const Folder folder;
   const std::vector<std::string> found = {"run",
