@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
-#include <stdlib.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -112,25 +111,38 @@ double compare(const fs::path& folder, int count, int together, int rounds) {
   return ratio;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  CLI::App app("Durable hand-offs a second over those of bare SQLite");
+struct Options {
   int count = 1000, rounds = 5;
   bool gate = false;
   std::string folder = ".";
-  app.add_option("--count", count, "Hand-offs a round")->check(CLI::PositiveNumber);
-  app.add_option("--rounds", rounds, "Rounds; figures are their medians")->check(CLI::PositiveNumber);
-  app.add_option("--folder", folder, "On the disk to be measured (here)");
-  app.add_flag("--gate", gate, "Exit code 1 below 0.8 of bare SQLite");
-  CLI11_PARSE(app, argc, argv);
+};
 
-  std::string own = (fs::path(folder) / "journal-bench-XXXXXX").string();
-  if (::mkdtemp(own.data()) == nullptr) give_up("cannot make a folder in " + folder);
-  const double alone = compare(own, count, 1, rounds);
-  (void)compare(own, count * 10, 20, rounds);  // where both wait for the disk less, and ours makes JSON of tasks
+int run(const Options& options) {
+  std::string own = (fs::path(options.folder) / "journal-bench-XXXXXX").string();
+  if (::mkdtemp(own.data()) == nullptr) give_up("cannot make a folder in " + options.folder);
+  const double alone = compare(own, options.count, 1, options.rounds);
+  // Where both wait for the disk less, and ours makes JSON of tasks.
+  (void)compare(own, options.count * 10, 20, options.rounds);
   fs::remove_all(own);
-  if (!gate || alone >= kBar) return 0;
+  if (!options.gate || alone >= kBar) return 0;
   fmt::print(stderr, "journal: below {:.1f} of bare SQLite\n", kBar);
   return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    Options options;
+    CLI::App app("Durable hand-offs a second over those of bare SQLite");
+    app.add_option("--count", options.count, "Hand-offs a round")->check(CLI::PositiveNumber);
+    app.add_option("--rounds", options.rounds, "Rounds; figures are their medians")->check(CLI::PositiveNumber);
+    app.add_option("--folder", options.folder, "On the disk to be measured (here)");
+    app.add_flag("--gate", options.gate, "Exit code 1 below 0.8 of bare SQLite");
+    CLI11_PARSE(app, argc, argv);
+    return run(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "journal: {}\n", error.what());
+    return 2;
+  }
 }

@@ -67,6 +67,7 @@ void expect_readable(const Error& error) {
 
 }  // namespace
 
+// libFuzzer calls it so: NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   auto [database, log] = good();
   for (; size >= 6; data += 6, size -= 6) {

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <string>
 
+// libFuzzer calls it so: NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 int main(int argc, char** argv) {

@@ -43,6 +43,7 @@ void expect_readable(const Error& error) {
 
 }  // namespace
 
+// libFuzzer calls it so: NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const bridge::Review review(skills(), {"arm"});
   const auto task = bridge::Review::parse({reinterpret_cast<const char*>(data), size});

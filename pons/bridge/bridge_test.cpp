@@ -93,7 +93,6 @@ TEST_F(BridgeTest, RunsATaskFromSubmissionToOutcome) {
 class FullDisk {
  public:
   FullDisk() {
-    before_ = std::signal(SIGXFSZ, SIG_IGN);
     EXPECT_EQ(::getrlimit(RLIMIT_FSIZE, &limit_), 0);
     const rlimit none{0, limit_.rlim_max};
     EXPECT_EQ(::setrlimit(RLIMIT_FSIZE, &none), 0);
@@ -105,7 +104,7 @@ class FullDisk {
 
  private:
   rlimit limit_{};
-  void (*before_)(int) = nullptr;
+  void (*before_)(int) = std::signal(SIGXFSZ, SIG_IGN);
 };
 
 TEST_F(BridgeTest, AnOutcomeThatTheDiskDoesNotTakeIsNotTold) {

@@ -15,8 +15,9 @@ namespace {
 int errno_of_log(sqlite3* database) {
   sqlite3_file* log = nullptr;
   int reason = 0;
-  const bool there = sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log) == SQLITE_OK &&
-                     log != nullptr && log->pMethods != nullptr;
+  const bool there =
+      sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, static_cast<void*>(&log)) == SQLITE_OK &&
+      log != nullptr && log->pMethods != nullptr;
   if (there) (void)log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &reason);
   return reason;
 }
