@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <map>
+#include <numbers>
 #include <string_view>
 #include <vector>
 
@@ -37,7 +38,7 @@ std::string metres(const Json& detail, const char* key) {
 
 std::string seen(const Json& d) {
   return fmt::format("at ({}) m, {:.0f}° turned, ± {:.1f} mm; {} m large; in {} frames, the last at {:.3f} s",
-                     metres(d, "position_m"), number(d, "yaw_rad") * 180 / 3.14159265, 1e3 * number(d, "sigma_m"),
+                     metres(d, "position_m"), number(d, "yaw_rad") * 180 / std::numbers::pi, 1e3 * number(d, "sigma_m"),
                      metres(d, "size_m"), text(d, "frames"), number(d, "seen_s"));
 }
 

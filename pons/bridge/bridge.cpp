@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
 #include <iterator>
 #include <utility>
 
@@ -130,7 +129,7 @@ Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Tim
   const std::size_t last = task.steps.size();
   Resumption what{.done = story.done()};
   if (what.done < last) what = resume(task, what.done);
-  assert(what.done >= story.done() && what.done <= last);
+  what.done = std::clamp(what.done, story.done(), last);  // what the journal has, no look takes back
   for (std::size_t step = story.done(); step < what.done; ++step)
     keep(journal_.event(task.id, now, kFoundDoneEvent, {{"step", step}}));
   if (!what.outcome && what.done == last) what.outcome = task::Outcome::kSucceeded;
@@ -279,8 +278,13 @@ void Bridge::finish(const std::string& id, task::Outcome outcome, std::string re
 Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {
   Open& open = *open_.find(id)->second;
   if (attempt.note != nullptr) {
-    assert(!tells_state(attempt.note->kind));
-    keep(journal_.event(id, now, attempt.note->kind, attempt.note->detail));
+    if (tells_state(attempt.note->kind)) {
+      set_fault(
+          {fmt::format("the skill {} notes '{}', which only the bridge may say", attempt.skill, attempt.note->kind),
+           "bridge", "mend the skill"});
+    } else {
+      keep(journal_.event(id, now, attempt.note->kind, attempt.note->detail));
+    }
     return {};
   }
   Json detail{{"step", open.done + attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};

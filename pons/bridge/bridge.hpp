@@ -47,7 +47,7 @@ struct Resumption {
   std::optional<task::Outcome> outcome;  // nothing: it goes on with the next step; when there is none, it SUCCEEDED
   std::string reason;                    // of the outcome
 };
-// Looks at the world. `done`: of so many of its first steps the journal has it, and no fewer are to be answered.
+// Looks at the world. `done`: of so many of its first steps the journal has it; an answer of fewer counts as that many.
 using Resume = std::function<Resumption(const task::Task& task, std::size_t done)>;
 
 class Bridge {

@@ -157,6 +157,17 @@ TEST_F(BridgeTest, WhatASkillNotesIsPartOfItsTasksStory) {
   EXPECT_EQ(journal_->task("a").value()->events.at(2).detail, (Json{{"to", "b"}}));
 }
 
+TEST_F(BridgeTest, ASkillMayNotSayWhereItsTaskStands) {
+  Actor lies("lies", {{.ticks = 1, .end = {Status::kFailed, "no", Json::object(), {{"found_done", {{"step", 0}}}}}}});
+  skills_.add(lies.type());
+  reopen();
+  ASSERT_TRUE(submit("a", "lies"));
+  run();
+  ASSERT_TRUE(bridge_->fault());
+  EXPECT_NE(bridge_->fault()->line().find("the skill lies notes 'found_done'"), std::string::npos);
+  EXPECT_EQ(kinds("a"), (std::vector<std::string>{"started", "attempt", "attempt_ended"}));
+}
+
 // A bridge is ended while its second step runs; the next one opens the journal.
 TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   const auto task = [](const std::string& id) {
@@ -171,7 +182,7 @@ TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   ASSERT_TRUE(bridge_->recover(
       [&](const task::Task& begun, std::size_t done) -> Resumption {
         asked.emplace_back(begun.id, done);
-        return {.done = done};
+        return {};  // a look that sees nothing takes back nothing
       },
       now_));
   EXPECT_EQ(asked, (std::vector<std::pair<std::string, std::size_t>>{{"begun", 1}}));
