@@ -28,10 +28,10 @@ Json to_json(const ObjectBelief& object) {
           {"size_m", list_of(object.size_m)}};
 }
 
-bool tells_of_tasks(gate::Operation operation) {
-  using enum gate::Operation;
-  return operation == kSubmit || operation == kList || operation == kShow || operation == kHistory;
-}
+bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kHalt; }
+
+constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
+constexpr std::string_view kAskedFor = "asked for over the socket";
 
 const Error kNoStream{"no stream goes on", "chunk_stream",
                       "submit a task with the skill follow_policy and the policy outside, and wait until it runs"};
@@ -74,7 +74,11 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
   for (gate::Request& request : socket_->poll()) {
-    const auto asked = gate::asked_from(request.text);
+    auto asked = gate::asked_from(request.text);
+    if (asked && asked->operation == gate::Operation::kWatch) {
+      watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
+      continue;
+    }
     Json answered = asked ? answer(*asked, now) : gate::refusal(asked.error());
     if (asked && tells_of_tasks(asked->operation)) {
       of_tasks.emplace_back(std::move(request), std::move(answered));
@@ -82,6 +86,12 @@ void Desk::attend(Time now) {
       request.reply(answered);
     }
   }
+  std::erase_if(watchers_, [&](Watcher& watcher) {
+    auto told = news(watcher.asked);
+    if (!told && now >= watcher.until) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
+    if (told) of_tasks.emplace_back(std::move(watcher.request), std::move(*told));
+    return told.has_value();
+  });
   // Nobody hears of an acceptance or an outcome before the disk has it; all who came in this period wait for it
   // together.
   const auto kept = of_tasks.empty() || !bridge_.unkept() ? Expected<void>{} : bridge_.commit(now);
@@ -98,6 +108,13 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
       return list();
     case gate::Operation::kShow:
       return show(asked.task);
+    case gate::Operation::kPause:
+    case gate::Operation::kResume:
+    case gate::Operation::kCancel:
+    case gate::Operation::kHalt:
+      return tell_task(asked, now);
+    case gate::Operation::kWatch:  // answered when there is something to tell
+      break;
     case gate::Operation::kObserve:
       return observe(now);
     case gate::Operation::kChunk:
@@ -142,6 +159,28 @@ Json Desk::history(const std::string& order) const {
   if (events->empty())
     return gate::refusal({"nothing is known of '" + order + "'", "history", "pons task list shows the tasks"});
   return {{"ok", true}, {"events", to_json(*events)}};
+}
+
+std::optional<Json> Desk::news(const gate::Asked& asked) const {
+  const auto events = journal_.history(asked.task, asked.after);
+  if (!events) return gate::refusal(events.error());
+  if (!events->empty()) return Json{{"ok", true}, {"events", to_json(*events)}, {"after", events->back().sequence}};
+  if (asked.after > 0) return std::nullopt;
+  return history(asked.task);  // nothing is known of it
+}
+
+Json Desk::tell_task(const gate::Asked& asked, Time now) {
+  const std::string_view reason = asked.reason.empty() ? kAskedFor : asked.reason;
+  const auto before = journal_.history(asked.task);
+  if (!before) return gate::refusal(before.error());
+  const auto told = [&]() -> Expected<void> {
+    if (asked.operation == gate::Operation::kPause) return bridge_.pause(asked.task, now, reason);
+    if (asked.operation == gate::Operation::kResume) return bridge_.resume(asked.task, now);
+    if (asked.operation == gate::Operation::kHalt) return bridge_.halt(asked.task, now, reason);
+    return bridge_.cancel(asked.task, now, reason);
+  }();
+  if (!told) return gate::refusal(told.error());
+  return {{"ok", true}, {"id", asked.task}, {"after", before->empty() ? 0 : before->back().sequence}};
 }
 
 Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {

@@ -3,7 +3,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/journal.hpp"
@@ -31,6 +33,9 @@ class Desk {
   [[nodiscard]] bridge::Json list() const;
   [[nodiscard]] bridge::Json show(const std::string& id) const;
   [[nodiscard]] bridge::Json history(const std::string& order) const;
+  [[nodiscard]] bridge::Json tell_task(const gate::Asked& asked, Time now);
+  // What there is to tell to who watches; nothing while there is nothing new.
+  [[nodiscard]] std::optional<bridge::Json> news(const gate::Asked& asked) const;
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
@@ -40,6 +45,12 @@ class Desk {
   const bridge::Journal& journal_;
   runner::Arming& arming_;
   Stream stream_;
+  struct Watcher {
+    gate::Request request;
+    gate::Asked asked;
+    Time until;
+  };
+  std::vector<Watcher> watchers_;
 };
 
 }  // namespace pons::apps

@@ -18,7 +18,11 @@ task::Json to_json(const bridge::TaskRecord& record) {
 task::Json to_json(const std::vector<bridge::Event>& events) {
   task::Json json = task::Json::array();
   for (const bridge::Event& event : events) {
-    json.push_back({{"task", event.task}, {"time_s", event.stamp.s()}, {"kind", event.kind}, {"detail", event.detail}});
+    json.push_back({{"sequence", event.sequence},
+                    {"task", event.task},
+                    {"time_s", event.stamp.s()},
+                    {"kind", event.kind},
+                    {"detail", event.detail}});
   }
   return json;
 }

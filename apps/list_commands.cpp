@@ -54,9 +54,10 @@ int skills(const std::string& name, const std::string& world_name) {
   const task::SkillType* type = registry.find(name);
   if (type == nullptr)
     return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
-  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\narguments in {}:\n{}\n", type->name, type->summary,
-             type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")),
-             to_s(type->timeout), type->attempts, world->name, type->schema.dump(2));
+  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\npauses: {}\narguments in {}:\n{}\n", type->name,
+             type->summary, type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")),
+             to_s(type->timeout), type->attempts, fmt::join(type->safe_points, "; or "), world->name,
+             type->schema.dump(2));
   return kExitGood;
 }
 

@@ -96,16 +96,30 @@ std::string carries(const Json& d) {
                      : fmt::format("the cups hold {}, not weighed yet", text(*load, "code"));
 }
 
+// Whether it stood then.
+std::string stop(const Json& d) {
+  const std::string result = text(d, "stop");
+  return result.empty() ? reason(d) : "standstill " + result;
+}
+
 std::string ended(const Json& d) {
   const std::string why = text(d, "reason");
-  return fmt::format("{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why);
+  const auto detail = d.is_object() ? d.find("detail") : d.end();
+  const std::string stopped = detail != d.end() && detail->contains("stop") ? "; " + stop(*detail) : "";
+  return fmt::format("{}{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why, stopped);
 }
+
+std::string preempting(const Json& d) { return "for " + text(d, "by"); }
+
+std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
 
 const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"seen", seen},       {"accepted", accepted}, {"started", started},
     {"attempt", attempt}, {"plan", plan},         {"motion", motion},
     {"carries", carries}, {"ride", reason},       {"attempt_ended", attempt_ended},
     {"resumed", step},    {"found_done", step},   {"cancelling", reason},
+    {"halting", reason},  {"pausing", reason},    {"paused", stop},
+    {"preempted", stop},  {"held", held},         {"preempting", preempting},
     {"ended", ended}};
 
 }  // namespace

@@ -1,10 +1,16 @@
-// pons task: submit to a running bridge, list and show from it or from a journal at rest.
+// pons task: submit to a running bridge and tell its tasks what to do; list and show from it or from a journal at rest.
 
 #include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <set>
+#include <string>
+#include <string_view>
 
 #include "apps/commands.hpp"
 #include "apps/journal_json.hpp"
@@ -24,13 +30,16 @@ constexpr std::streamsize kLargestTask = 64 * 1024;
 
 struct TaskOptions {
   fs::path socket, journal;
-  std::string file, id;
-  bool json = false;
+  std::string file, id, reason;
+  bool json = false, at_once = false;
 };
 
-Expected<Json> ask(const TaskOptions& options, const Json& request) {
+constexpr std::chrono::seconds kPatience{10};
+constexpr std::chrono::minutes kWatchPatience{10};  // a run answers who watches every 30 s of its time
+
+Expected<Json> ask(const TaskOptions& options, const Json& request, std::chrono::milliseconds patience = kPatience) {
   const fs::path socket = options.socket.empty() ? default_socket() : options.socket;
-  auto answer = gate::ask(socket, request);
+  auto answer = gate::ask(socket, request, patience);
   if (!answer) return answer;
   if (!answer->value("ok", false)) return fail(answer->value("error", std::string("refused without a reason")));
   return answer;
@@ -133,11 +142,45 @@ int history(const TaskOptions& options) {
   return kExitGood;
 }
 
+// Prints what happens to it after that sequence, until one of these events of the task itself: which. Error: the run
+// has ended before, or there is nothing of that name.
+Expected<std::string> follow(const TaskOptions& options, std::int64_t after, const std::set<std::string>& until) {
+  for (;;) {
+    const auto answer = ask(options, {{"op", "watch"}, {"id", options.id}, {"after", after}}, kWatchPatience);
+    if (!answer) return std::unexpected(answer.error());
+    after = answer->at("after");
+    for (const Json& event : answer->at("events")) {
+      fmt::print("{}\n", story_line(event));
+      const auto kind = event.value("kind", std::string{});
+      if (event.value("task", std::string{}) == options.id && until.contains(kind)) return kind;
+    }
+    std::fflush(stdout);
+  }
+}
+
+int watch(const TaskOptions& options) {
+  const auto ended = follow(options, 0, {"ended"});
+  return ended ? kExitGood : bad_input(ended.error());
+}
+
+// A verb, and the event that says that it was done.
+int tell(const TaskOptions& options, const std::string& verb, const std::string& done) {
+  Json request{{"op", verb}, {"id", options.id}};
+  if (!options.reason.empty()) request["reason"] = options.reason;
+  const auto answer = ask(options, request);
+  if (!answer) return bad_input(answer.error());
+  if (options.at_once) return kExitGood;
+  const auto came = follow(options, answer->at("after"), {done, "ended"});
+  if (!came) return bad_input(came.error());
+  return *came == done ? kExitGood : kExitBadRun;
+}
+
 }  // namespace
 
 void add_task(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<TaskOptions>();
-  CLI::App* task = app.add_subcommand("task", "Submit tasks to a running bridge; list and show them");
+  CLI::App* task =
+      app.add_subcommand("task", "Submit tasks to a running bridge, list and show them, tell them to pause or end");
   task->require_subcommand(1);
   const auto common = [options](CLI::App* command) {
     command->add_option("--socket", options->socket, "Where the run listens (its --socket)");
@@ -165,6 +208,28 @@ void add_task(CLI::App& app, Chosen& chosen) {
   history_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
   history_command->add_flag("--json", options->json, "All that is known, as JSON");
   history_command->callback([options, &chosen] { chosen = [options] { return history(*options); }; });
+
+  CLI::App* watch_command = task->add_subcommand("watch", "Tell the story as it happens, until the task has ended");
+  watch_command->add_option("id", options->id, "The task's id")->required();
+  common(watch_command);
+  watch_command->callback([options, &chosen] { chosen = [options] { return watch(*options); }; });
+
+  struct Verb {
+    const char *name, *done, *help;
+  };
+  for (const Verb& verb :
+       {Verb{"pause", "paused", "Let it wait: at once, or at its next safe point, with what it holds"},
+        Verb{"resume", "continued", "Let one that is paused go on"},
+        Verb{"cancel", "ended", "End it as CANCELLED, once its skill has left the world safe"},
+        Verb{"halt", "ended", "Likewise, but stop now what moves, wherever it is"}}) {
+    CLI::App* command = task->add_subcommand(verb.name, verb.help);
+    command->add_option("id", options->id, "The task's id")->required();
+    if (std::string_view(verb.name) != "resume") command->add_option("--reason", options->reason, "For the journal");
+    command->add_flag("--no-wait", options->at_once, "Do not wait until that has happened");
+    common(command);
+    command->callback(
+        [options, &chosen, verb] { chosen = [options, verb] { return tell(*options, verb.name, verb.done); }; });
+  }
 }
 
 }  // namespace pons::apps

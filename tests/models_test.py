@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the models of the lock-free parts with spin: each as it is must hold, and each wrong variant that its own comment
-names must not. usage: models_test.py [MODEL.pml ...]"""
+"""Checks the models of the lock-free parts, and of who gets which resource, with spin: each as it is must hold, and each
+wrong variant that its own comment names must not. usage: models_test.py [MODEL.pml ...]"""
 
 import re
 import subprocess
@@ -8,7 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-MODELS = Path(__file__).resolve().parent.parent / "pons/rt/models"
+SOURCES = Path(__file__).resolve().parent.parent / "pons"
 VARIANT = re.compile(r"^ \*   ([A-Z_]+) ", re.MULTILINE)
 
 
@@ -27,7 +27,7 @@ def errors_of(model: Path, variant: str | None) -> tuple[int, str]:
 
 
 def main() -> int:
-    models = [Path(name).resolve() for name in sys.argv[1:]] or sorted(MODELS.glob("*.pml"))
+    models = [Path(name).resolve() for name in sys.argv[1:]] or sorted(SOURCES.glob("*/models/*.pml"))
     bad = 0
     for model in models:
         text = model.read_text(encoding="utf-8")

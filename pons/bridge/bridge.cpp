@@ -7,13 +7,11 @@
 #include <utility>
 
 #include "pons/bridge/journal/story.hpp"
+#include "pons/bridge/open_task.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge {
 namespace {
-
-// Before whatever a brain may ask for: it holds what the next one would need.
-constexpr int kResumedPriority = 101;
 
 // Events between the durable moments of a task may wait this long for the disk.
 constexpr Duration kCommitPeriod = std::chrono::seconds(5);
@@ -26,21 +24,13 @@ std::vector<std::string> names(const std::vector<world::Resource>& resources) {
 
 }  // namespace
 
-struct Bridge::Open {
-  task::Task task;
-  Time accepted;
-  std::size_t done = 0;     // steps that an earlier bridge has seen succeed
-  tree::Observer observer;  // the tree refers to it
-  tree::NodePtr root;       // empty while queued
-  Time give_up_at;          // by then every step has had its timeout, and grace to leave the world safe
-  bool cancelled = false;
-  std::string cancel_reason;
-  int attempts = 0;
-  Json steps = Json::array();  // what each step that ended had to tell
-};
-
 Bridge::Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world)
-    : journal_(journal), skills_(skills), review_(skills, names(world.resources)), arbiter_(names(world.resources)) {}
+    : journal_(journal),
+      skills_(skills),
+      review_(skills, names(world.resources)),
+      arbiter_(names(world.resources), world.schedule),
+      urgent_priority_(world.schedule.urgent_priority),
+      on_emergency_stop_(world.schedule.on_emergency_stop) {}
 
 Bridge::~Bridge() = default;
 
@@ -64,9 +54,9 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   if (*held) return Admission{task->id, Accepted::kAlready};
   if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
   if (auto good = review_.check(*task, now); !good) return std::unexpected(good.error());
-  if (queue_length() >= kMaxQueue) {
-    return fail(fmt::format("{} tasks are waiting already", queue_length()), {}, "submit it again later");
-  }
+  const std::size_t waiting = open_.size() - running_.size();
+  if (waiting >= (task->priority < urgent_priority_ ? kMaxWaiting : kMaxUrgent))
+    return fail(fmt::format("{} tasks are waiting already", waiting), {}, "submit it again later");
   const auto accepted = journal_.accept(*task, now);
   if (!accepted) {
     set_fault(accepted.error());
@@ -74,7 +64,7 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   }
   unkept_ = true;
   std::string id = task->id;
-  enqueue(std::move(*task), now);
+  enqueue(add_open(std::move(*task), now));
   return Admission{std::move(id), *accepted};
 }
 
@@ -87,13 +77,18 @@ std::vector<std::string> Bridge::resources_of(const task::Task& task) const {
   return resources;
 }
 
-void Bridge::enqueue(task::Task task, Time now) {
-  arbiter_.add(task.id, task.priority, task.deadline, resources_of(task));
+Bridge::Open& Bridge::add_open(task::Task task, Time accepted) {
   auto open = std::make_unique<Open>();
-  open->accepted = now;
-  std::string id = task.id;
+  open->accepted = accepted;
+  open->priority = task.priority;
   open->task = std::move(task);
-  open_.emplace(std::move(id), std::move(open));
+  std::string id = open->task.id;
+  return *open_.emplace(std::move(id), std::move(open)).first->second;
+}
+
+void Bridge::enqueue(const Open& open) {
+  const auto deadline = open.begun ? std::nullopt : open.task.deadline;
+  arbiter_.add({open.task.id, open.priority, deadline, open.accepted, resources_of(open.task)});
 }
 
 // ---- after another bridge ----
@@ -106,26 +101,36 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
     // Its skills and places are those of the program and the world that run now.
     if (auto good = review_.check(record.task, record.accepted); !good) {
       finish_unopened(record.task.id, task::Outcome::kFailed, good.error().line(), now);
-    } else if (!record.started) {
-      enqueue(record.task, record.accepted);
-    } else if (auto taken = take_up(record.task, resume, now); !taken) {
+    } else if (auto taken = take_up(record, resume, now); !taken) {
       return taken;
     }
   }
   return commit(now);
 }
 
-Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Time now) {
-  const auto events = journal_.history(task.id);
+Expected<void> Bridge::take_up(const TaskRecord& record, const Resume& resume, Time now) {
+  const auto events = journal_.history(record.task.id);
   if (!events) return std::unexpected(events.error());
   Story story;
   for (const Event& event : *events) {
-    if (event.task != task.id) continue;
+    if (event.task != record.task.id) continue;
     if (auto taken = story.take(event); !taken) {
-      finish_unopened(task.id, task::Outcome::kFailed, taken.error().line(), now);
+      finish_unopened(record.task.id, task::Outcome::kFailed, taken.error().line(), now);
       return {};
     }
   }
+  if (story.started()) return go_on(record, story, resume, now);
+  Open& open = add_open(record.task, record.accepted);
+  if (story.paused()) {
+    open.stage = Open::Stage::kParked;
+  } else {
+    enqueue(open);
+  }
+  return {};
+}
+
+Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now) {
+  const task::Task& task = record.task;
   const std::size_t last = task.steps.size();
   Resumption what{.done = story.done()};
   if (what.done < last) what = resume(task, what.done);
@@ -137,14 +142,13 @@ Expected<void> Bridge::take_up(const task::Task& task, const Resume& resume, Tim
     finish_unopened(task.id, *what.outcome, what.reason, now);
     return {};
   }
-  const std::size_t done = what.done;
-  keep(journal_.event(task.id, now, kResumedEvent, {{"step", done}}));
-  arbiter_.add(task.id, kResumedPriority, std::nullopt, resources_of(task));
-  auto open = std::make_unique<Open>();
-  open->accepted = now;
-  open->done = done;
-  open->task = task;
-  open_.emplace(task.id, std::move(open));
+  keep(journal_.event(task.id, now, kResumedEvent, {{"step", what.done}}));
+  Open& open = add_open(task, record.accepted);
+  open.done = what.done;
+  open.begun = true;
+  open.priority = Arbiter::kFirst;  // it may hold what the next one would need
+  if (story.paused()) open.told = Open::Told::kPause;
+  enqueue(open);
   return {};
 }
 
@@ -154,36 +158,6 @@ void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const
   if (written) ended_.push_back({id, outcome, reason, Json::object()});
 }
 
-Expected<void> Bridge::cancel(std::string_view id, Time now, std::string_view reason) {
-  const auto found = open_.find(id);
-  if (found == open_.end()) return fail(fmt::format("there is no open task '{}'", task::excerpt(id)), {}, "");
-  const std::string name = found->first;
-  if (arbiter_.remove(name)) {
-    finish(name, task::Outcome::kCancelled, std::string(reason), Json::object(), now);
-  } else {
-    cancel_running(*found->second, now, reason);
-  }
-  return {};
-}
-
-void Bridge::stop(Time now, std::string_view reason) {
-  stopping_ = true;
-  for (const std::string& id : arbiter_.queue()) {
-    arbiter_.remove(id);
-    finish(id, task::Outcome::kCancelled, std::string(reason), Json::object(), now);
-  }
-  for (auto& [id, open] : open_) cancel_running(*open, now, reason);
-}
-
-void Bridge::cancel_running(Open& open, Time now, std::string_view reason) {
-  if (!open.root || open.cancelled) return;
-  open.cancelled = true;
-  open.cancel_reason = reason;
-  open.give_up_at = std::min(open.give_up_at, now + kCancelGrace);
-  keep(journal_.event(open.task.id, now, kCancellingEvent, {{"reason", open.cancel_reason}}));
-  open.root->cancel(now);
-}
-
 // ---- a tick ----
 
 void Bridge::tick(Time now) {
@@ -191,13 +165,16 @@ void Bridge::tick(Time now) {
   tick_trees(running(), now);
   expire(now);
   tick_trees(start_granted(now), now);
+  preempt(now);
   if (unkept_ || now - last_commit_ >= kCommitPeriod) keep(commit(now));
   if (!fault_) return;
-  for (auto& [id, open] : open_) cancel_running(*open, now, "the bridge has stopped: " + fault_->what);
-  for (const std::string& id : arbiter_.queue()) {
-    arbiter_.remove(id);
-    open_.erase(id);
-  }
+  for (const auto& [id, open] : running_)
+    end_running(*open, Ending::kCancel, now, "the bridge has stopped: " + fault_->what);
+  // What waits stays open in the journal.
+  std::erase_if(open_, [&](const auto& entry) {
+    arbiter_.remove(entry.first);
+    return entry.second->stage != Open::Stage::kRuns;
+  });
 }
 
 void Bridge::expire(Time now) {
@@ -208,33 +185,52 @@ void Bridge::expire(Time now) {
 
 std::vector<std::string> Bridge::start_granted(Time now) {
   if (held() || fault_) return {};
-  std::vector<std::string> granted = arbiter_.grant();
-  if (granted.empty()) return granted;
+  std::vector<std::string> granted = arbiter_.grant(now);
   for (const std::string& id : granted) {
     Open& open = *open_.find(id)->second;
-    keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
-    open.observer = [this, id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); };
-    const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
-                                       open.task.steps.end());
-    open.root = tree::from_steps(left, skills_, open.observer);
-    open.give_up_at = now;
-    for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
+    open.stage = Open::Stage::kRuns;
+    running_.emplace(id, &open);
+    if (open.root) {
+      open.told = Open::Told::kNothing;
+      open.stands = false;
+      keep(journal_.event(id, now, kContinuedEvent));
+      open.root->resume(now);
+    } else {
+      start(open, now);
+    }
   }
   return granted;
 }
 
+void Bridge::start(Open& open, Time now) {
+  const std::string& id = open.task.id;
+  if (!std::exchange(open.begun, true))
+    keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
+  open.observer = [this, id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); };
+  const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
+                                     open.task.steps.end());
+  open.root = tree::from_steps(left, skills_, open.observer);
+  open.give_up_at = now;
+  for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
+  if (open.told == Open::Told::kPause) open.root->pause(now, task::Pause::kStand);
+}
+
 void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
-    Open& open = *open_.find(id)->second;
+    Open& open = *running_.find(id)->second;
+    if (open.rests) open.give_up_at += now - *std::exchange(open.rests, {});
     const task::Progress progress = open.root->tick(now);
     // Never begun, because the journal could not say that it would: it stays open there.
     if (fault_ && open.attempts == 0) {
       arbiter_.release(id);
+      running_.erase(id);
       open_.erase(id);
       continue;
     }
-    if (progress.status != task::Status::kRunning) {
+    if (task::is_end(progress.status)) {
       conclude(id, open, progress, now);
+    } else if (progress.status == task::Status::kPaused && !open.cancelled) {
+      stands(open, progress, now);
     } else if (give_up(open, now)) {
       conclude(id, open, {task::Status::kFailed, "a skill did not end when it was told to", Json::object()}, now);
     }
@@ -262,7 +258,9 @@ void Bridge::conclude(const std::string& id, Open& open, const task::Progress& p
     reason = fmt::format("{} ({})", open.cancel_reason, progress.reason);
   }
   Json detail{{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
+  if (progress.stop) detail["stop"] = task::name(*progress.stop);
   arbiter_.release(id);
+  running_.erase(id);
   finish(id, outcome, std::move(reason), std::move(detail), now);
 }
 
@@ -327,9 +325,7 @@ std::vector<OutcomeReport> Bridge::take_outcomes() { return std::exchange(outcom
 
 std::vector<std::string> Bridge::running() const {
   std::vector<std::string> ids;
-  for (const auto& [id, open] : open_) {
-    if (open->root) ids.push_back(id);
-  }
+  for (const auto& [id, open] : running_) ids.push_back(id);
   return ids;
 }
 

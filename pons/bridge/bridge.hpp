@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/journal/story.hpp"
 #include "pons/bridge/review/review.hpp"
 #include "pons/bridge/schedule/arbiter.hpp"
 #include "pons/bridge/tree/tree.hpp"
@@ -25,7 +26,8 @@
 
 namespace pons::bridge {
 
-inline constexpr std::size_t kMaxQueue = 10'000;
+inline constexpr std::size_t kMaxWaiting = 10'000;  // tasks, paused ones among them;
+inline constexpr std::size_t kMaxUrgent = 10'100;   // until there are so many, an urgent one is taken all the same
 // A skill that was cancelled, or ran out of time, and has not ended after this long is given up: see Bridge::fault().
 inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
 
@@ -67,11 +69,25 @@ class Bridge {
   // and which end, and how. Error: the journal cannot be read or written.
   [[nodiscard]] Expected<void> recover(const Resume& resume, Time now);
   void tick(Time now);
-  // Queued: ends as CANCELLED at once. Running: the skill leaves the world safe first. Error: no such open task.
+
+  // The verbs that a sender has. What comes of them the task's events and its outcome say, with what was measured:
+  // "stop" is CONFIRMED, UNCERTAIN or FAILED. Errors: no such open task, or it is ending already.
+  // Waiting: leaves the queue. Running: stops at its next safe point and keeps its plan and its resources.
+  [[nodiscard]] Expected<void> pause(std::string_view id, Time now, std::string_view reason);
+  // Error also: it is not paused.
+  [[nodiscard]] Expected<void> resume(std::string_view id, Time now);
+  // Waiting: ends as CANCELLED at once. Running: the skill leaves the world safe first.
   [[nodiscard]] Expected<void> cancel(std::string_view id, Time now, std::string_view reason);
+  // Likewise, but what moves stops now, wherever it is.
+  [[nodiscard]] Expected<void> halt(std::string_view id, Time now, std::string_view reason);
   // Cancels everything and refuses what comes; tick() on until idle().
   void stop(Time now, std::string_view reason);
-  // Held, it starts no task (protective stop); running ones go on being ticked.
+  // The robot has had an emergency stop, for that cause: open tasks are held or cancelled as the world says. Called
+  // again before released() it does nothing.
+  void emergency_stop(Time now, std::string_view cause);
+  void released(Time now);
+
+  // Held, it starts no task (protective stop) and preempts none; running ones go on being ticked.
   enum class Hold : std::uint8_t { kOff, kOn };
   void hold(Hold hold) { hold_ = hold; }
 
@@ -87,7 +103,7 @@ class Bridge {
 
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
-  [[nodiscard]] std::vector<std::string> running() const;  // in the order of their ids
+  [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
   [[nodiscard]] bool idle() const { return open_.empty(); }
   [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
@@ -98,18 +114,29 @@ class Bridge {
   [[nodiscard]] const std::optional<Error>& fault() const { return fault_; }
 
  private:
-  struct Open;  // an accepted task without an outcome
+  struct Open;
 
   [[nodiscard]] Expected<Admission> admit(std::string_view json, Time now);
   [[nodiscard]] std::vector<std::string> resources_of(const task::Task& task) const;
-  void enqueue(task::Task task, Time now);
-  [[nodiscard]] Expected<void> take_up(const task::Task& task, const Resume& resume, Time now);
+  [[nodiscard]] Open& add_open(task::Task task, Time accepted);
+  void enqueue(const Open& open);
+  void park(Open& open);
+  [[nodiscard]] Expected<Open*> find_open(std::string_view id);
+  [[nodiscard]] Expected<void> take_up(const TaskRecord& record, const Resume& resume, Time now);
+  [[nodiscard]] Expected<void> go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now);
   void expire(Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
+  void start(Open& open, Time now);
+  void preempt(Time now);
+  void stands(Open& open, const task::Progress& progress, Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
   [[nodiscard]] bool give_up(Open& open, Time now);
   void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
-  void cancel_running(Open& open, Time now, std::string_view reason);
+  enum class Ending : std::uint8_t { kCancel, kHalt };
+  [[nodiscard]] Expected<void> end(std::string_view id, Ending ending, Time now, std::string_view reason);
+  void end_all(Time now, std::string_view reason);
+  void end_running(Open& open, Ending ending, Time now, std::string_view reason);
+  void end_waiting(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
   void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now);
   [[nodiscard]] Expected<void> journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
@@ -120,13 +147,17 @@ class Bridge {
   const task::SkillRegistry& skills_;
   Review review_;
   Arbiter arbiter_;
+  int urgent_priority_;
+  world::OnEmergencyStop on_emergency_stop_;
   std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
+  std::map<std::string, Open*, std::less<>> running_;
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
   Time last_commit_;
   std::int64_t retries_ = 0, refused_ = 0;
   Hold hold_ = Hold::kOff;
   bool unkept_ = false;  // an acceptance or an outcome waits for commit()
+  bool emergency_ = false;
   bool stopping_ = false;
 };
 

@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,8 @@ class TemporaryFolder {
 struct Course {
   int ticks = 1;  // says kRunning until this one
   Progress end{Status::kSucceeded, "", Json::object()};
-  int ticks_after_cancel = 0;  // further kRunning once cancelled
+  int ticks_after_cancel = 0;                  // further kRunning once cancelled, and before it stands when paused
+  std::optional<task::Pause> stands_for = {};  // paused for anything else, it runs on
   Progress cancelled_end{Status::kFailed, "broken off", Json::object()};
 };
 
@@ -50,7 +52,9 @@ class Actor {
  public:
   struct Log {
     std::vector<Json> started;
-    int ticks = 0, cancels = 0;
+    int ticks = 0, cancels = 0, halts = 0;
+    std::vector<task::Pause> pauses;
+    int resumes = 0;
   };
 
   Actor(std::string name, std::vector<Course> courses)
@@ -80,8 +84,24 @@ class Actor {
     Use(Course course, Log& log) : course_(std::move(course)), log_(log) {}
     Progress tick(Time) override {
       ++log_.ticks;
-      if (cancelled_) return left_-- > 0 ? Progress{} : course_.cancelled_end;
+      if (halted_) return stopped({Status::kFailed, "halted"});
+      if (cancelled_) return left_-- > 0 ? Progress{} : stopped(course_.cancelled_end);
+      if (paused_) return left_-- > 0 ? Progress{} : stopped({Status::kPaused});
       return ++done_ < course_.ticks ? Progress{} : course_.end;
+    }
+    void pause(Time, task::Pause pause) override {
+      log_.pauses.push_back(pause);
+      if (pause != course_.stands_for.value_or(pause)) return;
+      paused_ = true;
+      left_ = course_.ticks_after_cancel;
+    }
+    void resume(Time) override {
+      ++log_.resumes;
+      paused_ = false;
+    }
+    void halt(Time) override {
+      ++log_.halts;
+      halted_ = true;
     }
     void cancel(Time) override {
       ++log_.cancels;
@@ -90,10 +110,15 @@ class Actor {
     }
 
    private:
+    static Progress stopped(Progress progress) {
+      progress.stop = task::StopResult::kConfirmed;
+      return progress;
+    }
+
     Course course_;
     Log& log_;
     int done_ = 0, left_ = 0;
-    bool cancelled_ = false;
+    bool cancelled_ = false, paused_ = false, halted_ = false;
   };
 
   std::string name_;

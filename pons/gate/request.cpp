@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
@@ -22,10 +23,12 @@ using task::Schema;
 constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
-    "op": {"enum": ["submit", "list", "show", "history", "observe", "chunk", "robot", "stop", "emergency_stop", "reset",
-                    "arm"]},
+    "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "observe",
+                    "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
+    "after": {"type": "integer", "minimum": 0, "maximum": 1000000000000},
+    "reason": {"type": "string", "maxLength": 200},
     "stream": {"type": "integer", "minimum": 0, "maximum": 1000000000},
     "observed": {"type": "number", "minimum": 0, "maximum": 1000000000},
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
@@ -50,16 +53,25 @@ const Schema& schema() {
   return compiled;
 }
 
-// Which operations each member belongs to; all but "last" are needed there.
+// Those of one task.
+const std::map<std::string, Operation, std::less<>> kOfTask = {
+    {"show", Operation::kShow},   {"history", Operation::kHistory}, {"watch", Operation::kWatch},
+    {"pause", Operation::kPause}, {"resume", Operation::kResume},   {"cancel", Operation::kCancel},
+    {"halt", Operation::kHalt}};
+
+// Which operations each member belongs to; all but kOptional are needed there.
 const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
-    {"task", {"submit"}},     {"id", {"show", "history"}}, {"stream", {"chunk"}}, {"observed", {"chunk"}},
-    {"period_ms", {"chunk"}}, {"actions", {"chunk"}},      {"last", {"chunk"}}};
-constexpr std::string_view kOptional = "last";
+    {"task", {"submit"}},     {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt"}},
+    {"after", {"watch"}},     {"reason", {"pause", "cancel", "halt"}},
+    {"stream", {"chunk"}},    {"observed", {"chunk"}},
+    {"period_ms", {"chunk"}}, {"actions", {"chunk"}},
+    {"last", {"chunk"}}};
+constexpr std::array<std::string_view, 3> kOptional = {"after", "reason", "last"};
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
     const bool belongs = std::ranges::find(belongs_to, operation) != belongs_to.end();
-    const bool needed = belongs && member != kOptional;
+    const bool needed = belongs && std::ranges::find(kOptional, member) == kOptional.end();
     if (json.contains(member) ? belongs : !needed) continue;
     return fail(fmt::format("'{}' {}", member, needed ? "is missing" : "does not belong there"),
                 fmt::format("/{}", member), fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
@@ -92,8 +104,12 @@ Expected<Asked> asked_from(std::string_view text) {
   const auto operation = json->at("op").get<std::string>();
   if (auto good = check_members(*json, operation); !good) return std::unexpected(good.error());
   if (operation == "submit") return Asked{.operation = Operation::kSubmit, .task = json->at("task").dump()};
-  if (operation == "show") return Asked{.operation = Operation::kShow, .task = json->at("id").get<std::string>()};
-  if (operation == "history") return Asked{.operation = Operation::kHistory, .task = json->at("id").get<std::string>()};
+  if (const auto of_task = kOfTask.find(operation); of_task != kOfTask.end()) {
+    return Asked{.operation = of_task->second,
+                 .task = json->at("id").get<std::string>(),
+                 .reason = json->value("reason", std::string{}),
+                 .after = json->value("after", std::int64_t{0})};
+  }
   if (operation == "chunk") return chunk_from(*json);
   return Asked{.operation = kBare.at(operation)};
 }

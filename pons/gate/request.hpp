@@ -4,6 +4,12 @@
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
 //   {"op":"history","id":"P000123"}
 //                                → {"ok":true,"events":[…]}, of every task of that order
+//   {"op":"watch","id":"P000123","after":117}
+//                                → {"ok":true,"events":[…],"after":121}: likewise, those after that sequence, as soon
+//                                   as there are any; after a while without, none
+//   {"op":"pause","id":"P000123","reason":"…"}
+//                                → {"ok":true,"id":…,"after":…}; likewise resume (without a reason), cancel and halt.
+//                                   What comes of it, watch tells after that sequence
 //   {"op":"observe"}             → {"ok":true,"stream":1,"time_s":…,"executed":…,"enough_s":…,"position":[…],
 //                                   "speed":[…],"objects":[…]}
 //   {"op":"chunk","stream":1,"observed":…,"period_ms":…,"actions":[[…],…],"last":false}
@@ -25,10 +31,17 @@
 namespace pons::gate {
 
 enum class Operation : std::uint8_t {
+  // Of tasks:
   kSubmit,
   kList,
   kShow,
   kHistory,
+  kWatch,
+  kPause,
+  kResume,
+  kCancel,
+  kHalt,
+  // Of streams and of the arm:
   kObserve,
   kChunk,
   kRobot,
@@ -40,7 +53,9 @@ enum class Operation : std::uint8_t {
 
 struct Asked {
   Operation operation = Operation::kList;
-  std::string task;          // kSubmit: the task's JSON text; kShow, kHistory: the id
+  std::string task;          // kSubmit: the task's JSON text; kShow to kHalt: the id
+  std::string reason;        // kPause, kCancel, kHalt; may be empty
+  std::int64_t after = 0;    // kWatch
   std::uint64_t stream = 0;  // kChunk
   Chunk chunk;               // kChunk; finite, and otherwise as it came
 };

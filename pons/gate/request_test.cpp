@@ -17,6 +17,17 @@ TEST(AskedFrom, ReadsEachQuestion) {
   const auto history = asked_from(R"({"op":"history","id":"a"})");
   EXPECT_EQ(history->operation, Operation::kHistory);
   EXPECT_EQ(history->task, "a");
+  const auto watch = asked_from(R"({"op":"watch","id":"a","after":117})");
+  EXPECT_EQ(watch->operation, Operation::kWatch);
+  EXPECT_EQ(watch->after, 117);
+  EXPECT_EQ(asked_from(R"({"op":"watch","id":"a"})")->after, 0);
+  const auto pause = asked_from(R"({"op":"pause","id":"a","reason":"lunch"})");
+  EXPECT_EQ(pause->operation, Operation::kPause);
+  EXPECT_EQ(pause->task, "a");
+  EXPECT_EQ(pause->reason, "lunch");
+  EXPECT_EQ(asked_from(R"({"op":"resume","id":"a"})")->operation, Operation::kResume);
+  EXPECT_EQ(asked_from(R"({"op":"cancel","id":"a"})")->operation, Operation::kCancel);
+  EXPECT_EQ(asked_from(R"({"op":"halt","id":"a","reason":""})")->operation, Operation::kHalt);
   EXPECT_EQ(asked_from(R"({"op":"robot"})")->operation, Operation::kRobot);
   EXPECT_EQ(asked_from(R"({"op":"stop"})")->operation, Operation::kStop);
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);
@@ -48,6 +59,9 @@ TEST(AskedFrom, RefusesEverythingElse) {
                            "[]",
                            "null",
                            R"({"op":"halt"})",
+                           R"({"op":"resume","id":"a","reason":"why not"})",
+                           R"({"op":"watch","id":"a","after":-1})",
+                           R"({"op":"show","id":"a","after":1})",
                            R"({"op":"submit"})",
                            R"({"op":"submit","task":1})",
                            R"({"op":"list","id":"a"})",

@@ -31,6 +31,10 @@ bool is_stopped(const link::State& state) {
   return state.safety == SafetyState::kProtectiveStop || state.safety == SafetyState::kEmergencyStop;
 }
 
+bool is_emergency(const link::State& state) {
+  return state.safety == SafetyState::kEmergencyStopping || state.safety == SafetyState::kEmergencyStop;
+}
+
 bool stands(const link::State& state) { return is_stopped(state) && state.stop_result == link::StopResult::kConfirmed; }
 
 cerebellum::Resumes resumes(const link::State& state) {
@@ -71,6 +75,8 @@ Expected<void> Arming::tick(Time now) {
 
 void Arming::note_changes(const link::State& state, Time now) {
   const bool operational = state.safety == SafetyState::kOperational && !yielding_;
+  if (is_emergency(state)) bridge_.emergency_stop(now, link::name(state.cause));
+  if (operational) bridge_.released(now);
   if (was_operational_ && !operational) {
     ++stops_;
     bridge_.note("stop", {{"state", link::name(state.safety)}, {"cause", link::name(state.cause)}}, now);

@@ -64,6 +64,11 @@ class Cell {
   // Nothing is held any longer: likewise.
   void holds_nothing();
 
+  // A skill that was halted may have left something on the cups that nobody knows of.
+  void let_go_of_unknown() {
+    if (!held && arm.state().vacuum_on != 0) arm.vacuum(false);
+  }
+
   // Has the belt wait, as long as it is called every tick.
   void hold_belt(Time now) { belt_held_ = now; }
   [[nodiscard]] bool holds_belt(Time now) const { return belt_held_ && now < *belt_held_ + kBeltHeldFor; }

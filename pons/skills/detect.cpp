@@ -1,6 +1,8 @@
 #include "pons/skills/detect.hpp"
 
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace pons::skills {
 namespace {
@@ -13,7 +15,8 @@ class Detect final : public task::Skill {
   Detect(Cell& cell, std::string code, Time until) : cell_(cell), code_(std::move(code)), until_(until) {}
 
   Progress tick(Time now) override {
-    if (cancelled_) return {Status::kFailed, "cancelled", {}};
+    if (stopped_) return stands({Status::kFailed, *stopped_});
+    if (paused_at_) return stands({Status::kPaused});
     if (const ObjectBelief* object = cell_.find(code_)) {
       const Vector3 p = object->world_from_top.translation();
       const auto& r = object->world_from_top.linear();
@@ -27,13 +30,27 @@ class Detect final : public task::Skill {
     return now < until_ ? Progress{} : Progress{Status::kFailed, "not seen", {}};
   }
 
-  void cancel(Time) override { cancelled_ = true; }
+  void pause(Time now, task::Pause) override {
+    if (!paused_at_) paused_at_ = now;
+  }
+  void resume(Time now) override {
+    if (paused_at_) until_ += now - *std::exchange(paused_at_, {});
+  }
+  void cancel(Time) override { stopped_ = "cancelled"; }
+  void halt(Time) override { stopped_ = "halted"; }
 
  private:
+  // It only looks.
+  static Progress stands(Progress progress) {
+    progress.stop = task::StopResult::kConfirmed;
+    return progress;
+  }
+
   Cell& cell_;
   std::string code_;
   Time until_;
-  bool cancelled_ = false;
+  std::optional<Time> paused_at_;
+  std::optional<std::string> stopped_;
 };
 
 }  // namespace
@@ -50,6 +67,7 @@ task::SkillType detect(Cell& cell) {
           .resources = {},
           .timeout = std::chrono::seconds(70),
           .attempts = 1,
+          .safe_points = {"at once"},
           .start = [&cell](const task::Json& arguments, Time now) {
             return std::make_unique<Detect>(cell, arguments.at("object").get<std::string>(),
                                             now + from_s(arguments.value("within_s", 5.0)));

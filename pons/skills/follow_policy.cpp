@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "pons/motion/chunks.hpp"
+#include "pons/skills/conduct.hpp"
 #include "pons/task/policy.hpp"
 
 namespace pons::skills {
@@ -23,7 +24,7 @@ constexpr Duration kSilence = std::chrono::seconds(10);   // then the policy is 
 constexpr Duration kLongestStream = std::chrono::seconds(600);
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
-class FollowPolicy final : public task::Skill, public task::ChunkStream {
+class FollowPolicy final : public ArmSkill, public task::ChunkStream {
  public:
   FollowPolicy(Cell& cell, task::Json arguments)
       : cell_(cell), arguments_(std::move(arguments)), number_(++cell.streams), for_(from_s(arguments_.at("seconds"))) {
@@ -63,6 +64,18 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     } else {
       finish(cancelled);
     }
+  }
+
+  // What comes in meanwhile is refused, as while the arm is stopped.
+  bool may_rest(Time, task::Pause) override {
+    if (ending_) return false;
+    break_off();
+    return true;
+  }
+  void go_on(Time now, Duration rested) override {
+    if (first_chunk_) *first_chunk_ += rested;
+    heard_ = now;
+    cell_.stream = this;  // another may have had the arm meanwhile
   }
 
   // ---- the stream ----
@@ -137,11 +150,16 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     return {};
   }
 
+  Progress stopped() {
+    if (path_ && !ending_ && whole()) finish(succeeded());
+    break_off();
+    return ending_ ? verdict_ : Progress{};
+  }
+
   // What was sent in before a stop must not move the arm after it, nor end the stream: who had said the last says the
   // rest again. So the numbers go on above all that can have been observed, but short of what nobody has seen executed:
   // within the action that was under way, and before the end.
-  Progress stopped() {
-    if (path_ && !ending_ && whole()) finish(succeeded());
+  void break_off() {
     if (path_) {
       const bool got_on = executed_ > oldest_ + kRounding;
       const double next = std::min(std::floor(executed_ + motion::kSameProgress) + 1, total_);
@@ -149,7 +167,6 @@ class FollowPolicy final : public task::Skill, public task::ChunkStream {
     }
     path_.reset();
     last_ = false;
-    return ending_ ? verdict_ : Progress{};
   }
 
   void finish(Progress verdict) {
@@ -212,24 +229,26 @@ task::SkillType follow_policy(Cell& cell, const std::vector<std::string>& polici
   const auto number = [](double least, double most) {
     return task::Json{{"type", "number"}, {"minimum", least}, {"maximum", most}};
   };
-  return {
-      .name = "follow_policy",
-      .summary = "Follow a policy that says, chunk after chunk, where the arm shall be",
-      .schema = {{"type", "object"},
-                 {"properties",
-                  {{"policy", {{"enum", names}}},
-                   {"seconds", number(0.1, to_s(kLongestStream))},
-                   {"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}},
-                   {"height_m", number(0.05, 0.5)},
-                   {"rate_hz", number(0.2, 50)},
-                   {"latency_s", number(0, 5)},
-                   {"first_latency_s", number(0, 9)}}},
-                 {"required", {"policy", "seconds"}},
-                 {"additionalProperties", false}},
-      .resources = {"arm"},
-      .timeout = kLongestStream + 2 * kSilence,
-      .attempts = 1,
-      .start = [&cell](const task::Json& arguments, Time) { return std::make_unique<FollowPolicy>(cell, arguments); }};
+  return {.name = "follow_policy",
+          .summary = "Follow a policy that says, chunk after chunk, where the arm shall be",
+          .schema = {{"type", "object"},
+                     {"properties",
+                      {{"policy", {{"enum", names}}},
+                       {"seconds", number(0.1, to_s(kLongestStream))},
+                       {"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}},
+                       {"height_m", number(0.05, 0.5)},
+                       {"rate_hz", number(0.2, 50)},
+                       {"latency_s", number(0, 5)},
+                       {"first_latency_s", number(0, 9)}}},
+                     {"required", {"policy", "seconds"}},
+                     {"additionalProperties", false}},
+          .resources = {"arm"},
+          .timeout = kLongestStream + 2 * kSilence,
+          .attempts = 1,
+          .safe_points = {"anywhere on the path"},
+          .start = [&cell](const task::Json& arguments, Time) {
+            return conduct(cell, std::make_unique<FollowPolicy>(cell, arguments));
+          }};
 }
 
 }  // namespace pons::skills

@@ -1,6 +1,7 @@
 #include "pons/skills/move_to.hpp"
 
 #include "pons/motion/line.hpp"
+#include "pons/skills/conduct.hpp"
 
 namespace pons::skills {
 namespace {
@@ -12,7 +13,7 @@ constexpr double kAbove_m = 0.15;
 constexpr Duration kSearchFor = std::chrono::milliseconds(1000);  // where one tick is too short to find a way
 constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 
-class MoveTo final : public task::Skill {
+class MoveTo final : public ArmSkill {
  public:
   MoveTo(Cell& cell, std::string place, std::string path)
       : cell_(cell), place_(std::move(place)), path_(std::move(path)), delay_(cell.arm) {}
@@ -20,9 +21,7 @@ class MoveTo final : public task::Skill {
   Progress tick(Time now) override {
     arrives_ += delay_.take();
     if (!cell_.arm.operational()) {
-      moving_ = false;
-      search_ = {};
-      since_.reset();
+      plan_anew();
       return cancelled_ ? Progress{Status::kFailed, "cancelled", {}} : Progress{};
     }
     if (moving_) {
@@ -48,7 +47,21 @@ class MoveTo final : public task::Skill {
     if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
   }
 
+  // What the cups hold nobody else could place.
+  bool may_rest(Time, task::Pause pause) override {
+    if (pause == task::Pause::kHandOver && cell_.held) return false;
+    plan_anew();
+    return true;
+  }
+  void go_on(Time, Duration) override {}
+
  private:
+  void plan_anew() {
+    moving_ = false;
+    search_ = {};
+    since_.reset();
+  }
+
   Expected<motion::Trajectory> plan(Time now) {
     if (path_ == kLine) return line(now);
     if (cell_.held) return cell_.carry(now, [&](const AxisVector& from) { return target(from); }, search_);
@@ -113,9 +126,10 @@ task::SkillType move_to(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
+          .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
           .start = [&cell](const task::Json& arguments, Time) {
-            return std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
-                                            arguments.value("path", std::string(kJoints)));
+            return conduct(cell, std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
+                                                          arguments.value("path", std::string(kJoints))));
           }};
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pons/core/gravity.hpp"
+#include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
 #include "pons/skills/set_down.hpp"
@@ -37,8 +37,6 @@ constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives 
 constexpr double kLifted_m_s2 = 5.0;
 constexpr double kLifted_m = 0.020;  // nothing below supports the load any more: the bellows stretch 12 mm at most
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
-constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
-constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
 constexpr double kRetreat_m = 0.08;
 constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups slide over what they touch
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
@@ -53,7 +51,7 @@ constexpr double kStops_m = 0.02;      // before where the belt waits, and so fa
 constexpr double kWaitOver_m = 0.06;   // the others, which pass below
 constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
 
-class Pick final : public task::Skill {
+class Pick final : public ArmSkill {
  public:
   Pick(Cell& cell, std::string code, Time now)
       : cell_(cell),
@@ -104,6 +102,21 @@ class Pick final : public task::Skill {
     } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
     }
+  }
+
+  // Until the cups set out for the last of the way down; from there on the parcel is taken first.
+  bool may_rest(Time now, task::Pause) override {
+    const bool on_the_way = phase_ == Phase::kApproach && now + kNoReplanBefore < grasp_.hover;
+    if (stopped_ || (phase_ != Phase::kFind && !on_the_way) || cell_.held) return false;
+    phase_ = Phase::kFind;
+    search_ = {};
+    waiting_ = aside_ = false;
+    return true;
+  }
+  void go_on(Time now, Duration) override {
+    seen_ = now;
+    tried_.reset();
+    blocked_since_.reset();
   }
 
  private:
@@ -380,7 +393,7 @@ class Pick final : public task::Skill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
-    const bool lopsided = weighed && hangs_beside(*weighed);
+    const bool lopsided = weighed && hangs_beside(cell_.held->load, *weighed);
     if ((!weighed || heavy || lopsided) && !at_rest) return {};
     if (target_.crowded && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
@@ -395,15 +408,6 @@ class Pick final : public task::Skill {
       return begin_put_back(now, {Status::kRetry, "another hangs on it: its weight is felt beside it", {}});
     }
     return success(now);
-  }
-
-  // No parcel is so uneven that its weight hangs near its edge or beyond: then another came along.
-  [[nodiscard]] bool hangs_beside(const Weight& weight) const {
-    const Load& load = cell_.held->load;
-    const Eigen::Vector2d beside =
-        Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
-    const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
-    return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
   }
 
   // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along. What
@@ -487,8 +491,9 @@ task::SkillType pick(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(20),
           .attempts = 4,
+          .safe_points = {"before the last of the way down", "with the parcel weighed, which its task keeps"},
           .start = [&cell](const task::Json& arguments, Time now) {
-            return std::make_unique<Pick>(cell, arguments.at("object").get<std::string>(), now);
+            return conduct(cell, std::make_unique<Pick>(cell, arguments.at("object").get<std::string>(), now));
           }};
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pons/core/gravity.hpp"
+#include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
 #include "pons/world/mouth.hpp"
@@ -42,7 +43,7 @@ constexpr double kGoneShare = 0.4;                                    // of the 
 constexpr double kGoneLeast_kg = 0.08;
 constexpr double kMiddle = 0.15;  // of the mouth, from its centre
 
-class Place final : public task::Skill {
+class Place final : public ArmSkill {
  public:
   Place(Cell& cell, std::string name, std::string object, Time now)
       : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now), delay_(cell.arm) {}
@@ -52,8 +53,7 @@ class Place final : public task::Skill {
     if (!let_go_.empty() && !cell_.held) return gone(now);
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
-      phase_ = Phase::kPlan;
-      search_ = {};
+      plan_anew();
       return cancelled_ ? Progress{Status::kFailed, "cancelled; still held", {}} : Progress{};
     }
     switch (phase_) {
@@ -76,8 +76,24 @@ class Place final : public task::Skill {
     phase_ = Phase::kHold;
   }
 
+  // With the parcel on the cups, the arm is nobody else's; over the mouth it is let go of first.
+  bool may_rest(Time, task::Pause pause) override {
+    if (pause == task::Pause::kHandOver || (phase_ != Phase::kPlan && phase_ != Phase::kCarry)) return false;
+    plan_anew();
+    return true;
+  }
+  void go_on(Time, Duration) override {
+    tried_.reset();
+    blocked_since_.reset();
+  }
+
  private:
   enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kHold };
+
+  void plan_anew() {
+    phase_ = Phase::kPlan;
+    search_ = {};
+  }
 
   void move_along(Duration later) {
     arrives_ += later;
@@ -286,9 +302,11 @@ task::SkillType place(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 3,
+          .safe_points =
+              {"anywhere on the way, with the parcel on the cups; nobody else gets the arm before it is let go of"},
           .start = [&cell](const task::Json& arguments, Time now) {
-            return std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),
-                                           arguments.value("object", std::string{}), now);
+            return conduct(cell, std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),
+                                                         arguments.value("object", std::string{}), now));
           }};
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 
 namespace pons::skills {
@@ -28,7 +29,7 @@ constexpr Duration kSettleWithin = std::chrono::milliseconds(1500);  // and from
 constexpr Duration kSteady = std::chrono::milliseconds(300);         // within the tolerance, before it counts
 constexpr double kRise_m = 0.08;
 
-class Press final : public task::Skill {
+class Press final : public ArmSkill {
  public:
   Press(Cell& cell, std::string place, double force_n, Duration hold)
       : cell_(cell), place_(std::move(place)), force_n_(force_n), hold_(hold) {}
@@ -60,6 +61,16 @@ class Press final : public task::Skill {
     if (phase_ == Phase::kGo && cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
     if (phase_ != Phase::kRise) begin_rise({Status::kFailed, "cancelled", {}});
   }
+
+  // Not in the middle of pressing.
+  bool may_rest(Time, task::Pause) override {
+    if (phase_ != Phase::kStart && phase_ != Phase::kGo) return false;
+    if (cell_.arm.state().controller != link::Controller::kTracking || asked_) return false;
+    phase_ = Phase::kStart;
+    known_.reset();
+    return true;
+  }
+  void go_on(Time, Duration) override {}
 
  private:
   enum class Phase : std::uint8_t { kStart, kGo, kFeel, kHold, kRise };
@@ -106,6 +117,7 @@ class Press final : public task::Skill {
     compliance.force_max_n = kForceMax_n;
     cell_.arm.expect_contact(force_n_ + kMargin_n);
     cell_.arm.control(link::Controller::kAdmittance, compliance);
+    asked_ = true;
     return {};
   }
 
@@ -177,6 +189,7 @@ class Press final : public task::Skill {
   std::optional<Time> touched_, steady_since_;
   double least_n_ = 0, most_n_ = 0;
   Progress verdict_;
+  bool asked_ = false;  // for the law to press by
   bool rising_ = false, stopped_ = false, cancelled_ = false;
 };
 
@@ -195,10 +208,11 @@ task::SkillType press(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(30),
           .attempts = 2,
+          .safe_points = {"on the way there", "risen again"},
           .start = [&cell](const task::Json& arguments, Time) {
-            return std::make_unique<Press>(cell, arguments.at("place").get<std::string>(),
-                                           arguments.at("force_n").get<double>(),
-                                           from_s(arguments.at("seconds").get<double>()));
+            return conduct(cell, std::make_unique<Press>(cell, arguments.at("place").get<std::string>(),
+                                                         arguments.at("force_n").get<double>(),
+                                                         from_s(arguments.at("seconds").get<double>())));
           }};
 }
 

@@ -19,6 +19,7 @@ void Rest::tick(Time now) {
     return;
   }
   // What a skill that was broken off left behind.
+  cell_.let_go_of_unknown();
   cell_.arm.expect_contact(0);
   if (cell_.arm.state().controller != link::Controller::kTracking) {
     if (now > cell_.arm.motion_end()) cell_.arm.control(link::Controller::kTracking);

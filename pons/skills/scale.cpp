@@ -15,6 +15,8 @@ constexpr double kSwing_s_per_root_kg = 0.08;
 constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
+constexpr double kNearEdge = 0.75;  // of the way from the middle to an edge
+constexpr double kFelt_nm = 0.4;    // a moment below that the cups bear easily
 
 // What pulls the wrist down.
 double pull_n(Cell& cell) {
@@ -40,6 +42,13 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr double kLightest_kg = 0.01;
 
 }  // namespace
+
+bool hangs_beside(const Load& load, const Weight& weight) {
+  const Eigen::Vector2d beside =
+      Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
+  const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
+  return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
+}
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }
 

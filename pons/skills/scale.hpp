@@ -14,6 +14,10 @@ struct Weight {
   Eigen::Vector2d beside_tip_m{0, 0};  // of its centre of mass, tip frame: how far from the tip's axis
 };
 
+// Whether so much of it hangs near the load's edge or beyond that it cannot be the load's alone: no parcel is that
+// uneven, so another came along.
+[[nodiscard]] bool hangs_beside(const Load& load, const Weight& weight);
+
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same
 // swing, tells where it hangs.

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "pons/skills/conduct.hpp"
 
 namespace pons::skills {
 namespace {
@@ -28,7 +31,7 @@ link::Compliance springs(double stiffness_n_m) {
   return compliance;
 }
 
-class Yield final : public task::Skill {
+class Yield final : public ArmSkill {
  public:
   Yield(Cell& cell, Duration hold, double stiffness_n_m) : cell_(cell), hold_(hold), stiffness_n_m_(stiffness_n_m) {}
 
@@ -53,6 +56,22 @@ class Yield final : public task::Skill {
     cancelled_ = true;
     cell_.arm.control(link::Controller::kTracking);  // also when the change to springs is still on its way
     phase_ = Phase::kHold;
+  }
+
+  // Stiff again; what is left of the time comes later.
+  bool may_rest(Time now, task::Pause) override {
+    if (phase_ == Phase::kHold && !stiff_from_) return false;  // it ends
+    if (!stiff_from_) {
+      if (phase_ == Phase::kYield) hold_ = std::max(Duration{0}, hold_ - (now - began_));
+      cell_.arm.control(link::Controller::kTracking);  // also when the change to springs is still on its way
+      phase_ = Phase::kHold;
+      stiff_from_ = now + kRested;
+    }
+    return now >= *stiff_from_ && cell_.arm.state().controller == link::Controller::kTracking;
+  }
+  void go_on(Time, Duration) override {
+    stiff_from_.reset();
+    phase_ = Phase::kRest;
   }
 
  private:
@@ -89,6 +108,7 @@ class Yield final : public task::Skill {
       return {};
     }
     if (cancelled_) return end({Status::kFailed, "cancelled", {}});
+    if (stiff_from_) return {};
     const double moved_m = (tip() - held_at_).norm();
     return end({Status::kSucceeded, {}, {{"most_m", most_m_}, {"moved_m", moved_m}}});
   }
@@ -105,6 +125,7 @@ class Yield final : public task::Skill {
   Time began_;
   Vector3 held_at_ = Vector3::Zero();
   double most_m_ = 0;
+  std::optional<Time> stiff_from_;  // a pause was asked for: by then the arm has left its springs
   bool stopped_ = false, cancelled_ = false;
 };
 
@@ -122,9 +143,10 @@ task::SkillType yield(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(70),
           .attempts = 2,
+          .safe_points = {"anywhere, stiff"},
           .start = [&cell](const task::Json& arguments, Time) {
-            return std::make_unique<Yield>(cell, from_s(arguments.at("seconds").get<double>()),
-                                           arguments.value("stiffness_n_m", kStiffness_n_m));
+            return conduct(cell, std::make_unique<Yield>(cell, from_s(arguments.at("seconds").get<double>()),
+                                                         arguments.value("stiffness_n_m", kStiffness_n_m)));
           }};
 }
 

@@ -8,6 +8,8 @@ std::string_view name(Status status) {
   switch (status) {
     case Status::kRunning:
       return "running";
+    case Status::kPaused:
+      return "paused";
     case Status::kSucceeded:
       return "succeeded";
     case Status::kRetry:
@@ -16,6 +18,18 @@ std::string_view name(Status status) {
       return "failed";
     case Status::kException:
       return "exception";
+  }
+  return "unknown";
+}
+
+std::string_view name(StopResult result) {
+  switch (result) {
+    case StopResult::kConfirmed:
+      return "CONFIRMED";
+    case StopResult::kUncertain:
+      return "UNCERTAIN";
+    case StopResult::kFailed:
+      return "FAILED";
   }
   return "unknown";
 }

@@ -17,11 +17,12 @@
 namespace pons::world {
 namespace {
 
-constexpr double kReach = 100;        // m
-constexpr double kMaxSeconds = 3600;  // of a period, a phase, a latency
-constexpr double kMaxMass = 1000;     // kg
-constexpr double kMaxBeltRamp = 50;   // m/s²
-constexpr double kSlowest = 0.05;     // share of the speed limits: slower, nothing gets anywhere
+constexpr double kReach = 100;         // m
+constexpr double kMaxSeconds = 3600;   // of a period, a phase, a latency
+constexpr int kNobodysPriority = 101;  // a task has 100 at most
+constexpr double kMaxMass = 1000;      // kg
+constexpr double kMaxBeltRamp = 50;    // m/s²
+constexpr double kSlowest = 0.05;      // share of the speed limits: slower, nothing gets anywhere
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -154,6 +155,20 @@ std::vector<Resource> read_resources(const YamlValue& value) {
   return resources;
 }
 
+Schedule read_schedule(const YamlValue& value) {
+  const YamlMap map(value, {}, {"ageing_s", "urgent_priority", "on_emergency_stop"});
+  Schedule schedule;
+  if (map.has("ageing_s")) schedule.ageing = from_s(map["ageing_s"].number(1, kMaxSeconds));
+  if (map.has("urgent_priority")) schedule.urgent_priority = map["urgent_priority"].integer(1, kNobodysPriority);
+  if (map.has("on_emergency_stop")) {
+    const std::string word = map["on_emergency_stop"].name();
+    if (word != "hold" && word != "cancel")
+      map["on_emergency_stop"].refuse(fmt::format("is '{}'", word), "write hold or cancel");
+    if (word == "cancel") schedule.on_emergency_stop = OnEmergencyStop::kCancel;
+  }
+  return schedule;
+}
+
 Zone read_zone(const YamlMap& map) {
   Zone zone;
   zone.center_m = map["center"].vector(kReach);
@@ -240,7 +255,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   const YamlMap map(
       read_yaml(folder / "world.yaml"),
       {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"zones"});
+      {"schedule", "zones"});
   World world;
   world.name = name;
   world.folder = folder;
@@ -251,6 +266,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.places = read_places(map["places"]);
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   world.resources = read_resources(map["resources"]);
+  if (map.has("schedule")) world.schedule = read_schedule(map["schedule"]);
   if (map.has("zones")) world.zones = read_zones(map["zones"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);

@@ -13,6 +13,7 @@
 #include "pons/core/error.hpp"
 #include "pons/core/image.hpp"
 #include "pons/core/pose.hpp"
+#include "pons/core/time.hpp"
 
 namespace pons::world {
 
@@ -130,6 +131,19 @@ struct Resource {
   std::string name;  // "arm"
 };
 
+// What becomes of accepted tasks when an emergency stop comes.
+enum class OnEmergencyStop : std::uint8_t {
+  kHold,    // they wait, and go on when the robot is armed again
+  kCancel,  // all end as CANCELLED
+};
+
+// Who goes first.
+struct Schedule {
+  Duration ageing = std::chrono::seconds(30);  // a task that has waited so long counts one priority more, and so on
+  int urgent_priority = 95;                    // from here on a task makes running ones that count less give way
+  OnEmergencyStop on_emergency_stop = OnEmergencyStop::kHold;
+};
+
 struct World {
   std::string name;
   std::filesystem::path folder;
@@ -140,6 +154,7 @@ struct World {
   std::vector<Place> places;
   std::vector<CameraSpec> cameras;
   std::vector<Resource> resources;
+  Schedule schedule;
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;
   Rules rules;

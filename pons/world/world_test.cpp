@@ -251,6 +251,24 @@ TEST_F(BrokenWorld, ZonesAreTheFilesOrNone) {
   EXPECT_TRUE(none->zones.empty());
 }
 
+TEST_F(BrokenWorld, TheScheduleIsTheFilesOrElseTheUsualOne) {
+  const auto usual = load_text(text_);
+  ASSERT_TRUE(usual) << usual.error().line();
+  EXPECT_EQ(usual->schedule.ageing, std::chrono::seconds(30));
+  EXPECT_EQ(usual->schedule.urgent_priority, 95);
+  EXPECT_EQ(usual->schedule.on_emergency_stop, OnEmergencyStop::kHold);
+  const auto put = [&](const std::string& keys) { return text_ + "\nschedule: {" + keys + "}\n"; };
+  const auto own = load_text(put("ageing_s: 2.5, urgent_priority: 101, on_emergency_stop: cancel"));
+  ASSERT_TRUE(own) << own.error().line();
+  EXPECT_EQ(own->schedule.ageing, std::chrono::milliseconds(2500));
+  EXPECT_EQ(own->schedule.urgent_priority, 101);
+  EXPECT_EQ(own->schedule.on_emergency_stop, OnEmergencyStop::kCancel);
+  EXPECT_THAT(error(put("ageing_s: 0")), HasSubstr("schedule.ageing_s: 0 is out of range"));
+  EXPECT_THAT(error(put("urgent_priority: 0")), HasSubstr("schedule.urgent_priority: '0' is not possible"));
+  EXPECT_THAT(error(put("on_emergency_stop: panic")), HasSubstr("is 'panic'; write hold or cancel"));
+  EXPECT_THAT(error(put("fifo: yes")), HasSubstr("schedule.fifo: unknown key"));
+}
+
 TEST_F(BrokenWorld, RefusesImpossibleZones) {
   EXPECT_THAT(changed("slow: 0.3", "slow: 0"), HasSubstr("zones[0].slow"));
   EXPECT_THAT(changed("slow: 0.3", "slow: 1.5"), HasSubstr("zones[0].slow"));

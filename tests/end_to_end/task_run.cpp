@@ -1,9 +1,13 @@
 #include "tests/end_to_end/task_run.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <utility>
+
+#include "pons/runner/ending.hpp"
 
 namespace pons::tests {
 namespace {
@@ -21,8 +25,9 @@ void put_in(const fs::path& file, const std::string& before, const std::string& 
 }  // namespace
 
 world::World small_cell_with_block(const std::string& robot_lines) {
-  const fs::path worlds = fs::path(testing::TempDir()) /
-                          (testing::UnitTest::GetInstance()->current_test_info()->name() + std::string("_worlds"));
+  std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+  std::ranges::replace(name, '/', '_');  // of a test with a parameter
+  const fs::path worlds = fs::path(testing::TempDir()) / (name + "_worlds");
   fs::remove_all(worlds);
   fs::copy(PONS_WORLDS_SOURCE, worlds, fs::copy_options::recursive);
   put_in(worlds / "small_cell" / "world.yaml", "  - {name: tray, kind: tray",
@@ -35,35 +40,59 @@ world::World small_cell_with_block(const std::string& robot_lines) {
   return std::move(*world);
 }
 
-TaskRun::TaskRun(world::World world)
+TaskRun::TaskRun(world::World world, std::int64_t parcels, std::uint64_t seed)
     : world_(std::move(world)),
-      cell_(
-          apps::Assembly::build(world_, world::draw_manifest(world_, 1, 1).value(), {.journal = ":memory:"}).value()) {}
+      cell_(apps::Assembly::build(world_, world::draw_manifest(world_, parcels, seed).value(),
+                                  {.journal = ":memory:", .body = {.seed = seed}})
+                .value()),
+      parts_(cell_->parts()) {}
+
+void TaskRun::step() {
+  now_ += runner::kControlPeriod;
+  parts_.body.plant.advance(now_);
+  parts_.body.plant.body->read(sensors_);
+  parts_.body.photographer->open_shutters(now_, sensors_);
+  cell_->body->cerebellum->step(now_, sensors_, *parts_.body.link, set_points_);
+  parts_.body.plant.body->write(set_points_);
+  if (now_.ns() % runner::kBridgePeriod.count() != 0) return;
+  const auto ticked = parts_.bridge_side->tick(now_, *parts_.observer);
+  ASSERT_TRUE(ticked) << ticked.error().line();
+}
 
 void TaskRun::run(const std::string& skill, const std::string& arguments, const std::function<void(Time)>& each_tick) {
-  ASSERT_TRUE(cell_->above->bridge->submit(
-      R"({"id":"one","steps":[{"skill":")" + skill + R"(","arguments":)" + arguments + "}]}", Time{}));
-  runner::Parts parts = cell_->parts();
-  body::Sensors sensors;
-  body::SetPoints set_points;
-  for (Time now = Time(runner::kControlPeriod); now < Time(from_s(40)); now += runner::kControlPeriod) {
-    parts.body.plant.advance(now);
-    parts.body.plant.body->read(sensors);
-    parts.body.photographer->open_shutters(now, sensors);
-    cell_->body->cerebellum->step(now, sensors, *parts.body.link, set_points);
-    parts.body.plant.body->write(set_points);
-    each_tick(now);
-    if (now.ns() % runner::kBridgePeriod.count() != 0) continue;
-    const auto ticked = parts.bridge_side->tick(now, *parts.observer);
-    ASSERT_TRUE(ticked) << ticked.error().line();
-    const auto task = cell_->above->journal->task("one");
-    ASSERT_TRUE(task && *task);
-    if (const auto& ended = (*task)->record.outcome) {
-      outcome = ended->outcome;
-      reason = ended->reason;
-      return;
-    }
+  ASSERT_TRUE(
+      bridge().submit(R"({"id":"one","steps":[{"skill":")" + skill + R"(","arguments":)" + arguments + "}]}", now_));
+  await("one", from_s(40), each_tick);
+}
+
+void TaskRun::await(const std::string& id, Duration longest, const std::function<void(Time)>& each_tick) {
+  const Time end = now_ + longest;
+  while (now_ < end && !testing::Test::HasFatalFailure()) {
+    step();
+    each_tick(now_);
+    if (now_.ns() % runner::kBridgePeriod.count() != 0) continue;
+    const auto task = journal().task(id);
+    ASSERT_TRUE(task) << task.error().line();
+    if (!*task || !(*task)->record.outcome) continue;
+    const bridge::OutcomeRecord& ended = *(*task)->record.outcome;
+    outcome = ended.outcome;
+    reason = ended.reason;
+    detail = ended.detail;
+    return;
   }
+  FAIL() << id << " has no outcome after " << to_s(longest) << " s";
+}
+
+bool TaskRun::finish(const std::function<void(Time)>& each_tick) {
+  const runner::Watch watch{.limit = now_ + std::chrono::minutes(10)};
+  runner::Ending ending(watch, *parts_.bridge_side);
+  do {
+    step();
+    each_tick(now_);
+    if (testing::Test::HasFatalFailure()) return false;
+  } while (now_.ns() % runner::kBridgePeriod.count() != 0 || !ending.check(now_, parts_.body.plant.finished()));
+  parts_.bridge_side->close(now_);
+  return !ending.broken_off();
 }
 
 }  // namespace pons::tests

@@ -77,6 +77,42 @@ TEST_F(Visitor, ReadsTheStoryOfAParcel) {
   EXPECT_THAT(unknown.err, HasSubstr("nothing is known of 'P9'"));
 }
 
+TEST_F(Visitor, TellsATaskWhatToDoAndHearsWhatCameOfIt) {
+  const auto task = [&](const std::vector<std::string>& words) {
+    std::vector<std::string> line{"task"};
+    line.insert(line.end(), words.begin(), words.end());
+    line.insert(line.end(), {"--socket", folder_ / "s"});
+    return run_pons(line);
+  };
+  during_a_run([&] {
+    const char* const steps = R"("steps":[{"skill":"detect","arguments":{"object":"nobody","within_s":60}}])";
+    EXPECT_EQ(submit(fmt::format(R"({{"id":"lookout",{}}})", steps)).code, 0);
+    const Finished paused = task({"pause", "lookout", "--reason", "lunch"});
+    EXPECT_EQ(paused.code, 0) << paused.err;
+    EXPECT_THAT(paused.out, AllOf(HasSubstr("pausing       lunch"), HasSubstr("paused        standstill CONFIRMED")));
+    const Finished resumed = task({"resume", "lookout"});
+    EXPECT_EQ(resumed.code, 0) << resumed.err;
+    EXPECT_THAT(resumed.out, HasSubstr("continued"));
+    EXPECT_EQ(task({"resume", "lookout"}).code, 2);
+    const Finished cancelled = task({"cancel", "lookout"});
+    EXPECT_EQ(cancelled.code, 0) << cancelled.err;
+    EXPECT_THAT(cancelled.out, HasSubstr("CANCELLED: asked for over the socket (cancelled); standstill CONFIRMED"));
+    const Finished late = task({"halt", "lookout"});
+    EXPECT_EQ(late.code, 2);
+    EXPECT_THAT(late.err, HasSubstr("there is no open task 'lookout'"));
+    const Finished watched = task({"watch", "lookout"});
+    EXPECT_EQ(watched.code, 0) << watched.err;
+    EXPECT_THAT(watched.out, AllOf(HasSubstr("accepted"), HasSubstr("paused"), HasSubstr("CANCELLED")));
+    EXPECT_THAT(task({"watch", "P9"}).err, HasSubstr("nothing is known of 'P9'"));
+    EXPECT_EQ(submit(fmt::format(R"({{"id":"again",{}}})", steps)).code, 0);
+    const Finished halted = task({"halt", "again", "--no-wait"});
+    EXPECT_EQ(halted.code, 0) << halted.err;
+    EXPECT_EQ(halted.out, "");
+  });
+  EXPECT_THAT(show("again").out, HasSubstr("CANCELLED  asked for over the socket (halted)"));
+  EXPECT_EQ(report_["parcels"]["lost"], 0);
+}
+
 TEST_F(Visitor, ChecksAndShortensTheJournalAfterwards) {
   during_a_run([] {});
   const auto journal = [&](const std::vector<std::string>& words) {
@@ -178,10 +214,16 @@ TEST_F(Visitor, StopsResetsAndArmsTheArm) {
     EXPECT_THAT(robot("reset").out, AllOf(HasSubstr("disarmed"), HasSubstr("a person who arms it")));
     EXPECT_THAT(robot("arm").out, HasSubstr("operational"));
 
+    EXPECT_EQ(submit(R"({"id":"lookout","steps":[{"skill":"detect","arguments":{"object":"x","within_s":60}}]})").code,
+              0);
     EXPECT_THAT(robot("stop", {"--emergency"}).out, AllOf(HasSubstr("emergency stop"), HasSubstr("epoch       2")));
     EXPECT_THAT(robot("reset").out, HasSubstr("disarmed"));
     EXPECT_THAT(robot("arm").out, HasSubstr("operational"));
+    // Whoever has a task hears of it.
+    EXPECT_EQ(run_pons({"task", "cancel", "lookout", "--socket", folder_ / "s"}).code, 0);
   });
+  EXPECT_THAT(run_pons({"task", "history", "lookout", "--journal", folder_ / "j.db"}).out,
+              AllOf(HasSubstr("held          stopped: emergency stop raised"), HasSubstr("released")));
   EXPECT_EQ(report_["parcels"]["lost"], 0) << report_.dump(2);
   EXPECT_EQ(report_["parcels"]["missorted"], 0);
   EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "nothing has ridden by";

@@ -121,11 +121,11 @@ Expected<void> Journal::Impl::prepare(Database::Mode mode) {
       {&one_task, tasks + "AND a.task = ?1"},
       {&events_of_task, events + "WHERE task = ?1 AND kind NOT IN ('accepted', 'ended') ORDER BY sequence"},
       {&notes, events + "WHERE task = '' ORDER BY sequence"},
-      {&events_of_order,
-       events + "WHERE ?1 <> '' AND sequence IN (SELECT sequence FROM event WHERE order_id = ?1 AND order_id <> '' "
-                "UNION SELECT e.sequence FROM event a JOIN event e ON e.task = a.task "
-                "WHERE a.order_id = ?1 AND a.order_id <> '' AND a.kind = 'accepted' "
-                "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
+      {&events_of_order, events + "WHERE ?1 <> '' AND sequence > ?2 AND sequence IN (SELECT sequence FROM event WHERE "
+                                  "order_id = ?1 AND order_id <> '' "
+                                  "UNION SELECT e.sequence FROM event a JOIN event e ON e.task = a.task "
+                                  "WHERE a.order_id = ?1 AND a.order_id <> '' AND a.kind = 'accepted' "
+                                  "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
       {&every_event, events + "ORDER BY task, sequence"},
       {&count,
        "SELECT (SELECT count(*) FROM event WHERE kind = 'accepted'), (SELECT count(*) FROM event), "
@@ -414,8 +414,8 @@ Expected<std::optional<TaskHistory>> Journal::task(std::string_view id) const {
 
 Expected<std::vector<Event>> Journal::notes() const { return impl_->all_of(impl_->notes); }
 
-Expected<std::vector<Event>> Journal::history(std::string_view order) const {
-  return impl_->all_of(impl_->events_of_order.bind(order));
+Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64_t after) const {
+  return impl_->all_of(impl_->events_of_order.bind(order).bind(after));
 }
 
 Expected<void> Journal::each_event(const std::function<Expected<void>(const Event&)>& take) const {

@@ -116,8 +116,9 @@ class Journal {
   [[nodiscard]] Expected<std::optional<TaskHistory>> task(std::string_view id) const;
   // Those of no task.
   [[nodiscard]] Expected<std::vector<Event>> notes() const;
-  // All that belongs to an order, of whatever task or of none; a task's own id will do as well.
-  [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order) const;
+  // All that belongs to an order, of whatever task or of none, written after that sequence; a task's own id will do as
+  // well.
+  [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order, std::int64_t after = 0) const;
   // Every event, task by task in the order of their ids, those of no task first. Stops at the first error of `take`.
   [[nodiscard]] Expected<void> each_event(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<Counts> counts() const;

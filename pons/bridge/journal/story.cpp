@@ -26,8 +26,10 @@ std::size_t step_of(const Event& event) {
 }  // namespace
 
 bool tells_state(std::string_view kind) {
-  constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent, kAttemptEvent,   kAttemptEndedEvent,
-                              kCancellingEvent, kResumedEvent, kFoundDoneEvent, kEndedEvent};
+  constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent,   kAttemptEvent,   kAttemptEndedEvent,
+                              kCancellingEvent, kHaltingEvent,   kPausingEvent,   kPausedEvent,
+                              kPreemptingEvent, kPreemptedEvent, kContinuedEvent, kHeldEvent,
+                              kReleasedEvent,   kResumedEvent,   kFoundDoneEvent, kEndedEvent};
   return std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
@@ -47,7 +49,11 @@ Expected<void> Story::take(const Event& event) {
   if (event.kind == kAttemptEndedEvent) taken = take_attempt_end(event);
   if (event.kind == kFoundDoneEvent) taken = take_found_done(event);
   if (event.kind == kEndedEvent) taken = take_end(event);
-  if (event.kind == kCancellingEvent && !started_) taken = impossible(event, "comes before it was started");
+  const bool of_running = event.kind == kCancellingEvent || event.kind == kHaltingEvent ||
+                          event.kind == kPreemptingEvent || event.kind == kPreemptedEvent;
+  if (of_running && !started_) taken = impossible(event, "comes before it was started");
+  if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = true;
+  if (event.kind == kContinuedEvent) paused_ = false;
   // What the bridge before was at, nobody saw end.
   if (event.kind == kResumedEvent) trying_.reset();
   if (!taken) return taken;

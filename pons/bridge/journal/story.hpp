@@ -13,6 +13,14 @@ namespace pons::bridge {
 inline constexpr std::string_view kAttemptEvent = "attempt";             // {"step","skill","attempt"}: a skill starts
 inline constexpr std::string_view kAttemptEndedEvent = "attempt_ended";  // and {"status","reason","detail"}
 inline constexpr std::string_view kCancellingEvent = "cancelling";       // {"reason"}
+inline constexpr std::string_view kHaltingEvent = "halting";             // {"reason"}
+inline constexpr std::string_view kPausingEvent = "pausing";             // {"reason"}: on its way to a safe point
+inline constexpr std::string_view kPausedEvent = "paused";               // {"stop"}, of one that has begun
+inline constexpr std::string_view kPreemptingEvent = "preempting";       // {"by"}: likewise, for that task
+inline constexpr std::string_view kPreemptedEvent = "preempted";         // {"stop"}: and waits again
+inline constexpr std::string_view kContinuedEvent = "continued";         // after either
+inline constexpr std::string_view kHeldEvent = "held";                   // {"cause"}: an emergency stop has come,
+inline constexpr std::string_view kReleasedEvent = "released";           // and is over
 inline constexpr std::string_view kResumedEvent = "resumed";  // {"step"}: another bridge goes on, with this step
 // {"step"}: nobody saw this step end, but the world shows that it had succeeded.
 inline constexpr std::string_view kFoundDoneEvent = "found_done";
@@ -29,6 +37,7 @@ class Story {
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] bool ended() const { return ended_; }
+  [[nodiscard]] bool paused() const { return paused_; }  // as far as it was asked for
   // So many of its first steps have succeeded.
   [[nodiscard]] std::size_t done() const { return done_; }
 
@@ -44,7 +53,7 @@ class Story {
   std::optional<std::size_t> trying_;  // the step whose skill runs
   std::int64_t sequence_ = 0, run_ = 0;
   Time stamp_;
-  bool accepted_ = false, started_ = false, ended_ = false;
+  bool accepted_ = false, started_ = false, paused_ = false, ended_ = false;
 };
 
 // Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and

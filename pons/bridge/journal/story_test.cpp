@@ -59,6 +59,23 @@ TEST_F(StoryTest, NothingIsDoneTwice) {
   EXPECT_NE(event("odd").find("after its outcome"), std::string::npos);
 }
 
+TEST_F(StoryTest, KnowsWhetherItIsPaused) {
+  EXPECT_EQ(event(kPausedEvent), "") << "in the queue";
+  EXPECT_TRUE(story_.paused());
+  EXPECT_EQ(event(kContinuedEvent), "");
+  EXPECT_FALSE(story_.paused());
+  EXPECT_NE(event(kPreemptingEvent).find("before it was started"), std::string::npos);
+  EXPECT_NE(event(kHaltingEvent).find("before it was started"), std::string::npos);
+  EXPECT_EQ(event(kStartedEvent), "");
+  EXPECT_EQ(attempt(0), "");
+  EXPECT_EQ(event(kPreemptingEvent), "");
+  EXPECT_EQ(event(kPreemptedEvent), "");
+  EXPECT_FALSE(story_.paused()) << "it goes on by itself";
+  EXPECT_EQ(event(kPausingEvent), "");
+  EXPECT_TRUE(story_.paused()) << "from when it was asked for";
+  EXPECT_EQ(attempt_ended(0, task::Status::kSucceeded), "");
+}
+
 TEST_F(StoryTest, NothingIsClaimedThatDidNotHappen) {
   EXPECT_NE(attempt(0).find("before it was started"), std::string::npos);
   EXPECT_EQ(event(kStartedEvent), "");

@@ -1,15 +1,18 @@
 #include "pons/bridge/schedule/arbiter.hpp"
 
+#include <algorithm>
 #include <cassert>
+#include <utility>
 
 namespace pons::bridge {
 namespace {
 
 constexpr Time kNever{Duration::max()};
+constexpr int kAged = Arbiter::kFirst - 1;  // above what any brain may ask for
 
 }  // namespace
 
-Arbiter::Arbiter(const std::vector<std::string>& resources) {
+Arbiter::Arbiter(const std::vector<std::string>& resources, const world::Schedule& schedule) : schedule_(schedule) {
   assert(resources.size() <= kMaxResources);
   for (const std::string& name : resources) {
     [[maybe_unused]] const bool added = bits_.emplace(name, bits_.size()).second;
@@ -17,39 +20,124 @@ Arbiter::Arbiter(const std::vector<std::string>& resources) {
   }
 }
 
-bool Arbiter::knows(std::string_view resource) const { return bits_.find(resource) != bits_.end(); }
+// ---- the queue ----
 
-void Arbiter::add(std::string id, int priority, std::optional<Time> deadline,
-                  const std::vector<std::string>& resources) {
-  assert(rank_of_.find(id) == rank_of_.end() && running_.find(id) == running_.end());
-  Mask needs = 0;
-  for (const std::string& name : resources) {
+void Arbiter::add(const Claim& claim) {
+  assert(waiting_.find(claim.id) == waiting_.end() && running_.find(claim.id) == running_.end());
+  Entry& entry = waiting_[claim.id];
+  entry.claim = claim;
+  entry.number = added_++;
+  for (const std::string& name : claim.resources) {
     const auto bit = bits_.find(name);
     assert(bit != bits_.end());
-    needs |= Mask{1} << bit->second;
+    entry.needs |= Mask{1} << bit->second;
   }
-  const Rank rank(-priority, deadline.value_or(kNever), accepted_++);
-  if (deadline) deadlines_.emplace(*deadline, rank);
-  rank_of_.emplace(id, rank);
-  queue_.emplace(rank, Entry{std::move(id), needs});
+  wait(entry);
+}
+
+bool Arbiter::remove(std::string_view id) {
+  const auto found = waiting_.find(id);
+  if (found == waiting_.end()) return false;
+  wait_no_more(found->second);
+  waiting_.erase(found);
+  return true;
+}
+
+// What it counts for now, and when for more.
+void Arbiter::take_rank(Entry& entry) const {
+  const Claim& claim = entry.claim;
+  const auto waited = std::max<std::int64_t>(0, (now_ - claim.accepted) / schedule_.ageing);
+  const auto missing = std::max(0, kAged - claim.priority);
+  const int gained = static_cast<int>(std::min<std::int64_t>(waited, missing));
+  const int counts = claim.priority + gained;
+  entry.counts_more.reset();
+  if (gained < missing) entry.counts_more = claim.accepted + (gained + 1) * schedule_.ageing;
+  const Time deadline = counts == kAged ? kNever : claim.deadline.value_or(kNever);
+  entry.rank = {-counts, deadline, claim.accepted, entry.number};
+}
+
+void Arbiter::wait(Entry& entry) {
+  take_rank(entry);
+  lanes_[entry.needs].emplace(entry.rank, &entry);
+  if (entry.counts_more) ageing_.emplace(std::pair(*entry.counts_more, entry.number), &entry);
+  if (entry.claim.deadline && !entry.started)
+    deadlines_.emplace(std::pair(*entry.claim.deadline, entry.number), &entry);
   changed_ = true;
 }
 
-std::vector<std::string> Arbiter::grant() {
+void Arbiter::wait_no_more(Entry& entry) {
+  const auto lane = lanes_.find(entry.needs);
+  lane->second.erase(entry.rank);
+  if (lane->second.empty()) lanes_.erase(lane);
+  if (entry.counts_more) ageing_.erase({*entry.counts_more, entry.number});
+  if (entry.claim.deadline) deadlines_.erase({*entry.claim.deadline, entry.number});
+  changed_ = true;
+}
+
+void Arbiter::age() {
+  while (!ageing_.empty() && ageing_.begin()->first.first <= now_) {
+    Entry& entry = *ageing_.begin()->second;
+    wait_no_more(entry);
+    wait(entry);
+  }
+}
+
+std::vector<std::string> Arbiter::take_expired(Time now) {
+  std::map<Rank, std::string> expired;
+  for (const auto& [when, entry] : deadlines_) {
+    if (when.first >= now) break;
+    expired.emplace(entry->rank, entry->claim.id);
+  }
+  std::vector<std::string> ids;
+  for (auto& [rank, id] : expired) {
+    remove(id);
+    ids.push_back(std::move(id));
+  }
+  return ids;
+}
+
+std::vector<std::string> Arbiter::queue() const {
+  Lane all;
+  for (const auto& [needs, lane] : lanes_) all.insert(lane.begin(), lane.end());
+  std::vector<std::string> ids;
+  ids.reserve(all.size());
+  for (const auto& [rank, entry] : all) ids.push_back(entry->claim.id);
+  return ids;
+}
+
+// ---- resources ----
+
+const Arbiter::Lanes::value_type* Arbiter::first_lane(const std::set<Mask>& passed) const {
+  const Lanes::value_type* first = nullptr;
+  for (const Lanes::value_type& lane : lanes_) {
+    if (passed.contains(lane.first)) continue;
+    if (first == nullptr || lane.second.begin()->first < first->second.begin()->first) first = &lane;
+  }
+  return first;
+}
+
+std::vector<std::string> Arbiter::grant(Time now) {
+  now_ = now;
+  age();
   std::vector<std::string> granted;
   if (!changed_) return granted;
-  changed_ = false;
   Mask taken = held_;
-  for (const auto& [rank, entry] : queue_) {
-    if ((entry.needs & taken) == 0) {
-      held_ |= entry.needs;
-      running_.emplace(entry.id, entry.needs);
-      granted.push_back(entry.id);
+  std::set<Mask> passed;
+  while (const Lanes::value_type* const lane = first_lane(passed)) {
+    const Mask needs = lane->first;
+    if ((needs & taken) == 0) {
+      Entry& entry = waiting_.find(lane->second.begin()->second->claim.id)->second;
+      wait_no_more(entry);  // and the lane may be no more
+      entry.started = true;
+      held_ |= needs;
+      granted.push_back(entry.claim.id);
+      running_.insert(waiting_.extract(entry.claim.id));
+    } else {
+      passed.insert(needs);
     }
     // Also where it has to wait: nobody behind it may take what it waits for.
-    taken |= entry.needs;
+    taken |= needs;
   }
-  for (const std::string& id : granted) remove(id);
   changed_ = false;
   return granted;
 }
@@ -57,38 +145,43 @@ std::vector<std::string> Arbiter::grant() {
 void Arbiter::release(std::string_view id) {
   const auto found = running_.find(id);
   assert(found != running_.end());
-  held_ &= ~found->second;
+  held_ &= ~found->second.needs;
   running_.erase(found);
   changed_ = true;
 }
 
-bool Arbiter::remove(std::string_view id) {
-  const auto found = rank_of_.find(id);
-  if (found == rank_of_.end()) return false;
-  const Rank rank = found->second;
-  deadlines_.erase({std::get<Time>(rank), rank});
-  queue_.erase(rank);
-  rank_of_.erase(found);
-  changed_ = true;
-  return true;
+void Arbiter::hand_over(std::string_view id) {
+  const auto found = running_.find(id);
+  assert(found != running_.end());
+  held_ &= ~found->second.needs;
+  Entry& entry = found->second;
+  waiting_.insert(running_.extract(found));
+  wait(entry);
 }
 
-std::vector<std::string> Arbiter::take_expired(Time now) {
-  std::set<Rank> expired;
-  for (const auto& [deadline, rank] : deadlines_) {
-    if (deadline >= now) break;
-    expired.insert(rank);
+std::vector<Arbiter::Preemption> Arbiter::preemptions() const {
+  std::map<std::string, std::string> by;
+  Mask claimed = 0;  // by those before: who comes after them gains nothing by a preemption
+  std::set<Mask> passed;
+  while (const Lanes::value_type* const lane = first_lane(passed)) {
+    passed.insert(lane->first);
+    const Entry& urgent = *lane->second.begin()->second;
+    const bool alone = (claimed & urgent.needs) == 0;
+    claimed |= urgent.needs;
+    if (!alone || urgent.claim.priority < schedule_.urgent_priority) continue;
+    std::vector<std::string> holders;
+    bool gives_way = true;
+    for (const auto& [id, entry] : running_) {
+      if ((entry.needs & urgent.needs) == 0) continue;
+      holders.push_back(id);
+      gives_way = gives_way && std::get<int>(entry.rank) > std::get<int>(urgent.rank);
+    }
+    if (!gives_way) continue;
+    for (std::string& id : holders) by.emplace(std::move(id), urgent.claim.id);
   }
-  std::vector<std::string> ids;
-  for (const Rank& rank : expired) ids.push_back(queue_.at(rank).id);
-  for (const std::string& id : ids) remove(id);
-  return ids;
-}
-
-std::vector<std::string> Arbiter::queue() const {
-  std::vector<std::string> ids;
-  for (const auto& [rank, entry] : queue_) ids.push_back(entry.id);
-  return ids;
+  std::vector<Preemption> preemptions;
+  for (auto& [running, urgent] : by) preemptions.push_back({running, urgent});
+  return preemptions;
 }
 
 }  // namespace pons::bridge

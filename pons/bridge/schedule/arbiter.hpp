@@ -11,50 +11,92 @@
 #include <vector>
 
 #include "pons/core/time.hpp"
+#include "pons/world/world.hpp"
 
 namespace pons::bridge {
 
-// A task takes all its resources at once or waits. The order is priority (higher first), deadline (earlier first, none
-// last), acceptance. A waiting task keeps later ones off every resource it needs, so that it cannot be starved by tasks
-// that need less.
+// What a task asks the arbiter for.
+struct Claim {
+  std::string id;
+  int priority = 50;                   // 0 … 100, or kFirst
+  std::optional<Time> deadline;        // to start by
+  Time accepted;                       // it waits since then
+  std::vector<std::string> resources;  // twice named is once
+};
+
+// A task takes all its resources at once or waits; it never asks for more while it holds some, so that no circle of
+// waiting can close (pons/bridge/models/claims.pml). Tasks wait in the order of priority (higher first), deadline
+// (earlier first, none last), acceptance. A waiting task keeps later ones off every resource it needs: it cannot be
+// starved by tasks that need less. And with every `ageing` that it has waited it counts one priority more, at last more
+// than any brain may ask for, where acceptance alone decides: nor can it be starved by a stream of more important ones.
+//
+// add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
+// different sets of resources that are waited for.
 class Arbiter {
  public:
   static constexpr std::size_t kMaxResources = 64;
+  static constexpr int kFirst = 102;  // the priority of a task that goes before all others
 
   // At most kMaxResources names, each once.
-  explicit Arbiter(const std::vector<std::string>& resources);
+  Arbiter(const std::vector<std::string>& resources, const world::Schedule& schedule);
 
-  [[nodiscard]] bool knows(std::string_view resource) const;
   // Queues a task whose resources are all known and whose id is neither queued nor running (asserted).
-  void add(std::string id, int priority, std::optional<Time> deadline, const std::vector<std::string>& resources);
-  // The tasks that may start now, in order; they hold their resources from here on.
-  [[nodiscard]] std::vector<std::string> grant();
+  void add(const Claim& claim);
+  // The tasks that may start now, in order; they hold their resources from here on. `now` must not run back.
+  [[nodiscard]] std::vector<std::string> grant(Time now);
   // A task that was granted has ended.
   void release(std::string_view id);
+  // A task that was granted waits again, at the place in the queue that its age gives it; its deadline was met.
+  void hand_over(std::string_view id);
   // Takes a task out of the queue; false when it is not in it.
   bool remove(std::string_view id);
   // Takes out the queued tasks whose deadline is before `now`, in the queue's order.
   [[nodiscard]] std::vector<std::string> take_expired(Time now);
 
+  // Running tasks that stand in the way of urgent ones, and of which: a waiting task whose own priority is urgent, and
+  // where all who hold what it needs count less than it, aged or not. After grant().
+  struct Preemption {
+    std::string running, by;
+  };
+  [[nodiscard]] std::vector<Preemption> preemptions() const;
+
   [[nodiscard]] std::vector<std::string> queue() const;  // in order
-  [[nodiscard]] std::size_t queue_length() const { return queue_.size(); }
+  [[nodiscard]] std::size_t queue_length() const { return waiting_.size(); }
 
  private:
   using Mask = std::uint64_t;
-  // Priority negated, deadline (or the end of time), acceptance.
-  using Rank = std::tuple<int, Time, std::uint64_t>;
+  // Priority negated, aged; deadline, or the end of time; acceptance; what was added first.
+  using Rank = std::tuple<int, Time, Time, std::uint64_t>;
   struct Entry {
-    std::string id;
+    Claim claim;
     Mask needs = 0;
+    std::uint64_t number = 0;
+    Rank rank;                        // by which it waits, or was granted
+    std::optional<Time> counts_more;  // while it waits: from when on
+    bool started = false;             // then its deadline was met
   };
+  using Entries = std::map<std::string, Entry, std::less<>>;
+  // Those that wait for the same resources, of which only the first can be next.
+  using Lane = std::map<Rank, const Entry*>;
+  using Lanes = std::map<Mask, Lane>;
+  // Of waiting entries, by a time of theirs.
+  using Agenda = std::map<std::pair<Time, std::uint64_t>, Entry*>;
 
+  void wait(Entry& entry);
+  void wait_no_more(Entry& entry);
+  void age();
+  void take_rank(Entry& entry) const;
+  // The lane whose head comes first, of those that are none of `passed`; null when there is none.
+  [[nodiscard]] const Lanes::value_type* first_lane(const std::set<Mask>& passed) const;
+
+  world::Schedule schedule_;
   std::map<std::string, std::size_t, std::less<>> bits_;
-  std::map<Rank, Entry> queue_;
-  std::map<std::string, Rank, std::less<>> rank_of_;  // queued ids
-  std::set<std::pair<Time, Rank>> deadlines_;         // of queued tasks that have one
-  std::map<std::string, Mask, std::less<>> running_;
+  Entries waiting_, running_;
+  Lanes lanes_;  // none empty
+  Agenda ageing_, deadlines_;
   Mask held_ = 0;
-  std::uint64_t accepted_ = 0;
+  std::uint64_t added_ = 0;
+  Time now_;
   bool changed_ = false;  // since the last grant(): otherwise there is nothing new to give
 };
 

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <tuple>
 
 #include "pons/core/random.hpp"
 
@@ -14,88 +16,221 @@ using Ids = std::vector<std::string>;
 
 Time at(double seconds) { return Time(from_s(seconds)); }
 
+Claim claim(std::string id, int priority, Ids resources, std::optional<Time> deadline = {}, Time accepted = {}) {
+  return {std::move(id), priority, deadline, accepted, std::move(resources)};
+}
+
+// The ids of one grant after the other, each released at once.
+Ids drain(Arbiter& arbiter, Time now) {
+  Ids ids;
+  for (Ids granted = arbiter.grant(now); !granted.empty(); granted = arbiter.grant(now)) {
+    for (const std::string& id : granted) arbiter.release(id);
+    ids.insert(ids.end(), granted.begin(), granted.end());
+  }
+  return ids;
+}
+
 TEST(Arbiter, OrdersByPriorityThenDeadlineThenAcceptance) {
-  Arbiter arbiter({"arm"});
-  arbiter.add("late", 50, std::nullopt, {"arm"});
-  arbiter.add("later", 50, std::nullopt, {"arm"});
-  arbiter.add("soon", 50, at(9), {"arm"});
-  arbiter.add("sooner", 50, at(8), {"arm"});
-  arbiter.add("express", 80, std::nullopt, {"arm"});
-  arbiter.add("low", 10, at(1), {"arm"});
+  Arbiter arbiter({"arm"}, {});
+  arbiter.add(claim("late", 50, {"arm"}));
+  arbiter.add(claim("later", 50, {"arm"}));
+  arbiter.add(claim("soon", 50, {"arm"}, at(9)));
+  arbiter.add(claim("sooner", 50, {"arm"}, at(8)));
+  arbiter.add(claim("express", 80, {"arm"}));
+  arbiter.add(claim("low", 10, {"arm"}, at(1)));
   const Ids order{"express", "sooner", "soon", "late", "later", "low"};
   EXPECT_EQ(arbiter.queue(), order);
   Ids started;
   while (arbiter.queue_length() > 0) {
-    const Ids granted = arbiter.grant();
+    const Ids granted = arbiter.grant({});
     ASSERT_EQ(granted.size(), 1u);
     started.push_back(granted[0]);
-    EXPECT_TRUE(arbiter.grant().empty());
+    EXPECT_TRUE(arbiter.grant({}).empty());
     arbiter.release(granted[0]);
   }
   EXPECT_EQ(started, order);
 }
 
 TEST(Arbiter, GivesAllOrNothing) {
-  Arbiter arbiter({"arm", "camera"});
-  arbiter.add("a", 50, std::nullopt, {"arm"});
-  arbiter.add("both", 50, std::nullopt, {"arm", "camera", "arm"});
-  EXPECT_EQ(arbiter.grant(), Ids{"a"});
+  Arbiter arbiter({"arm", "camera"}, {});
+  arbiter.add(claim("a", 50, {"arm"}));
+  arbiter.add(claim("both", 50, {"arm", "camera", "arm"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"a"});
   arbiter.release("a");
-  EXPECT_EQ(arbiter.grant(), Ids{"both"});
-  arbiter.add("camera", 50, std::nullopt, {"camera"});
-  EXPECT_TRUE(arbiter.grant().empty());
+  EXPECT_EQ(arbiter.grant({}), Ids{"both"});
+  arbiter.add(claim("camera", 50, {"camera"}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
   arbiter.release("both");
-  EXPECT_EQ(arbiter.grant(), Ids{"camera"});
+  EXPECT_EQ(arbiter.grant({}), Ids{"camera"});
 }
 
 TEST(Arbiter, AWaitingTaskIsNotOvertakenByOnesThatNeedLess) {
-  Arbiter arbiter({"arm", "camera", "lamp"});
-  arbiter.add("holder", 50, std::nullopt, {"arm"});
-  EXPECT_EQ(arbiter.grant(), Ids{"holder"});
-  arbiter.add("both", 50, std::nullopt, {"arm", "camera"});
-  arbiter.add("camera", 50, std::nullopt, {"camera"});
-  arbiter.add("lamp", 10, std::nullopt, {"lamp"});
-  EXPECT_EQ(arbiter.grant(), Ids{"lamp"});
+  Arbiter arbiter({"arm", "camera", "lamp"}, {});
+  arbiter.add(claim("holder", 50, {"arm"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"holder"});
+  arbiter.add(claim("both", 50, {"arm", "camera"}));
+  arbiter.add(claim("camera", 50, {"camera"}));
+  arbiter.add(claim("lamp", 10, {"lamp"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"lamp"});
   arbiter.release("holder");
-  EXPECT_EQ(arbiter.grant(), Ids{"both"});
+  EXPECT_EQ(arbiter.grant({}), Ids{"both"});
 }
 
 TEST(Arbiter, TasksThatNeedNothingStartAtOnce) {
-  Arbiter arbiter({"arm"});
-  arbiter.add("a", 50, std::nullopt, {"arm"});
-  arbiter.add("free", 1, std::nullopt, {});
-  EXPECT_EQ(arbiter.grant(), (Ids{"a", "free"}));
+  Arbiter arbiter({"arm"}, {});
+  arbiter.add(claim("a", 50, {"arm"}));
+  arbiter.add(claim("free", 1, {}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"a", "free"}));
 }
 
 TEST(Arbiter, RemovedTasksMakeRoom) {
-  Arbiter arbiter({"arm", "camera"});
-  arbiter.add("holder", 50, std::nullopt, {"arm"});
-  (void)arbiter.grant();
-  arbiter.add("both", 50, at(1), {"arm", "camera"});
-  arbiter.add("camera", 50, std::nullopt, {"camera"});
-  EXPECT_TRUE(arbiter.grant().empty());
+  Arbiter arbiter({"arm", "camera"}, {});
+  arbiter.add(claim("holder", 50, {"arm"}));
+  (void)arbiter.grant({});
+  arbiter.add(claim("both", 50, {"arm", "camera"}, at(1)));
+  arbiter.add(claim("camera", 50, {"camera"}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
   EXPECT_TRUE(arbiter.remove("both"));
   EXPECT_FALSE(arbiter.remove("both"));
   EXPECT_FALSE(arbiter.remove("holder"));
-  EXPECT_EQ(arbiter.grant(), Ids{"camera"});
+  EXPECT_EQ(arbiter.grant({}), Ids{"camera"});
   EXPECT_TRUE(arbiter.take_expired(at(100)).empty());
 }
 
 TEST(Arbiter, ExpiredTasksLeaveInTheQueuesOrder) {
-  Arbiter arbiter({"arm"});
-  arbiter.add("a", 50, at(2), {"arm"});
-  arbiter.add("b", 80, at(3), {"arm"});
-  arbiter.add("c", 50, at(5), {"arm"});
-  arbiter.add("d", 50, std::nullopt, {"arm"});
+  Arbiter arbiter({"arm"}, {});
+  arbiter.add(claim("a", 50, {"arm"}, at(2)));
+  arbiter.add(claim("b", 80, {"arm"}, at(3)));
+  arbiter.add(claim("c", 50, {"arm"}, at(5)));
+  arbiter.add(claim("d", 50, {"arm"}));
   EXPECT_TRUE(arbiter.take_expired(at(2)).empty());
   EXPECT_EQ(arbiter.take_expired(at(4)), (Ids{"b", "a"}));
   EXPECT_EQ(arbiter.queue(), (Ids{"c", "d"}));
 }
 
+TEST(Arbiter, AWaitingTaskCountsMoreWithTime) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(10)});
+  arbiter.add(claim("old", 50, {"arm"}));
+  arbiter.add(claim("new", 52, {"arm"}, {}, at(15)));
+  arbiter.add(claim("express", 80, {"arm"}, {}, at(15)));
+  arbiter.add(claim("holder", 100, {"arm"}));
+  EXPECT_EQ(arbiter.grant(at(15)), Ids{"holder"});
+  EXPECT_EQ(arbiter.queue(), (Ids{"express", "new", "old"})) << "one more for 10 s, but 51 is still less than 52";
+  EXPECT_TRUE(arbiter.grant(at(20)).empty());
+  EXPECT_EQ(arbiter.queue(), (Ids{"express", "old", "new"})) << "52 both, and accepted earlier";
+  arbiter.release("holder");
+  EXPECT_EQ(drain(arbiter, at(21)), (Ids{"express", "old", "new"}));
+}
+
+TEST(Arbiter, NoStreamOfMoreImportantOnesStarvesATask) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(1)});
+  arbiter.add(claim("low", 0, {"arm"}));
+  int overtaken = 0;
+  for (double t = 0; t < 300; t += 0.5) {
+    // Always one of the highest more, whose deadline is before anything else.
+    arbiter.add(claim(fmt::format("high{}", t), 100, {"arm"}, at(t + 0.01), at(t)));
+    const Ids granted = arbiter.grant(at(t));
+    ASSERT_EQ(granted.size(), 1u);
+    if (granted[0] == "low") break;
+    ++overtaken;
+    arbiter.release(granted[0]);
+  }
+  EXPECT_EQ(overtaken, 202) << "101 s, two a second";
+}
+
+// Whatever was added when and removed again, the order is that of priority, aged; deadline; acceptance.
+TEST(Arbiter, KeepsTheOrderThatSortingWouldGive) {
+  Random random(11);
+  Arbiter arbiter({"arm", "camera"}, {.ageing = from_s(2)});
+  arbiter.add(claim("holder", 100, {"arm", "camera"}));
+  ASSERT_EQ(arbiter.grant({}).size(), 1u);
+  std::map<std::string, Claim> waiting;
+  for (int i = 0; i < 3'000; ++i) {
+    const Time now = at(0.05 * i);
+    if (random.uniform() < 0.6) {
+      Claim added = claim(fmt::format("t{:04}", i), static_cast<int>(random.below(101)), {}, {}, now);
+      added.resources = random.uniform() < 0.5 ? Ids{"arm"} : Ids{"arm", "camera"};
+      if (random.uniform() < 0.5) added.deadline = now + from_s(500 * random.uniform());
+      arbiter.add(added);
+      waiting.emplace(added.id, added);
+    } else if (!waiting.empty()) {
+      const auto victim = std::next(waiting.begin(), static_cast<std::ptrdiff_t>(random.below(waiting.size())));
+      EXPECT_TRUE(arbiter.remove(victim->first));
+      waiting.erase(victim);
+    }
+    EXPECT_TRUE(arbiter.grant(now).empty());
+    if (i % 100 != 0) continue;
+    Ids sorted;
+    for (const auto& [id, one] : waiting) sorted.push_back(id);
+    std::ranges::sort(sorted, {}, [&](const std::string& id) {
+      const Claim& one = waiting.at(id);
+      const int counts = std::min<int>(101, one.priority + static_cast<int>((now - one.accepted) / from_s(2)));
+      const Time deadline = counts == 101 ? Time(Duration::max()) : one.deadline.value_or(Time(Duration::max()));
+      return std::tuple(-counts, deadline, one.accepted);
+    });
+    ASSERT_EQ(arbiter.queue(), sorted) << i;
+  }
+}
+
+TEST(Arbiter, AnUrgentTaskMakesLesserOnesGiveWay) {
+  Arbiter arbiter({"arm", "camera", "lamp"}, {.urgent_priority = 90});
+  arbiter.add(claim("ordinary", 50, {"arm"}));
+  arbiter.add(claim("watcher", 50, {"camera"}));
+  arbiter.add(claim("lamp", 50, {"lamp"}));
+  EXPECT_EQ(arbiter.grant({}).size(), 3u);
+  arbiter.add(claim("express", 89, {"arm"}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "important, but not urgent";
+  arbiter.add(claim("urgent", 90, {"arm", "camera"}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
+  const auto preemptions = arbiter.preemptions();
+  ASSERT_EQ(preemptions.size(), 2u);
+  EXPECT_EQ(preemptions[0].running, "ordinary");
+  EXPECT_EQ(preemptions[1].running, "watcher");
+  EXPECT_EQ(preemptions[0].by, "urgent");
+
+  arbiter.hand_over("ordinary");
+  EXPECT_TRUE(arbiter.grant({}).empty()) << "all or nothing";
+  arbiter.hand_over("watcher");
+  EXPECT_EQ(arbiter.grant({}), Ids{"urgent"});
+  EXPECT_TRUE(arbiter.preemptions().empty());
+  EXPECT_EQ(arbiter.queue(), (Ids{"express", "ordinary", "watcher"}));
+  arbiter.release("urgent");
+  EXPECT_EQ(arbiter.grant({}), (Ids{"express", "watcher"}));
+}
+
+TEST(Arbiter, NobodyGivesWayToOneThatCountsLessOrCouldNotStartAllTheSame) {
+  Arbiter arbiter({"arm", "camera"}, {.ageing = from_s(1), .urgent_priority = 90});
+  arbiter.add(claim("waited", 50, {"arm"}, {}, at(0)));
+  EXPECT_EQ(arbiter.grant(at(45)), Ids{"waited"}) << "counts 95 by now";
+  arbiter.add(claim("camera", 10, {"camera"}, {}, at(45)));
+  EXPECT_EQ(arbiter.grant(at(45)), Ids{"camera"});
+  arbiter.add(claim("urgent", 94, {"arm", "camera"}, {}, at(45)));
+  EXPECT_TRUE(arbiter.grant(at(45)).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "the camera alone would not help it";
+  arbiter.add(claim("more urgent", 96, {"arm", "camera"}, {}, at(45)));
+  EXPECT_TRUE(arbiter.grant(at(45)).empty());
+  EXPECT_EQ(arbiter.preemptions().size(), 2u);
+}
+
+TEST(Arbiter, WhoHandedOverWaitsByItsAgeAndDoesNotExpire) {
+  Arbiter arbiter({"arm"}, {});
+  arbiter.add(claim("first", 50, {"arm"}, at(5), at(0)));
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{"first"});
+  arbiter.add(claim("second", 50, {"arm"}, at(6), at(1)));
+  arbiter.add(claim("urgent", 95, {"arm"}, {}, at(2)));
+  arbiter.hand_over("first");
+  EXPECT_EQ(arbiter.grant(at(2)), Ids{"urgent"});
+  EXPECT_EQ(arbiter.queue(), (Ids{"first", "second"}));
+  EXPECT_EQ(arbiter.take_expired(at(10)), Ids{"second"});
+  arbiter.release("urgent");
+  EXPECT_EQ(arbiter.grant(at(10)), Ids{"first"});
+}
+
 TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
   const Ids names{"r0", "r1", "r2", "r3", "r4"};
   Random random(5);
-  Arbiter arbiter(names);
+  Arbiter arbiter(names, {});
   std::map<std::string, Ids> running, needs;
   std::size_t ended = 0, added = 0;
   for (int step = 0; step < 20'000; ++step) {
@@ -106,9 +241,9 @@ TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
       }
       const std::string id = fmt::format("t{}", added++);
       needs[id] = wanted;
-      arbiter.add(id, static_cast<int>(random.below(3)), std::nullopt, wanted);
+      arbiter.add(claim(id, static_cast<int>(random.below(3)), wanted));
     }
-    for (const std::string& id : arbiter.grant()) running[id] = needs[id];
+    for (const std::string& id : arbiter.grant({})) running[id] = needs[id];
     std::map<std::string, int> holders;
     for (const auto& [id, held] : running) {
       for (const std::string& name : held) ++holders[name];

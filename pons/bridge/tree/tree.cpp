@@ -21,19 +21,33 @@ class Series final : public Node {
   Progress tick(Time now) override {
     for (;;) {
       Progress progress = children_[current_]->tick(now);
-      if (progress.status == Status::kRunning || !goes_on_(progress.status)) return progress;
+      if (!task::is_end(progress.status) || !goes_on_(progress.status)) return progress;
       if (current_ + 1 == children_.size()) return progress;
       if (cancelled_) return progress.status == Status::kSucceeded ? broken_off() : progress;
       ++current_;
+      if (pause_) children_[current_]->pause(now, *pause_);
     }
+  }
+  void pause(Time now, Pause pause) override {
+    pause_ = pause;
+    children_[current_]->pause(now, pause);
+  }
+  void resume(Time now) override {
+    pause_.reset();
+    children_[current_]->resume(now);
   }
   void cancel(Time now) override {
     cancelled_ = true;
     children_[current_]->cancel(now);
   }
+  void halt(Time now) override {
+    cancelled_ = true;
+    children_[current_]->halt(now);
+  }
   void reset() override {
     for (NodePtr& child : children_) child->reset();
     current_ = 0;
+    pause_.reset();
     cancelled_ = false;
   }
 
@@ -41,53 +55,87 @@ class Series final : public Node {
   std::vector<NodePtr> children_;
   bool (*goes_on_)(Status);
   std::size_t current_ = 0;
+  std::optional<Pause> pause_;
   bool cancelled_ = false;
 };
 
-class Retry final : public Node {
+// A node with one child, which hears what it hears.
+class Decorator : public Node {
  public:
-  Retry(int attempts, NodePtr child) : attempts_(attempts), child_(std::move(child)) { assert(attempts_ >= 1); }
+  explicit Decorator(NodePtr child) : child_(std::move(child)) {}
+  void pause(Time now, Pause pause) override { child_->pause(now, pause); }
+  void resume(Time now) override { child_->resume(now); }
+  void cancel(Time now) override { child_->cancel(now); }
+  void halt(Time now) override { child_->halt(now); }
+  void reset() override { child_->reset(); }
+
+ protected:
+  [[nodiscard]] Node& child() { return *child_; }
+
+ private:
+  NodePtr child_;
+};
+
+class Retry final : public Decorator {
+ public:
+  Retry(int attempts, NodePtr child) : Decorator(std::move(child)), attempts_(attempts) { assert(attempts_ >= 1); }
 
   Progress tick(Time now) override {
-    Progress progress = child_->tick(now);
+    Progress progress = child().tick(now);
     if (progress.status != Status::kRetry) return progress;
     ++done_;
     if (done_ < attempts_ && !cancelled_) {
-      child_->reset();
+      child().reset();
+      if (pause_) child().pause(now, *pause_);
       return {};
     }
     progress.status = Status::kFailed;
     if (done_ > 1) progress.reason = fmt::format("{}; gave up after {} attempts", progress.reason, done_);
     return progress;
   }
+  void pause(Time now, Pause pause) override {
+    pause_ = pause;
+    Decorator::pause(now, pause);
+  }
+  void resume(Time now) override {
+    pause_.reset();
+    Decorator::resume(now);
+  }
   void cancel(Time now) override {
     cancelled_ = true;
-    child_->cancel(now);
+    Decorator::cancel(now);
+  }
+  void halt(Time now) override {
+    cancelled_ = true;
+    Decorator::halt(now);
   }
   void reset() override {
-    child_->reset();
+    Decorator::reset();
     done_ = 0;
+    pause_.reset();
     cancelled_ = false;
   }
 
  private:
   int attempts_;
-  NodePtr child_;
   int done_ = 0;
+  std::optional<Pause> pause_;
   bool cancelled_ = false;
 };
 
-class Timeout final : public Node {
+class Timeout final : public Decorator {
  public:
-  Timeout(Duration limit, NodePtr child) : limit_(limit), child_(std::move(child)) {}
+  Timeout(Duration limit, NodePtr child) : Decorator(std::move(child)), limit_(limit) {}
 
   Progress tick(Time now) override {
-    if (!started_) started_ = now;
-    Progress progress = child_->tick(now);
-    if (progress.status == Status::kRunning) {
-      if (!expired_ && now - *started_ >= limit_) {
+    if (!ends_) ends_ = now + limit_;
+    if (paused_since_) *ends_ += now - *std::exchange(paused_since_, {});
+    Progress progress = child().tick(now);
+    if (progress.status == Status::kPaused) paused_since_ = now;
+    if (!task::is_end(progress.status)) {
+      if (!expired_ && progress.status == Status::kRunning && now >= *ends_) {
         expired_ = true;
-        child_->cancel(now);
+        child().cancel(now);
       }
       return progress;
     }
@@ -96,17 +144,16 @@ class Timeout final : public Node {
     progress.reason = fmt::format("timed out after {} s: {}", to_s(limit_), progress.reason);
     return progress;
   }
-  void cancel(Time now) override { child_->cancel(now); }
   void reset() override {
-    child_->reset();
-    started_.reset();
+    Decorator::reset();
+    ends_.reset();
+    paused_since_.reset();
     expired_ = false;
   }
 
  private:
   Duration limit_;
-  NodePtr child_;
-  std::optional<Time> started_;
+  std::optional<Time> ends_, paused_since_;
   bool expired_ = false;
 };
 
@@ -123,19 +170,34 @@ class Action final : public Node {
       }
       skill_ = type_.start(arguments_, now);
       if (!skill_) return end({Status::kFailed, "the skill did not start", Json::object()}, now);
+      if (pause_) skill_->pause(now, *pause_);
     }
     Progress progress = skill_->tick(now);
     for (const task::Note& note : std::exchange(progress.notes, {}))
       (void)observer_({step_, type_.name, attempts_, nullptr, &note}, now);
-    return progress.status == Status::kRunning ? progress : end(std::move(progress), now);
+    return task::is_end(progress.status) ? end(std::move(progress), now) : progress;
+  }
+  // What comes before the skill has begun, it hears when it does.
+  void pause(Time now, Pause pause) override {
+    pause_ = pause;
+    if (skill_) skill_->pause(now, pause);
+  }
+  void resume(Time now) override {
+    pause_.reset();
+    if (skill_) skill_->resume(now);
   }
   void cancel(Time now) override {
     if (skill_ && !cancelled_) skill_->cancel(now);
     cancelled_ = true;
   }
+  void halt(Time now) override {
+    if (skill_) skill_->halt(now);
+    cancelled_ = true;
+  }
   // Attempts go on counting: a retry is the same step.
   void reset() override {
     skill_.reset();
+    pause_.reset();
     cancelled_ = false;
   }
 
@@ -151,6 +213,7 @@ class Action final : public Node {
   const Observer& observer_;
   std::unique_ptr<task::Skill> skill_;
   int attempts_ = 0;
+  std::optional<Pause> pause_;
   bool cancelled_ = false;
 };
 

@@ -1,16 +1,20 @@
 // Behaviour trees: what a task runs as. A node is ticked until it ends; nodes are allocated when the tree is built, and
 // a tick visits each at most once per step that ends in it.
 //
-// | status     | Sequence            | Fallback            | Retry                    | Timeout |
-// |------------|---------------------|---------------------|--------------------------|---------|
-// | kRunning   | runs                | runs                | runs                     | runs; on expiry cancels its
-// child | | kSucceeded | next child, or ends | ends                | ends                     | ends    | | kRetry |
-// fails               | next child, or fails | starts the child again, or fails | passed up | | kFailed    | fails |
-// next child, or fails     | fails                    | fails   | | kException | ends                | ends | ends |
-// ends |
+// clang-format off
+// | status     | Sequence            | Fallback                 | Retry                            | Timeout                       |
+// |------------|---------------------|--------------------------|----------------------------------|-------------------------------|
+// | kRunning   | runs                | runs                     | runs                             | runs; expired, it is cancelled |
+// | kPaused    | is paused           | is paused                | is paused                        | is paused; its time stands    |
+// | kSucceeded | next child, or ends | ends                     | ends                             | ends                          |
+// | kRetry     | fails               | next child, or fails     | starts the child again, or fails | passed up                     |
+// | kFailed    | fails               | next child, or fails     | fails                            | fails                         |
+// | kException | ends                | ends                     | ends                             | ends                          |
+// clang-format on
 //
-// Cancelling: cancel() reaches the running leaf, and the tree goes on being ticked until that has ended. Nothing new is
-// started afterwards. A leaf that nevertheless ends with kSucceeded counts as done.
+// pause(), resume(), cancel() and halt() reach the running leaf, which knows what they mean (task::Skill), and the tree
+// goes on being ticked until that has ended. A pause that comes between two leaves is the next one's. After cancel() or
+// halt() nothing new is started; a leaf that nevertheless ends with kSucceeded counts as done.
 #pragma once
 
 #include <functional>
@@ -25,16 +29,19 @@
 namespace pons::bridge::tree {
 
 using task::Json;
+using task::Pause;
 using task::Progress;
 using task::Status;
 
 class Node {
  public:
   virtual ~Node() = default;
-  // Not to be called again after it said something else than kRunning, until reset().
+  // Not to be called again after it has ended, until reset().
   [[nodiscard]] virtual Progress tick(Time now) = 0;
-  // At most once between resets has an effect.
+  virtual void pause(Time now, Pause pause) = 0;
+  virtual void resume(Time now) = 0;
   virtual void cancel(Time now) = 0;
+  virtual void halt(Time now) = 0;
   // As newly built. Not while it runs.
   virtual void reset() = 0;
 };
@@ -57,7 +64,8 @@ using Observer = std::function<Expected<void>(const Attempt& attempt, Time now)>
 [[nodiscard]] NodePtr fallback(std::vector<NodePtr> children);
 // The child is started again on the tick after its kRetry, `attempts` times in all; then it has failed.
 [[nodiscard]] NodePtr retry(int attempts, NodePtr child);
-// From the first tick. When the child, cancelled, ends with anything but kSucceeded or kException, it has failed.
+// From the first tick, pauses not counted. When the child, cancelled, ends with anything but kSucceeded or kException,
+// it has failed.
 [[nodiscard]] NodePtr timeout(Duration limit, NodePtr child);
 // `type` and `observer` must outlive the node.
 [[nodiscard]] NodePtr action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer);

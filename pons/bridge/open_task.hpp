@@ -1,0 +1,43 @@
+// An accepted task without an outcome, as the bridge has it in hand.
+#pragma once
+
+#include <string>
+
+#include "pons/bridge/bridge.hpp"
+
+namespace pons::bridge {
+
+struct Bridge::Open {
+  // Where it is. Only a task that runs holds resources and is ticked.
+  enum class Stage : std::uint8_t {
+    kWaits,   // in the arbiter's queue
+    kRuns,    // on its way, or paused on it
+    kParked,  // paused, out of the queue
+  };
+  // What a running one was told, beside ending.
+  enum class Told : std::uint8_t {
+    kNothing,
+    kPause,    // by a person: it keeps its resources
+    kPreempt,  // for another task: it waits again as soon as it stands
+  };
+
+  task::Task task;
+  int priority = 50;  // it waits with
+  Time accepted;
+  std::size_t done = 0;     // steps that an earlier bridge has seen succeed
+  tree::Observer observer;  // the tree refers to it
+  tree::NodePtr root;       // none before it was granted for the first time
+  Stage stage = Stage::kWaits;
+  Told told = Told::kNothing;
+  bool begun = false;   // by this bridge or one before
+  bool stands = false;  // as it was told
+  bool held = false;    // by an emergency stop
+  bool cancelled = false, halted = false;
+  std::string cancel_reason;
+  Time give_up_at;            // by then every step has had its timeout, and grace to leave the world safe
+  std::optional<Time> rests;  // since then its time stands
+  int attempts = 0;
+  Json steps = Json::array();  // what each step that ended had to tell
+};
+
+}  // namespace pons::bridge

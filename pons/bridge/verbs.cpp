@@ -1,0 +1,188 @@
+// What a task may be told after it was accepted: pause, resume, preempt, cancel, halt.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "pons/bridge/bridge.hpp"
+#include "pons/bridge/journal/story.hpp"
+#include "pons/bridge/open_task.hpp"
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge {
+
+Expected<Bridge::Open*> Bridge::find_open(std::string_view id) {
+  const auto found = open_.find(id);
+  if (found == open_.end())
+    return fail(fmt::format("there is no open task '{}'", task::excerpt(id)), {},
+                "pons task list shows those there are");
+  return found->second.get();
+}
+
+// ---- pause, resume ----
+
+Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view reason) {
+  const auto found = find_open(id);
+  if (!found) return std::unexpected(found.error());
+  Open& open = **found;
+  if (open.cancelled) return fail(fmt::format("task '{}' is ending already", open.task.id), {}, "wait for its outcome");
+  if (open.told == Open::Told::kPause || open.stage == Open::Stage::kParked) return {};
+  unkept_ = true;
+  if (open.stage == Open::Stage::kWaits) {
+    park(open);
+    keep(journal_.event(open.task.id, now, kPausedEvent, {{"reason", reason}}));
+    return {};
+  }
+  open.told = Open::Told::kPause;
+  open.stands = false;
+  keep(journal_.event(open.task.id, now, kPausingEvent, {{"reason", reason}}));
+  open.root->pause(now, task::Pause::kStand);
+  return {};
+}
+
+void Bridge::park(Open& open) {
+  arbiter_.remove(open.task.id);
+  open.stage = Open::Stage::kParked;
+}
+
+Expected<void> Bridge::resume(std::string_view id, Time now) {
+  const auto found = find_open(id);
+  if (!found) return std::unexpected(found.error());
+  Open& open = **found;
+  const bool parked = open.stage == Open::Stage::kParked;
+  if (open.cancelled || (!parked && open.told != Open::Told::kPause))
+    return fail(fmt::format("task '{}' is not paused", open.task.id), {}, "pons task show says how it stands");
+  unkept_ = true;
+  keep(journal_.event(open.task.id, now, kContinuedEvent));
+  open.told = Open::Told::kNothing;
+  open.stands = false;
+  if (parked) {
+    open.stage = Open::Stage::kWaits;
+    enqueue(open);
+  } else if (open.root) {
+    open.root->resume(now);
+  }
+  return {};
+}
+
+// ---- preempt ----
+
+void Bridge::preempt(Time now) {
+  if (held() || fault_) return;
+  for (const auto& [id, by] : arbiter_.preemptions()) {
+    Open& open = *running_.find(id)->second;
+    if (open.told != Open::Told::kNothing || open.cancelled) continue;
+    open.told = Open::Told::kPreempt;
+    open.stands = false;
+    keep(journal_.event(id, now, kPreemptingEvent, {{"by", by}}));
+    open.root->pause(now, task::Pause::kHandOver);
+  }
+}
+
+// A running task has come to rest as it was told.
+void Bridge::stands(Open& open, const task::Progress& progress, Time now) {
+  open.rests = now;
+  if (std::exchange(open.stands, true)) return;
+  const Json detail{{"stop", task::name(progress.stop.value_or(task::StopResult::kUncertain))}};
+  const std::string& id = open.task.id;
+  unkept_ = true;
+  if (open.told != Open::Told::kPreempt) {
+    keep(journal_.event(id, now, kPausedEvent, detail));
+    return;
+  }
+  keep(journal_.event(id, now, kPreemptedEvent, detail));
+  running_.erase(id);
+  arbiter_.hand_over(id);
+  open.stage = Open::Stage::kWaits;
+}
+
+// ---- cancel, halt ----
+
+Expected<void> Bridge::cancel(std::string_view id, Time now, std::string_view reason) {
+  return end(id, Ending::kCancel, now, reason);
+}
+
+Expected<void> Bridge::halt(std::string_view id, Time now, std::string_view reason) {
+  return end(id, Ending::kHalt, now, reason);
+}
+
+Expected<void> Bridge::end(std::string_view id, Ending ending, Time now, std::string_view reason) {
+  const auto found = find_open(id);
+  if (!found) return std::unexpected(found.error());
+  Open& open = **found;
+  if (open.stage == Open::Stage::kRuns) {
+    end_running(open, ending, now, reason);
+  } else {
+    end_waiting(open, now, reason);
+  }
+  return {};
+}
+
+// What it has begun was left at a safe point, with nothing in use.
+void Bridge::end_waiting(Open& open, Time now, std::string_view reason) {
+  const std::string id = open.task.id;
+  arbiter_.remove(id);
+  Json detail = Json::object();
+  if (open.root) detail = {{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
+  finish(id, task::Outcome::kCancelled, std::string(reason), std::move(detail), now);
+}
+
+void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view reason) {
+  const bool halts = ending == Ending::kHalt && !open.halted;
+  if (open.cancelled && !halts) return;
+  open.cancelled = true;
+  open.halted = open.halted || halts;
+  open.cancel_reason = reason;
+  open.give_up_at = std::min(open.give_up_at, now + kCancelGrace);
+  open.rests.reset();
+  unkept_ = true;
+  // What moves is stopped before anything waits for the disk.
+  if (halts) {
+    open.root->halt(now);
+  } else {
+    open.root->cancel(now);
+  }
+  keep(journal_.event(open.task.id, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}}));
+}
+
+void Bridge::end_all(Time now, std::string_view reason) {
+  std::vector<Open*> waiting;
+  for (const auto& [id, open] : open_) {
+    if (open->stage == Open::Stage::kRuns) {
+      end_running(*open, Ending::kCancel, now, reason);
+    } else {
+      waiting.push_back(open.get());
+    }
+  }
+  for (Open* const open : waiting) end_waiting(*open, now, reason);
+}
+
+void Bridge::stop(Time now, std::string_view reason) {
+  stopping_ = true;
+  end_all(now, reason);
+}
+
+// ---- emergency stop ----
+
+void Bridge::emergency_stop(Time now, std::string_view cause) {
+  if (std::exchange(emergency_, true)) return;
+  if (on_emergency_stop_ == world::OnEmergencyStop::kCancel) {
+    end_all(now, fmt::format("stopped: {}", cause));
+    return;
+  }
+  for (const auto& [id, open] : open_) {
+    open->held = true;
+    unkept_ = true;
+    keep(journal_.event(id, now, kHeldEvent, {{"cause", cause}}));
+  }
+}
+
+void Bridge::released(Time now) {
+  if (!std::exchange(emergency_, false)) return;
+  for (const auto& [id, open] : open_) {
+    if (!std::exchange(open->held, false)) continue;
+    unkept_ = true;
+    keep(journal_.event(id, now, kReleasedEvent));
+  }
+}
+
+}  // namespace pons::bridge
