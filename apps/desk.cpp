@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -31,6 +32,7 @@ Json to_json(const ObjectBelief& object) {
 bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kHalt; }
 
 constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
+constexpr std::size_t kWatchersMost = 16;
 constexpr std::string_view kAskedFor = "asked for over the socket";
 
 const Error kNoStream{"no stream goes on", "chunk_stream",
@@ -86,16 +88,27 @@ void Desk::attend(Time now) {
       request.reply(answered);
     }
   }
-  std::erase_if(watchers_, [&](Watcher& watcher) {
-    auto told = news(watcher.asked);
-    if (!told && now >= watcher.until) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
-    if (told) of_tasks.emplace_back(std::move(watcher.request), std::move(*told));
-    return told.has_value();
-  });
   // Nobody hears of an acceptance or an outcome before the disk has it; all who came in this period wait for it
   // together.
   const auto kept = of_tasks.empty() || !bridge_.unkept() ? Expected<void>{} : bridge_.commit(now);
   for (auto& [request, answered] : of_tasks) request.reply(kept ? answered : gate::refusal(kept.error()));
+  tell_watchers(now);
+}
+
+// What is durable, and nothing else. Those who watch must not keep others from the socket: when too many do, the first
+// is sent away, and asks again.
+void Desk::tell_watchers(Time now) {
+  const std::int64_t durable = journal_.durable();
+  const std::size_t too_many = watchers_.size() - std::min(watchers_.size(), kWatchersMost);
+  std::size_t number = 0;
+  std::erase_if(watchers_, [&](Watcher& watcher) {
+    const bool leaves = number++ < too_many || now >= watcher.until;
+    std::optional<Json> told;
+    if (std::exchange(watcher.looked, durable) != durable) told = news(watcher.asked);
+    if (!told && leaves) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
+    if (told) watcher.request.reply(*told);
+    return told.has_value();
+  });
 }
 
 Json Desk::answer(const gate::Asked& asked, Time now) {
@@ -162,11 +175,12 @@ Json Desk::history(const std::string& order) const {
 }
 
 std::optional<Json> Desk::news(const gate::Asked& asked) const {
-  const auto events = journal_.history(asked.task, asked.after);
+  auto events = journal_.history(asked.task, asked.after);
   if (!events) return gate::refusal(events.error());
+  if (events->empty() && asked.after == 0) return history(asked.task);  // nothing is known of it
+  std::erase_if(*events, [&](const bridge::Event& event) { return event.sequence > journal_.durable(); });
   if (!events->empty()) return Json{{"ok", true}, {"events", to_json(*events)}, {"after", events->back().sequence}};
-  if (asked.after > 0) return std::nullopt;
-  return history(asked.task);  // nothing is known of it
+  return std::nullopt;
 }
 
 Json Desk::tell_task(const gate::Asked& asked, Time now) {

@@ -36,6 +36,7 @@ class Desk {
   [[nodiscard]] bridge::Json tell_task(const gate::Asked& asked, Time now);
   // What there is to tell to who watches; nothing while there is nothing new.
   [[nodiscard]] std::optional<bridge::Json> news(const gate::Asked& asked) const;
+  void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
@@ -49,6 +50,7 @@ class Desk {
     gate::Request request;
     gate::Asked asked;
     Time until;
+    std::int64_t looked = -1;  // what was durable when there was nothing to tell
   };
   std::vector<Watcher> watchers_;
 };

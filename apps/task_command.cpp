@@ -170,7 +170,7 @@ int tell(const TaskOptions& options, const std::string& verb, const std::string&
   const auto answer = ask(options, request);
   if (!answer) return bad_input(answer.error());
   if (options.at_once) return kExitGood;
-  const auto came = follow(options, answer->at("after"), {done, "ended"});
+  const auto came = follow(options, answer->at("after"), {done, "continued", "ended"});
   if (!came) return bad_input(came.error());
   return *came == done ? kExitGood : kExitBadRun;
 }

@@ -97,11 +97,13 @@ void Dispatcher::recall_ride(std::string_view code) {
   known.rode = true;
 }
 
-Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now) {
+Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now,
+                              const std::set<std::string>& set_aside) {
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
-    decisions.belt_waits = decisions.belt_waits || would_ride_past(belief);
+    if (decisions.belt_waits || !would_ride_past(belief)) continue;
+    decisions.belt_waits = !set_aside.contains(id_of(belief.code, known_.find(belief.code)->second.tries));
   }
   return decisions;
 }

@@ -63,8 +63,10 @@ class Dispatcher {
   // `world` must outlive it.
   Dispatcher(Orders orders, const world::World& world);
 
-  // `beliefs` are all live tracks, predicted to `now`.
-  [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now);
+  // `beliefs` are all live tracks, predicted to `now`; the belt does not wait for the tasks `set_aside`, which somebody
+  // has paused before they began: what they are about rides on.
+  [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now,
+                                  const std::set<std::string>& set_aside = {});
   // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
   bool heard(std::string_view id, task::Outcome outcome);
   // What an earlier dispatcher asked for in this run, and what became of it, in that order, before the first observe():

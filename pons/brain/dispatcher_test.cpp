@@ -98,6 +98,8 @@ TEST_F(DispatcherTest, TheBeltWaitsForWhatIsAskedForAndForNothingElse) {
   EXPECT_FALSE(waits(world_.belt.waits_at_m() - stops_m - 0.02, 0.5, "P1"));
   EXPECT_TRUE(waits(world_.belt.waits_at_m() - stops_m + 0.01, 0.5, "P1"));
   EXPECT_TRUE(waits(world_.belt.waits_at_m() + 0.001, 0, "P1")) << "and goes on waiting when it stands";
+  EXPECT_FALSE(dispatcher_.observe({parcel(1, world_.belt.waits_at_m() + 0.001, "P1")}, at(10), {"P1"}).belt_waits)
+      << "but not for what a person has set aside";
   EXPECT_FALSE(waits(2.01, 0.5, "P1")) << "too late";
   EXPECT_FALSE(waits(1.95, 0.5, "")) << "no label";
   EXPECT_FALSE(waits(1.95, 0.5, "P9")) << "nobody's";

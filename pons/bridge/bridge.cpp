@@ -54,9 +54,8 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   if (*held) return Admission{task->id, Accepted::kAlready};
   if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
   if (auto good = review_.check(*task, now); !good) return std::unexpected(good.error());
-  const std::size_t waiting = open_.size() - running_.size();
-  if (waiting >= (task->priority < urgent_priority_ ? kMaxWaiting : kMaxUrgent))
-    return fail(fmt::format("{} tasks are waiting already", waiting), {}, "submit it again later");
+  if (open_.size() >= (task->priority < urgent_priority_ ? kMaxOpen : kMaxUrgent))
+    return fail(fmt::format("{} tasks are open already", open_.size()), {}, "submit it again later");
   const auto accepted = journal_.accept(*task, now);
   if (!accepted) {
     set_fault(accepted.error());
@@ -80,6 +79,7 @@ std::vector<std::string> Bridge::resources_of(const task::Task& task) const {
 Bridge::Open& Bridge::add_open(task::Task task, Time accepted) {
   auto open = std::make_unique<Open>();
   open->accepted = accepted;
+  open->waits_since = accepted - held_for_;
   open->priority = task.priority;
   open->task = std::move(task);
   std::string id = open->task.id;
@@ -88,7 +88,7 @@ Bridge::Open& Bridge::add_open(task::Task task, Time accepted) {
 
 void Bridge::enqueue(const Open& open) {
   const auto deadline = open.begun ? std::nullopt : open.task.deadline;
-  arbiter_.add({open.task.id, open.priority, deadline, open.accepted, resources_of(open.task)});
+  arbiter_.add({open.task.id, open.priority, deadline, open.waits_since, resources_of(open.task)});
 }
 
 // ---- after another bridge ----
@@ -119,10 +119,19 @@ Expected<void> Bridge::take_up(const TaskRecord& record, const Resume& resume, T
       return {};
     }
   }
-  if (story.started()) return go_on(record, story, resume, now);
+  // Who told it to end has been answered, and nothing moves for it again.
+  if (story.ending()) {
+    finish_unopened(record.task.id, task::Outcome::kCancelled, *story.ending(), now);
+    return {};
+  }
+  const bool begun = story.started();
+  if (begun && !story.handed_over()) return go_on(record, story, resume, now);
+  if (begun) keep(journal_.event(record.task.id, now, kResumedEvent, {{"step", story.done()}}));
   Open& open = add_open(record.task, record.accepted);
+  open.begun = begun;
+  open.done = story.done();
   if (story.paused()) {
-    open.stage = Open::Stage::kParked;
+    park(open, now);
   } else {
     enqueue(open);
   }
@@ -161,6 +170,8 @@ void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const
 // ---- a tick ----
 
 void Bridge::tick(Time now) {
+  if (held()) stand_still(now);
+  last_tick_ = now;
   // Who ends frees resources for who starts in the same tick.
   tick_trees(running(), now);
   expire(now);
@@ -177,6 +188,15 @@ void Bridge::tick(Time now) {
   });
 }
 
+// A stopped robot's time does not count: not for those that run, nor for those that wait.
+void Bridge::stand_still(Time now) {
+  if (last_tick_ > Time{}) held_for_ += now - last_tick_;
+  for (const auto& [id, open] : running_) {
+    open->root->stand_still(now);
+    if (!open->cancelled && !open->rests) open->rests = last_tick_;
+  }
+}
+
 void Bridge::expire(Time now) {
   for (const std::string& id : arbiter_.take_expired(now)) {
     finish(id, task::Outcome::kFailed, "its deadline passed before it could start", Json::object(), now);
@@ -185,21 +205,27 @@ void Bridge::expire(Time now) {
 
 std::vector<std::string> Bridge::start_granted(Time now) {
   if (held() || fault_) return {};
-  std::vector<std::string> granted = arbiter_.grant(now);
+  std::vector<std::string> granted = arbiter_.grant(now - held_for_);
   for (const std::string& id : granted) {
     Open& open = *open_.find(id)->second;
     open.stage = Open::Stage::kRuns;
     running_.emplace(id, &open);
     if (open.root) {
-      open.told = Open::Told::kNothing;
-      open.stands = false;
-      keep(journal_.event(id, now, kContinuedEvent));
-      open.root->resume(now);
+      regain(open, now);
     } else {
       start(open, now);
     }
   }
   return granted;
+}
+
+void Bridge::regain(Open& open, Time now) {
+  open.told = Open::Told::kNothing;
+  open.stands = false;
+  keep(journal_.event(open.task.id, now, kRegainedEvent));
+  // Before anything moves, as with an attempt. Where that cannot be written, it is cancelled where it stands.
+  keep(commit(now));
+  if (!fault_) open.root->resume(now);
 }
 
 void Bridge::start(Open& open, Time now) {
@@ -265,6 +291,7 @@ void Bridge::conclude(const std::string& id, Open& open, const task::Progress& p
 }
 
 void Bridge::finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now) {
+  parked_.erase(id);
   const auto closed = open_.extract(open_.find(id));  // until the end of this: `id` may live in it
   const std::string& name = closed.key();
   const auto written = journal_.outcome(name, outcome, reason, now, detail);
@@ -327,6 +354,10 @@ std::vector<std::string> Bridge::running() const {
   std::vector<std::string> ids;
   for (const auto& [id, open] : running_) ids.push_back(id);
   return ids;
+}
+
+bool Bridge::uses_resources() const {
+  return std::ranges::any_of(running_, [&](const auto& entry) { return !resources_of(entry.second->task).empty(); });
 }
 
 void Bridge::keep(const Expected<void>& written) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,8 +27,8 @@
 
 namespace pons::bridge {
 
-inline constexpr std::size_t kMaxWaiting = 10'000;  // tasks, paused ones among them;
-inline constexpr std::size_t kMaxUrgent = 10'100;   // until there are so many, an urgent one is taken all the same
+inline constexpr std::size_t kMaxOpen = 10'000;    // tasks without an outcome;
+inline constexpr std::size_t kMaxUrgent = 10'100;  // until there are so many, an urgent one is taken all the same
 // A skill that was cancelled, or ran out of time, and has not ended after this long is given up: see Bridge::fault().
 inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
 
@@ -87,7 +88,8 @@ class Bridge {
   void emergency_stop(Time now, std::string_view cause);
   void released(Time now);
 
-  // Held, it starts no task (protective stop) and preempts none; running ones go on being ticked.
+  // Held, it starts no task (protective stop) and preempts none; running ones go on being ticked, but no time passes:
+  // none runs out, and none that waits grows older.
   enum class Hold : std::uint8_t { kOff, kOn };
   void hold(Hold hold) { hold_ = hold; }
 
@@ -104,6 +106,10 @@ class Bridge {
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
+  // Waiting ones that a person has paused.
+  [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
+  // Whether any of those that run needs some: else nothing moves for a task.
+  [[nodiscard]] bool uses_resources() const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
   [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
@@ -120,13 +126,15 @@ class Bridge {
   [[nodiscard]] std::vector<std::string> resources_of(const task::Task& task) const;
   [[nodiscard]] Open& add_open(task::Task task, Time accepted);
   void enqueue(const Open& open);
-  void park(Open& open);
+  void park(Open& open, Time now);
   [[nodiscard]] Expected<Open*> find_open(std::string_view id);
   [[nodiscard]] Expected<void> take_up(const TaskRecord& record, const Resume& resume, Time now);
   [[nodiscard]] Expected<void> go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now);
   void expire(Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
   void start(Open& open, Time now);
+  void regain(Open& open, Time now);
+  void stand_still(Time now);
   void preempt(Time now);
   void stands(Open& open, const task::Progress& progress, Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
@@ -151,9 +159,11 @@ class Bridge {
   world::OnEmergencyStop on_emergency_stop_;
   std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
   std::map<std::string, Open*, std::less<>> running_;
+  std::set<std::string> parked_;
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
-  Time last_commit_;
+  Time last_commit_, last_tick_;
+  Duration held_for_{0};  // since the first tick
   std::int64_t retries_ = 0, refused_ = 0;
   Hold hold_ = Hold::kOff;
   bool unkept_ = false;  // an acceptance or an outcome waits for commit()

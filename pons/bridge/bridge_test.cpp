@@ -331,13 +331,13 @@ TEST_F(BridgeTest, RefusesAFullQueueAndForgetsWhatItRefused) {
   journal_ = std::move(*Journal::open(":memory:"));
   bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
   bridge_->hold(Bridge::Hold::kOn);
-  for (std::size_t i = 0; i < kMaxWaiting; ++i) ASSERT_TRUE(submit(fmt::format("t{}", i), "pick"));
-  EXPECT_EQ(submit("more", "pick").error().what, "10000 tasks are waiting already");
-  EXPECT_EQ(journal_->counts().value().accepted, static_cast<std::int64_t>(kMaxWaiting));
+  for (std::size_t i = 0; i < kMaxOpen; ++i) ASSERT_TRUE(submit(fmt::format("t{}", i), "pick"));
+  EXPECT_EQ(submit("more", "pick").error().what, "10000 tasks are open already");
+  EXPECT_EQ(journal_->counts().value().accepted, static_cast<std::int64_t>(kMaxOpen));
   EXPECT_TRUE(submit("urgent", "pick", R"(,"priority":95)")) << "which no crowd of others keeps out";
   EXPECT_TRUE(bridge_->cancel("urgent", now_, "")) << "or the queue would be as full as before";
-  bridge_->hold(Bridge::Hold::kOff);
-  bridge_->tick(now_);
+  EXPECT_FALSE(submit("more", "pick"));
+  EXPECT_TRUE(bridge_->cancel("t7", now_, ""));
   EXPECT_TRUE(submit("more", "pick"));
 }
 

@@ -24,6 +24,8 @@ struct Bridge::Open {
   task::Task task;
   int priority = 50;  // it waits with
   Time accepted;
+  Time waits_since;         // it ages from then on, in the arbiter's time, which stands while nothing may start
+  Time parked_at;           // in that time, too
   std::size_t done = 0;     // steps that an earlier bridge has seen succeed
   tree::Observer observer;  // the tree refers to it
   tree::NodePtr root;       // none before it was granted for the first time

@@ -44,6 +44,7 @@ struct Course {
   Progress end{Status::kSucceeded, "", Json::object()};
   int ticks_after_cancel = 0;                  // further kRunning once cancelled, and before it stands when paused
   std::optional<task::Pause> stands_for = {};  // paused for anything else, it runs on
+  task::StopResult stop = task::StopResult::kConfirmed;
   Progress cancelled_end{Status::kFailed, "broken off", Json::object()};
 };
 
@@ -110,8 +111,8 @@ class Actor {
     }
 
    private:
-    static Progress stopped(Progress progress) {
-      progress.stop = task::StopResult::kConfirmed;
+    [[nodiscard]] Progress stopped(Progress progress) const {
+      progress.stop = course_.stop;
       return progress;
     }
 

@@ -25,23 +25,28 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   if (!found) return std::unexpected(found.error());
   Open& open = **found;
   if (open.cancelled) return fail(fmt::format("task '{}' is ending already", open.task.id), {}, "wait for its outcome");
-  if (open.told == Open::Told::kPause || open.stage == Open::Stage::kParked) return {};
+  if (open.told == Open::Told::kPause || open.stage == Open::Stage::kParked)
+    return fail(fmt::format("task '{}' is paused already", open.task.id), {}, "pons task history tells since when");
   unkept_ = true;
-  if (open.stage == Open::Stage::kWaits) {
-    park(open);
+  // One that an earlier bridge had begun may hold something: it is paused as soon as it has its resources again.
+  const bool may_hold = open.priority == Arbiter::kFirst;
+  if (open.stage == Open::Stage::kWaits && !may_hold) {
+    arbiter_.remove(open.task.id);
+    park(open, now);
     keep(journal_.event(open.task.id, now, kPausedEvent, {{"reason", reason}}));
     return {};
   }
   open.told = Open::Told::kPause;
   open.stands = false;
   keep(journal_.event(open.task.id, now, kPausingEvent, {{"reason", reason}}));
-  open.root->pause(now, task::Pause::kStand);
+  if (open.root) open.root->pause(now, task::Pause::kStand);
   return {};
 }
 
-void Bridge::park(Open& open) {
-  arbiter_.remove(open.task.id);
+void Bridge::park(Open& open, Time now) {
   open.stage = Open::Stage::kParked;
+  open.parked_at = now - held_for_;
+  parked_.insert(open.task.id);
 }
 
 Expected<void> Bridge::resume(std::string_view id, Time now) {
@@ -57,6 +62,8 @@ Expected<void> Bridge::resume(std::string_view id, Time now) {
   open.stands = false;
   if (parked) {
     open.stage = Open::Stage::kWaits;
+    open.waits_since += (now - held_for_) - open.parked_at;
+    parked_.erase(open.task.id);
     enqueue(open);
   } else if (open.root) {
     open.root->resume(now);
@@ -85,6 +92,10 @@ void Bridge::stands(Open& open, const task::Progress& progress, Time now) {
   const Json detail{{"stop", task::name(progress.stop.value_or(task::StopResult::kUncertain))}};
   const std::string& id = open.task.id;
   unkept_ = true;
+  if (progress.stop == task::StopResult::kFailed) {
+    end_running(open, Ending::kHalt, now, "it was told to stand, and moves");
+    return;
+  }
   if (open.told != Open::Told::kPreempt) {
     keep(journal_.event(id, now, kPausedEvent, detail));
     return;

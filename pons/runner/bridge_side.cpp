@@ -63,7 +63,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
-  if (bridge_.running().empty() && !arming_.settles()) skills_.rest(now);
+  if (!bridge_.uses_resources() && !arming_.settles()) skills_.rest(now);
   if (auto noted = note_carried(now); !noted) return noted;
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;
@@ -100,7 +100,7 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
-  const brain::Decisions decisions = dispatcher_.observe(objects, now);
+  const brain::Decisions decisions = dispatcher_.observe(objects, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {

@@ -30,6 +30,7 @@ constexpr double kSlowestShare = 0.10;
 constexpr double kSlowGripShare = 0.70;
 // Of one correction: a few are fine, but what no speed helps must come to an end.
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
+constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
 constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
@@ -298,6 +299,18 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;
     search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, timid));
   }
+}
+
+Expected<void> Cell::stop(Time now) {
+  for (double share = 1; held && share >= kSlowestShare; share *= kSofter) {
+    const AxisLimits limits = limits_loaded(share);
+    const Time from = arm.splice_time(now, limits);
+    const auto way = motion::stop(arm.planned(from), from, limits);
+    if (!way) break;
+    const double mass_kg = held->mass_kg + kUnsure_kg;
+    if (grip_use(model, world.robot.tool, held->load, mass_kg, *way) <= kGripShare) return arm.stream(*way);
+  }
+  return arm.stop(now);
 }
 
 }  // namespace pons::skills

@@ -118,6 +118,9 @@ class Cell {
   // that is spent, whoever asks with the same `search` in the next tick goes on from there.
   [[nodiscard]] Expected<motion::Trajectory> carry(Time now, const Goal& goal, Search& search);
 
+  // To rest, as softly as what is held was carried.
+  [[nodiscard]] Expected<void> stop(Time now);
+
   // For an arm that waits: up, with what it holds, before anything that rides along the belt meets it. Does nothing
   // while it moves or where it is clear.
   void keep_clear(Time now);

@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "pons/skills/scale.hpp"
 #include "pons/skills/standstill.hpp"
 
 namespace pons::skills {
@@ -17,10 +18,10 @@ constexpr Duration kHaltWithin = std::chrono::seconds(3);
 class Conducted final : public task::Skill {
  public:
   Conducted(Cell& cell, std::unique_ptr<ArmSkill> skill)
-      : cell_(cell), skill_(std::move(skill)), standstill_(cell.arm) {}
+      : cell_(cell), skill_(std::move(skill)), standstill_(cell.arm), weighing_(cell) {}
 
   Progress tick(Time now) override {
-    if (!std::exchange(began_, true)) cell_.let_go_of_unknown();
+    if (std::exchange(fresh_, false)) take_over_arm();
     Progress progress = advance(now);
     progress.notes = cell_.take_notes();
     return progress;
@@ -33,8 +34,9 @@ class Conducted final : public task::Skill {
   }
 
   void resume(Time now) override {
-    if (mode_ == Mode::kRests) skill_->go_on(now, now - rests_since_);
-    if (mode_ == Mode::kRests || mode_ == Mode::kSeeksRest) mode_ = Mode::kGoes;
+    if (mode_ != Mode::kRests && mode_ != Mode::kSeeksRest) return;
+    skill_->go_on(now, mode_ == Mode::kRests ? now - rests_since_ : Duration{0});
+    mode_ = Mode::kGoes;
   }
 
   void cancel(Time now) override {
@@ -48,6 +50,7 @@ class Conducted final : public task::Skill {
     if (mode_ == Mode::kHalts) return;
     mode_ = Mode::kHalts;
     halted_at_ = now;
+    stands_.reset();
     cell_.arm.halt();
   }
 
@@ -63,7 +66,7 @@ class Conducted final : public task::Skill {
   Progress advance(Time now) {
     switch (mode_) {
       case Mode::kGoes:
-        return skill_->tick(now);
+        return go(now);
       case Mode::kSeeksRest:
         if (!skill_->may_rest(now, pause_)) return skill_->tick(now);
         begin_rest(now);
@@ -78,15 +81,32 @@ class Conducted final : public task::Skill {
     return {Status::kFailed, "unreachable"};
   }
 
+  // As it was left by whoever had it before: a skill that was halted may have left something on the cups that nobody
+  // knows of, and a force that its tip might meet.
+  void take_over_arm() {
+    cell_.let_go_of_unknown();
+    cell_.arm.expect_contact(0);
+    unweighed_ = cell_.held && cell_.held->mass_kg <= 0;
+  }
+
+  Progress go(Time now) {
+    if (unweighed_ && cell_.arm.operational()) {
+      unweighed_ = cell_.held && !weighing_.tick(now);
+      if (unweighed_) return {};
+    }
+    return skill_->tick(now);
+  }
+
   void begin_rest(Time now) {
     mode_ = Mode::kRests;
     rests_since_ = now;
     stands_.reset();
-    if (cell_.arm.operational() && now < cell_.arm.motion_end()) (void)cell_.arm.stop(now);
+    if (cell_.arm.operational() && now < cell_.arm.motion_end()) (void)cell_.stop(now);
     standstill_.expect(now);
   }
 
   Progress rest(Time now) {
+    fresh_ = true;  // others may have the arm meanwhile
     if (!stands_) stands_ = standstill_.look(now);
     if (!stands_) return {};
     if (pause_ == Pause::kStand) cell_.keep_clear(now);
@@ -106,24 +126,32 @@ class Conducted final : public task::Skill {
     return verdict_->stop ? *verdict_ : Progress{};
   }
 
+  // Before the command has arrived the cerebellum tells nothing of a stop. And what is being let go of is not known to
+  // have gone: what was done by then is done.
   Progress halted(Time now) {
-    // Before the command has arrived the cerebellum tells nothing of a stop.
-    const bool takes_effect = !cell_.arm.operational();
-    Progress progress{Status::kFailed, "halted"};
-    if (takes_effect) progress.stop = standstill_.look(now);
-    if (!progress.stop && now >= halted_at_ + kHaltWithin) progress.stop = task::StopResult::kFailed;
-    return progress.stop ? progress : Progress{};
+    const bool overdue = now >= halted_at_ + kHaltWithin;
+    if (!stands_ && cell_.arm.operational()) cell_.arm.halt();
+    if (!stands_ && !cell_.arm.operational()) stands_ = standstill_.look(now);
+    const bool lets_go = cell_.arm.cups().phase == link::VacuumPhase::kReleasing;
+    if ((!stands_ || lets_go) && !overdue) return {};
+    Progress progress = verdict_.value_or(Progress{});
+    if (!verdict_ && !cell_.arm.operational()) progress = skill_->tick(now);
+    if (progress.status != Status::kSucceeded) progress = {Status::kFailed, "halted"};
+    progress.stop = stands_.value_or(task::StopResult::kFailed);
+    return progress;
   }
 
   Cell& cell_;
   std::unique_ptr<ArmSkill> skill_;
   Standstill standstill_;
+  LateWeighing weighing_;
+  bool unweighed_ = false;
   Mode mode_ = Mode::kGoes;
   Pause pause_ = Pause::kStand;
   Time rests_since_, halted_at_;
-  std::optional<task::StopResult> stands_;  // resting
+  std::optional<task::StopResult> stands_;  // resting or halted
   std::optional<Progress> verdict_;         // cancelled
-  bool began_ = false;
+  bool fresh_ = true;                       // the arm may not be as this skill left it
 };
 
 }  // namespace

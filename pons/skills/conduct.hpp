@@ -23,8 +23,9 @@ class ArmSkill {
 
 // The skill as the bridge sees it. It says that it is paused, and after cancel() or halt() that it has ended, once
 // standstill was measured, or was not within a second. Paused, the arm keeps clear of what rides along. A halt is a
-// protective stop: whatever the arm was at, it stays there, and the cups hold what they hold. With each tick it tells
-// what the arm was asked for in it.
+// protective stop: whatever the arm was at, it stays there, and the cups hold what they hold. Before it begins, or goes
+// on, what another has left on the cups is let go of when nobody knows it, and weighed when nobody has. With each tick
+// it tells what the arm was asked for in it.
 [[nodiscard]] std::unique_ptr<task::Skill> conduct(Cell& cell, std::unique_ptr<ArmSkill> skill);
 
 }  // namespace pons::skills

@@ -16,7 +16,7 @@ class Detect final : public task::Skill {
 
   Progress tick(Time now) override {
     if (stopped_) return stands({Status::kFailed, *stopped_});
-    if (paused_at_) return stands({Status::kPaused});
+    if (paused_at_ && !cell_.held) return stands({Status::kPaused});
     if (const ObjectBelief* object = cell_.find(code_)) {
       const Vector3 p = object->world_from_top.translation();
       const auto& r = object->world_from_top.linear();
@@ -67,7 +67,7 @@ task::SkillType detect(Cell& cell) {
           .resources = {},
           .timeout = std::chrono::seconds(70),
           .attempts = 1,
-          .safe_points = {"at once"},
+          .safe_points = {"at once; with something on the cups, at the next step's"},
           .start = [&cell](const task::Json& arguments, Time now) {
             return std::make_unique<Detect>(cell, arguments.at("object").get<std::string>(),
                                             now + from_s(arguments.value("within_s", 5.0)));

@@ -44,7 +44,7 @@ class MoveTo final : public ArmSkill {
   void cancel(Time now) override {
     cancelled_ = true;
     moving_ = true;
-    if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
+    if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
   }
 
   // What the cups hold nobody else could place.

@@ -54,13 +54,7 @@ constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits 
 class Pick final : public ArmSkill {
  public:
   Pick(Cell& cell, std::string code, Time now)
-      : cell_(cell),
-        code_(std::move(code)),
-        started_(now),
-        seen_(now),
-        weighing_(cell),
-        set_down_(cell),
-        delay_(cell.arm) {}
+      : cell_(cell), code_(std::move(code)), started_(now), seen_(now), set_down_(cell), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
     move_along(delay_.take());
@@ -133,7 +127,6 @@ class Pick final : public ArmSkill {
   Progress find(Time now) {
     if (!cell_.world.robot.wrist_sensor)
       return {Status::kFailed, "the robot has no wrist sensor to weigh a load with: see robot.wrist_sensor", {}};
-    if (cell_.held && !weighing_.tick(now)) return {};
     cell_.keep_clear(now);
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};
@@ -468,7 +461,6 @@ class Pick final : public ArmSkill {
   double lift_travel_m_ = 0;  // of the belt then
   double expected_kg_ = 0;    // of the load, by its size
   Scale scale_;
-  LateWeighing weighing_;
   SetDown set_down_;
   Delay delay_;
   Duration behind_{0};  // of the belt, since the cups set out for the contact

@@ -72,7 +72,7 @@ class Place final : public ArmSkill {
   void cancel(Time now) override {
     cancelled_ = true;
     if (phase_ == Phase::kRelease || phase_ == Phase::kHold) return;  // it is over the mouth already
-    if (cell_.arm.stop(now)) arrives_ = cell_.arm.motion_end();
+    if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
     phase_ = Phase::kHold;
   }
 

@@ -174,6 +174,43 @@ TEST_P(VerbsOfASkill, HaltedItStandsAtOnceAndTheCellGoesOn) {
 INSTANTIATE_TEST_SUITE_P(Skills, VerbsOfASkill, testing::ValuesIn(kUses),
                          [](const auto& use) { return std::string(use.param.name); });
 
+// What had left the cups before the halt has arrived, and what had not is still held.
+TEST(Verbs, HaltedAtAnyMomentOfLettingGoItKnowsWhatItPlaced) {
+  const auto let_go = [](TaskRun& cell) {
+    bool held = false;
+    const auto is_held = [&] { return cell.cerebellum().state().vacuum.phase == link::VacuumPhase::kSealed; };
+    while (!held || is_held()) {
+      cell.step();
+      held = held || is_held();
+      ASSERT_LT(cell.now(), Time(kLongest));
+    }
+  };
+  const auto world = [] { return world::load(PONS_WORLDS_SOURCE, "parcel_cell").value(); };
+  TaskRun undisturbed(world());
+  let_go(undisturbed);
+  int placed = 0;
+  for (int ms = -60; ms <= 70; ms += 10) {
+    TaskRun cell(world());
+    while (cell.now() < undisturbed.now() + std::chrono::milliseconds(ms)) cell.step();
+    SCOPED_TRACE(fmt::format("{} ms after the cups were opened", ms));
+    ASSERT_TRUE(cell.bridge().halt("P000001", cell.now(), "test"));
+    cell.await("P000001", 3s, [](Time) {});
+    EXPECT_EQ(cell.detail.at("stop"), "CONFIRMED");
+    placed += cell.outcome == Outcome::kSucceeded ? 1 : 0;
+    const bool finished = cell.finish([](Time) {});
+    const auto reckoning =
+        apps::reckon(cell.world(), cell.body(), cell.journal(), {.result = {.end = cell.now(), .complete = finished}});
+    ASSERT_TRUE(reckoning) << reckoning.error().line();
+    const referee::Verdict& verdict = reckoning->verdict;
+    EXPECT_EQ(verdict.lost + verdict.missorted + verdict.duplicated, 0) << testing::PrintToString(verdict.findings);
+    if (placed > 0) {
+      EXPECT_EQ(verdict.sorted, 1) << "once let go of, always";
+    }
+  }
+  EXPECT_GE(placed, 5);
+  EXPECT_LE(placed, 10);
+}
+
 // Whoever calls what when, no parcel is lost and none is where it should not be.
 TEST(Verbs, OfAPersonWhoCannotMakeUpTheirMindLoseNothing) {
   constexpr int kParcels = 14;

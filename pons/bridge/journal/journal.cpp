@@ -54,13 +54,15 @@ struct Journal::Impl {
   // what was to become durable together must not become so in part.
   std::optional<Error> failed;
   // Only open_to_read() leaves those that write unprepared.
-  mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count;
+  mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count, newest;
+  std::int64_t durable = -1;  // not looked up yet
   Statement add_first, add_event, add_note, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();
   [[nodiscard]] Expected<void> prepare(Database::Mode mode);
   [[nodiscard]] Expected<void> ensure_transaction();
   [[nodiscard]] Expected<void> make_durable();
+  [[nodiscard]] Expected<void> look_up_durable();
   [[nodiscard]] Expected<void> write(Statement& statement);
   // A transaction, and the stamp for what is written now: a clock that runs back is told of, and waited for.
   [[nodiscard]] Expected<std::int64_t> begin_at(Time now);
@@ -115,7 +117,7 @@ Expected<void> Journal::Impl::prepare(Database::Mode mode) {
     return {};
   };
   const std::string tasks(kTaskColumns), events(kEventColumns);
-  const std::array<std::pair<Statement*, std::string>, 8> reads{{
+  const std::array<std::pair<Statement*, std::string>, 9> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
       {&all_tasks, tasks + "ORDER BY a.sequence"},
       {&one_task, tasks + "AND a.task = ?1"},
@@ -127,6 +129,7 @@ Expected<void> Journal::Impl::prepare(Database::Mode mode) {
                                   "WHERE a.order_id = ?1 AND a.order_id <> '' AND a.kind = 'accepted' "
                                   "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
       {&every_event, events + "ORDER BY task, sequence"},
+      {&newest, "SELECT coalesce(max(sequence), 0) FROM event"},
       {&count,
        "SELECT (SELECT count(*) FROM event WHERE kind = 'accepted'), (SELECT count(*) FROM event), "
        "coalesce(sum(o = 'SUCCEEDED'), 0), coalesce(sum(o = 'FAILED'), 0), coalesce(sum(o = 'CANCELLED'), 0), "
@@ -253,7 +256,16 @@ Expected<void> Journal::Impl::make_durable() {
     failed = Error{"the journal's file is gone", file, "put it back where it was, and start again"};
     return std::unexpected(*failed);
   }
-  return write(commit);
+  if (auto done = write(commit); !done) return done;
+  return look_up_durable();
+}
+
+Expected<void> Journal::Impl::look_up_durable() {
+  Reading reading(newest);
+  const auto row = newest.step();
+  if (!row) return std::unexpected(row.error());
+  durable = newest.integer(0);
+  return {};
 }
 
 Expected<std::int64_t> Journal::Impl::begin_at(Time now) {
@@ -413,6 +425,11 @@ Expected<std::optional<TaskHistory>> Journal::task(std::string_view id) const {
 }
 
 Expected<std::vector<Event>> Journal::notes() const { return impl_->all_of(impl_->notes); }
+
+std::int64_t Journal::durable() const {
+  if (impl_->durable < 0 && !impl_->look_up_durable()) return 0;
+  return impl_->durable;
+}
 
 Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64_t after) const {
   return impl_->all_of(impl_->events_of_order.bind(order).bind(after));

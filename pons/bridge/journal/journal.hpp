@@ -119,6 +119,8 @@ class Journal {
   // All that belongs to an order, of whatever task or of none, written after that sequence; a task's own id will do as
   // well.
   [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order, std::int64_t after = 0) const;
+  // The sequence of the last event that a commit has made durable; of one opened for writing.
+  [[nodiscard]] std::int64_t durable() const;
   // Every event, task by task in the order of their ids, those of no task first. Stops at the first error of `take`.
   [[nodiscard]] Expected<void> each_event(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<Counts> counts() const;

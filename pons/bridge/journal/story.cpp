@@ -26,10 +26,10 @@ std::size_t step_of(const Event& event) {
 }  // namespace
 
 bool tells_state(std::string_view kind) {
-  constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent,   kAttemptEvent,   kAttemptEndedEvent,
-                              kCancellingEvent, kHaltingEvent,   kPausingEvent,   kPausedEvent,
-                              kPreemptingEvent, kPreemptedEvent, kContinuedEvent, kHeldEvent,
-                              kReleasedEvent,   kResumedEvent,   kFoundDoneEvent, kEndedEvent};
+  constexpr std::array kKinds{kAcceptedEvent,  kStartedEvent,  kAttemptEvent, kAttemptEndedEvent, kCancellingEvent,
+                              kHaltingEvent,   kPausingEvent,  kPausedEvent,  kPreemptingEvent,   kPreemptedEvent,
+                              kContinuedEvent, kRegainedEvent, kHeldEvent,    kReleasedEvent,     kResumedEvent,
+                              kFoundDoneEvent, kEndedEvent};
   return std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
@@ -54,6 +54,9 @@ Expected<void> Story::take(const Event& event) {
   if (of_running && !started_) taken = impossible(event, "comes before it was started");
   if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = true;
   if (event.kind == kContinuedEvent) paused_ = false;
+  if (event.kind == kCancellingEvent || event.kind == kHaltingEvent) ending_ = task::text_of(event.detail, "reason");
+  if (event.kind == kPreemptedEvent) handed_over_ = true;
+  if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = false;
   // What the bridge before was at, nobody saw end.
   if (event.kind == kResumedEvent) trying_.reset();
   if (!taken) return taken;

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "pons/bridge/journal/journal.hpp"
@@ -18,7 +19,8 @@ inline constexpr std::string_view kPausingEvent = "pausing";             // {"re
 inline constexpr std::string_view kPausedEvent = "paused";               // {"stop"}, of one that has begun
 inline constexpr std::string_view kPreemptingEvent = "preempting";       // {"by"}: likewise, for that task
 inline constexpr std::string_view kPreemptedEvent = "preempted";         // {"stop"}: and waits again
-inline constexpr std::string_view kContinuedEvent = "continued";         // after either
+inline constexpr std::string_view kContinuedEvent = "continued";         // a person's pause is over
+inline constexpr std::string_view kRegainedEvent = "regained";           // preempted, it has its resources again
 inline constexpr std::string_view kHeldEvent = "held";                   // {"cause"}: an emergency stop has come,
 inline constexpr std::string_view kReleasedEvent = "released";           // and is over
 inline constexpr std::string_view kResumedEvent = "resumed";  // {"step"}: another bridge goes on, with this step
@@ -38,6 +40,10 @@ class Story {
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] bool ended() const { return ended_; }
   [[nodiscard]] bool paused() const { return paused_; }  // as far as it was asked for
+  // Why it was told to end, if it was.
+  [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
+  // It was preempted and has not gone on: what it had begun stands at a safe point, with nothing in use.
+  [[nodiscard]] bool handed_over() const { return handed_over_; }
   // So many of its first steps have succeeded.
   [[nodiscard]] std::size_t done() const { return done_; }
 
@@ -51,9 +57,10 @@ class Story {
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
   std::optional<std::size_t> trying_;  // the step whose skill runs
+  std::optional<std::string> ending_;
   std::int64_t sequence_ = 0, run_ = 0;
   Time stamp_;
-  bool accepted_ = false, started_ = false, paused_ = false, ended_ = false;
+  bool accepted_ = false, started_ = false, paused_ = false, handed_over_ = false, ended_ = false;
 };
 
 // Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and

@@ -71,6 +71,11 @@ TEST_F(StoryTest, KnowsWhetherItIsPaused) {
   EXPECT_EQ(event(kPreemptingEvent), "");
   EXPECT_EQ(event(kPreemptedEvent), "");
   EXPECT_FALSE(story_.paused()) << "it goes on by itself";
+  EXPECT_TRUE(story_.handed_over());
+  EXPECT_EQ(event(kContinuedEvent), "") << "of a pause meanwhile";
+  EXPECT_TRUE(story_.handed_over());
+  EXPECT_EQ(event(kRegainedEvent), "");
+  EXPECT_FALSE(story_.handed_over());
   EXPECT_EQ(event(kPausingEvent), "");
   EXPECT_TRUE(story_.paused()) << "from when it was asked for";
   EXPECT_EQ(attempt_ended(0, task::Status::kSucceeded), "");

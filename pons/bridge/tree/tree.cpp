@@ -9,7 +9,12 @@
 namespace pons::bridge::tree {
 namespace {
 
-Progress broken_off() { return {Status::kFailed, "cancelled before it started", Json::object()}; }
+// `stop`: of what came before it.
+Progress broken_off(std::optional<task::StopResult> stop = {}) {
+  Progress progress{Status::kFailed, "cancelled before it started", Json::object()};
+  progress.stop = stop;
+  return progress;
+}
 
 // Ticks its children one after the other; `goes_on` says after which status the next one is tried.
 class Series final : public Node {
@@ -23,7 +28,7 @@ class Series final : public Node {
       Progress progress = children_[current_]->tick(now);
       if (!task::is_end(progress.status) || !goes_on_(progress.status)) return progress;
       if (current_ + 1 == children_.size()) return progress;
-      if (cancelled_) return progress.status == Status::kSucceeded ? broken_off() : progress;
+      if (cancelled_) return progress.status == Status::kSucceeded ? broken_off(progress.stop) : progress;
       ++current_;
       if (pause_) children_[current_]->pause(now, *pause_);
     }
@@ -44,6 +49,7 @@ class Series final : public Node {
     cancelled_ = true;
     children_[current_]->halt(now);
   }
+  void stand_still(Time now) override { children_[current_]->stand_still(now); }
   void reset() override {
     for (NodePtr& child : children_) child->reset();
     current_ = 0;
@@ -67,6 +73,7 @@ class Decorator : public Node {
   void resume(Time now) override { child_->resume(now); }
   void cancel(Time now) override { child_->cancel(now); }
   void halt(Time now) override { child_->halt(now); }
+  void stand_still(Time now) override { child_->stand_still(now); }
   void reset() override { child_->reset(); }
 
  protected:
@@ -129,9 +136,10 @@ class Timeout final : public Decorator {
 
   Progress tick(Time now) override {
     if (!ends_) ends_ = now + limit_;
-    if (paused_since_) *ends_ += now - *std::exchange(paused_since_, {});
+    if (paused_) *ends_ += now - last_tick_;
+    last_tick_ = now;
     Progress progress = child().tick(now);
-    if (progress.status == Status::kPaused) paused_since_ = now;
+    paused_ = progress.status == Status::kPaused;
     if (!task::is_end(progress.status)) {
       if (!expired_ && progress.status == Status::kRunning && now >= *ends_) {
         expired_ = true;
@@ -144,16 +152,22 @@ class Timeout final : public Decorator {
     progress.reason = fmt::format("timed out after {} s: {}", to_s(limit_), progress.reason);
     return progress;
   }
+  void stand_still(Time now) override {
+    paused_ = true;
+    Decorator::stand_still(now);
+  }
   void reset() override {
     Decorator::reset();
     ends_.reset();
-    paused_since_.reset();
+    paused_ = false;
     expired_ = false;
   }
 
  private:
   Duration limit_;
-  std::optional<Time> ends_, paused_since_;
+  std::optional<Time> ends_;
+  Time last_tick_;
+  bool paused_ = false;  // since the last tick
   bool expired_ = false;
 };
 
@@ -190,6 +204,7 @@ class Action final : public Node {
     if (skill_ && !cancelled_) skill_->cancel(now);
     cancelled_ = true;
   }
+  void stand_still(Time) override {}
   void halt(Time now) override {
     if (skill_) skill_->halt(now);
     cancelled_ = true;

@@ -42,6 +42,8 @@ class Node {
   virtual void resume(Time now) = 0;
   virtual void cancel(Time now) = 0;
   virtual void halt(Time now) = 0;
+  // Before a tick: the time since the one before does not count.
+  virtual void stand_still(Time now) = 0;
   // As newly built. Not while it runs.
   virtual void reset() = 0;
 };
