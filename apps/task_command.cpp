@@ -151,7 +151,7 @@ Expected<std::string> follow(const TaskOptions& options, std::int64_t after, con
     after = answer->at("after");
     for (const Json& event : answer->at("events")) {
       fmt::print("{}\n", story_line(event));
-      const auto kind = event.value("kind", std::string{});
+      auto kind = event.value("kind", std::string{});
       if (event.value("task", std::string{}) == options.id && until.contains(kind)) return kind;
     }
     std::fflush(stdout);
