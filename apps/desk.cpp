@@ -32,7 +32,7 @@ Json to_json(const ObjectBelief& object) {
 bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kHalt; }
 
 constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
-constexpr std::size_t kWatchersMost = 16;
+constexpr std::size_t kWatchersMost = 16;  // half of the socket's clients: the other half is for whoever else asks
 constexpr std::string_view kAskedFor = "asked for over the socket";
 
 const Error kNoStream{"no stream goes on", "chunk_stream",
@@ -77,7 +77,7 @@ void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
   for (gate::Request& request : socket_->poll()) {
     auto asked = gate::asked_from(request.text);
-    if (asked && asked->operation == gate::Operation::kWatch) {
+    if (asked && asked->operation == gate::Operation::kWatch && watchers_.size() < kWatchersMost) {
       watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
       continue;
     }
@@ -95,17 +95,13 @@ void Desk::attend(Time now) {
   tell_watchers(now);
 }
 
-// What is durable, and nothing else. Those who watch must not keep others from the socket: when too many do, the first
-// is sent away, and asks again.
+// What is durable, and nothing else.
 void Desk::tell_watchers(Time now) {
   const std::int64_t durable = journal_.durable();
-  const std::size_t too_many = watchers_.size() - std::min(watchers_.size(), kWatchersMost);
-  std::size_t number = 0;
   std::erase_if(watchers_, [&](Watcher& watcher) {
-    const bool leaves = number++ < too_many || now >= watcher.until;
     std::optional<Json> told;
     if (std::exchange(watcher.looked, durable) != durable) told = news(watcher.asked);
-    if (!told && leaves) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
+    if (!told && now >= watcher.until) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
     if (told) watcher.request.reply(*told);
     return told.has_value();
   });
@@ -126,8 +122,8 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kCancel:
     case gate::Operation::kHalt:
       return tell_task(asked, now);
-    case gate::Operation::kWatch:  // answered when there is something to tell
-      break;
+    case gate::Operation::kWatch:  // one more than are answered when there is something to tell
+      return gate::refusal({fmt::format("{} watch already", watchers_.size()), "watch", "ask history instead"});
     case gate::Operation::kObserve:
       return observe(now);
     case gate::Operation::kChunk:
@@ -151,11 +147,17 @@ Json Desk::submit(const std::string& task, Time now) {
           {"accepted", admitted->accepted == bridge::Accepted::kNew ? "new" : "already"}};
 }
 
+Json Desk::with_state(const bridge::TaskRecord& record) const {
+  Json json = to_json(record);
+  if (const std::string_view state = bridge_.state(record.task.id); !state.empty()) json["state"] = state;
+  return json;
+}
+
 Json Desk::list() const {
   const auto tasks = journal_.tasks();
   if (!tasks) return gate::refusal(tasks.error());
   Json list = Json::array();
-  for (const bridge::TaskRecord& record : *tasks) list.push_back(to_json(record));
+  for (const bridge::TaskRecord& record : *tasks) list.push_back(with_state(record));
   return {{"ok", true}, {"tasks", std::move(list)}};
 }
 
@@ -163,7 +165,7 @@ Json Desk::show(const std::string& id) const {
   const auto history = journal_.task(id);
   if (!history) return gate::refusal(history.error());
   if (!*history) return gate::refusal({"no task '" + id + "'", "show", "pons task list shows those there are"});
-  return {{"ok", true}, {"task", to_json((*history)->record)}, {"events", to_json((*history)->events)}};
+  return {{"ok", true}, {"task", with_state((*history)->record)}, {"events", to_json((*history)->events)}};
 }
 
 Json Desk::history(const std::string& order) const {

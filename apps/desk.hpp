@@ -30,6 +30,8 @@ class Desk {
  private:
   [[nodiscard]] bridge::Json answer(const gate::Asked& asked, Time now);
   [[nodiscard]] bridge::Json submit(const std::string& task, Time now);
+  // The bridge knows more of an open task than the journal's row.
+  [[nodiscard]] bridge::Json with_state(const bridge::TaskRecord& record) const;
   [[nodiscard]] bridge::Json list() const;
   [[nodiscard]] bridge::Json show(const std::string& id) const;
   [[nodiscard]] bridge::Json history(const std::string& order) const;

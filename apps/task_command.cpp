@@ -79,9 +79,9 @@ int submit(const TaskOptions& options) {
 
 void print_row(const Json& task) {
   const std::string outcome = task.value("outcome", std::string{});
+  const std::string open = task.value("state", std::string(task.value("started", false) ? "begun" : "waiting"));
   fmt::print("{:<20} {:>3}  {:<10} {}\n", task.value("id", std::string{}), task.value("priority", 0),
-             !outcome.empty() ? outcome : (task.value("started", false) ? "running" : "waiting"),
-             task.value("reason", std::string{}));
+             outcome.empty() ? open : outcome, task.value("reason", std::string{}));
 }
 
 Expected<Json> from_journal(const fs::path& file, const std::string& id) {

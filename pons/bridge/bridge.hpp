@@ -106,6 +106,9 @@ class Bridge {
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
+  // How an open task stands, for a person to read: "waiting", "running", "pausing", "paused", "making way", "preempted",
+  // "ending"; empty when there is no such open task.
+  [[nodiscard]] std::string_view state(std::string_view id) const;
   // Waiting ones that a person has paused.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
   // Whether any of those that run needs some: else nothing moves for a task.

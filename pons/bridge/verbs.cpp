@@ -18,6 +18,19 @@ Expected<Bridge::Open*> Bridge::find_open(std::string_view id) {
   return found->second.get();
 }
 
+std::string_view Bridge::state(std::string_view id) const {
+  const auto found = open_.find(id);
+  if (found == open_.end()) return "";
+  const Open& open = *found->second;
+  if (open.stage == Open::Stage::kParked) return "paused";
+  if (open.stage == Open::Stage::kWaits && open.told == Open::Told::kPause) return "pausing";
+  if (open.stage == Open::Stage::kWaits)
+    return open.begun && open.priority != Arbiter::kFirst ? "preempted" : "waiting";
+  if (open.cancelled) return "ending";
+  if (open.told == Open::Told::kPause) return open.stands ? "paused" : "pausing";
+  return open.told == Open::Told::kPreempt ? "making way" : "running";
+}
+
 // ---- pause, resume ----
 
 Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view reason) {
@@ -152,6 +165,8 @@ void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view r
   } else {
     open.root->cancel(now);
   }
+  // After a fault nobody has told it to end: another bridge goes on with it.
+  if (fault_) return;
   keep(journal_.event(open.task.id, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}}));
 }
 

@@ -38,6 +38,9 @@ TEST_F(VerbsTest, PausedOnItsWayItKeepsItsResourcesAndGoesOn) {
   EXPECT_THAT(pause("a"), HasSubstr("is paused already"));
   tick();
   EXPECT_THAT(kinds("a"), ElementsAre("started", "attempt", "pausing", "paused"));
+  EXPECT_EQ(bridge_->state("a"), "paused");
+  EXPECT_EQ(bridge_->state("b"), "waiting");
+  EXPECT_EQ(bridge_->state("c"), "");
   EXPECT_EQ(last("a").detail.at("stop"), "CONFIRMED");
   EXPECT_THAT(pick_.log.pauses, ElementsAre(Pause::kStand));
   tick(500);
@@ -142,6 +145,21 @@ TEST_F(VerbsTest, WhatWasToldToEndEndsForTheNextBridge) {
   EXPECT_TRUE(bridge_->idle());
 }
 
+// What ran beside the skill that made the bridge give up goes on with the next one.
+TEST_F(VerbsTest, AFaultOfTheBridgeIsNobodysWord) {
+  Actor beside("beside", {{.ticks = 1'000'000}});
+  task::SkillType type = beside.type(1, from_s(600));
+  type.resources.clear();
+  skills_.add(type);
+  reopen();
+  ASSERT_TRUE(submit("innocent", "beside"));
+  ASSERT_TRUE(submit("stuck", "deaf"));
+  tick(4'000);
+  ASSERT_TRUE(bridge_->fault());
+  EXPECT_EQ(beside.log.cancels, 1);
+  EXPECT_THAT(kinds("innocent"), testing::Not(testing::Contains("cancelling")));
+}
+
 TEST_F(VerbsTest, AStoppedRobotsTimeDoesNotCount) {
   ASSERT_TRUE(submit("a", "slow"));  // times out after 5 s
   tick(100);
@@ -206,12 +224,15 @@ TEST_F(VerbsTest, AnUrgentTaskGetsTheArmAndTheOtherGoesOnByItself) {
   tick();
   EXPECT_THAT(kinds("a"), ElementsAre("started", "attempt", "preempting"));
   EXPECT_EQ(last("a").detail.at("by"), "urgent");
+  EXPECT_EQ(bridge_->state("a"), "making way");
   EXPECT_THAT(pick_.log.pauses, ElementsAre(Pause::kHandOver));
   tick();
   EXPECT_EQ(bridge_->running(), std::vector<std::string>{"urgent"});
   EXPECT_EQ(bridge_->queue(), std::vector<std::string>{"a"});
   EXPECT_EQ(last("a").kind, "preempted");
   EXPECT_EQ(last("a").detail.at("stop"), "CONFIRMED");
+  EXPECT_EQ(bridge_->state("a"), "preempted");
+  EXPECT_EQ(bridge_->state("urgent"), "running");
   const int ticks = pick_.log.ticks;
   tick(2);
   EXPECT_EQ(pick_.log.ticks, ticks) << "what holds no resources is not ticked";
@@ -284,6 +305,7 @@ TEST_F(VerbsTest, CancelledItLeavesTheWorldSafeAndSaysThatItStands) {
   tick(5);
   EXPECT_EQ(cancel("a"), "");
   EXPECT_EQ(cancel("a"), "");
+  EXPECT_EQ(bridge_->state("a"), "ending");
   EXPECT_THAT(pause("a"), HasSubstr("is ending already"));
   const auto reports = run(1);
   ASSERT_EQ(reports.size(), 1u);

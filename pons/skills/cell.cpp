@@ -302,15 +302,17 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
 }
 
 Expected<void> Cell::stop(Time now) {
+  std::optional<motion::Trajectory> softest;
   for (double share = 1; held && share >= kSlowestShare; share *= kSofter) {
     const AxisLimits limits = limits_loaded(share);
     const Time from = arm.splice_time(now, limits);
-    const auto way = motion::stop(arm.planned(from), from, limits);
+    auto way = motion::stop(arm.planned(from), from, limits);
     if (!way) break;
     const double mass_kg = held->mass_kg + kUnsure_kg;
-    if (grip_use(model, world.robot.tool, held->load, mass_kg, *way) <= kGripShare) return arm.stream(*way);
+    softest = std::move(*way);
+    if (grip_use(model, world.robot.tool, held->load, mass_kg, *softest) <= kGripShare) break;
   }
-  return arm.stop(now);
+  return softest ? arm.stream(*softest) : arm.stop(now);
 }
 
 }  // namespace pons::skills

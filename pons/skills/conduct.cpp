@@ -18,7 +18,7 @@ constexpr Duration kHaltWithin = std::chrono::seconds(3);
 class Conducted final : public task::Skill {
  public:
   Conducted(Cell& cell, std::unique_ptr<ArmSkill> skill)
-      : cell_(cell), skill_(std::move(skill)), standstill_(cell.arm), weighing_(cell) {}
+      : cell_(cell), skill_(std::move(skill)), standstill_(cell.arm) {}
 
   Progress tick(Time now) override {
     if (std::exchange(fresh_, false)) take_over_arm();
@@ -68,7 +68,7 @@ class Conducted final : public task::Skill {
       case Mode::kGoes:
         return go(now);
       case Mode::kSeeksRest:
-        if (!skill_->may_rest(now, pause_)) return skill_->tick(now);
+        if (unweighed_ || !skill_->may_rest(now, pause_)) return go(now);
         begin_rest(now);
         return rest(now);
       case Mode::kRests:
@@ -87,12 +87,15 @@ class Conducted final : public task::Skill {
     cell_.let_go_of_unknown();
     cell_.arm.expect_contact(0);
     unweighed_ = cell_.held && cell_.held->mass_kg <= 0;
+    weighing_.emplace(cell_);
   }
 
   Progress go(Time now) {
     if (unweighed_ && cell_.arm.operational()) {
-      unweighed_ = cell_.held && !weighing_.tick(now);
+      unweighed_ = cell_.held && !weighing_->tick(now);
       if (unweighed_) return {};
+    } else if (unweighed_) {
+      weighing_.emplace(cell_);  // a stop broke it off
     }
     return skill_->tick(now);
   }
@@ -144,7 +147,7 @@ class Conducted final : public task::Skill {
   Cell& cell_;
   std::unique_ptr<ArmSkill> skill_;
   Standstill standstill_;
-  LateWeighing weighing_;
+  std::optional<LateWeighing> weighing_;
   bool unweighed_ = false;
   Mode mode_ = Mode::kGoes;
   Pause pause_ = Pause::kStand;

@@ -16,7 +16,11 @@ class Detect final : public task::Skill {
 
   Progress tick(Time now) override {
     if (stopped_) return stands({Status::kFailed, *stopped_});
-    if (paused_at_ && !cell_.held) return stands({Status::kPaused});
+    // Nobody else may have what hangs on the cups.
+    if (pause_ && (pause_ == task::Pause::kStand || !cell_.held)) {
+      if (!paused_at_) paused_at_ = now;
+      return stands({Status::kPaused});
+    }
     if (const ObjectBelief* object = cell_.find(code_)) {
       const Vector3 p = object->world_from_top.translation();
       const auto& r = object->world_from_top.linear();
@@ -30,10 +34,9 @@ class Detect final : public task::Skill {
     return now < until_ ? Progress{} : Progress{Status::kFailed, "not seen", {}};
   }
 
-  void pause(Time now, task::Pause) override {
-    if (!paused_at_) paused_at_ = now;
-  }
+  void pause(Time, task::Pause pause) override { pause_ = pause; }
   void resume(Time now) override {
+    pause_.reset();
     if (paused_at_) until_ += now - *std::exchange(paused_at_, {});
   }
   void cancel(Time) override { stopped_ = "cancelled"; }
@@ -49,6 +52,7 @@ class Detect final : public task::Skill {
   Cell& cell_;
   std::string code_;
   Time until_;
+  std::optional<task::Pause> pause_;
   std::optional<Time> paused_at_;
   std::optional<std::string> stopped_;
 };
@@ -67,7 +71,7 @@ task::SkillType detect(Cell& cell) {
           .resources = {},
           .timeout = std::chrono::seconds(70),
           .attempts = 1,
-          .safe_points = {"at once; with something on the cups, at the next step's"},
+          .safe_points = {"at once; with something on the cups nobody else gets the arm"},
           .start = [&cell](const task::Json& arguments, Time now) {
             return std::make_unique<Detect>(cell, arguments.at("object").get<std::string>(),
                                             now + from_s(arguments.value("within_s", 5.0)));

@@ -113,6 +113,24 @@ TEST_F(PickTest, WhatIsWeighedAfterAStopIsToldToTheLoop) {
   EXPECT_EQ(cell_.held->mass_kg, told->payload_kg);
 }
 
+// Nor does a pause keep it from being weighed first: unweighed it would be carried as if it were nothing.
+TEST_F(PickTest, WhatIsPausedBeforeItIsWeighedIsWeighedAllTheSame) {
+  for (const int paused_at : {0, 3}) {
+    cell_.held = Held{"P1", {.size_m = {0.2, 0.15, 0.1}}, 0};
+    grips_kg_ = 1.9;
+    tick_with({});
+    const auto skill = start("P1");
+    Progress progress;
+    for (int i = 0; i < 200 && !task::is_end(progress.status); ++i) {
+      if (i == paused_at) skill->pause(now_, task::Pause::kHandOver);
+      progress = skill->tick(now_);
+      tick_with({});
+    }
+    EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    EXPECT_NEAR(cell_.held->mass_kg, 1.9, 1e-6) << paused_at;
+  }
+}
+
 // It stood on the belt yet when the arm was stopped: there the wrist feels nothing.
 TEST_F(PickTest, WhatMayStandOnTheBeltIsLiftedBeforeItIsWeighed) {
   const double size_z_m = cell_.model.world_from_tip(rest().position).translation().z() - world_.belt.surface_z_m;

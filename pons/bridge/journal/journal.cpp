@@ -55,7 +55,7 @@ struct Journal::Impl {
   std::optional<Error> failed;
   // Only open_to_read() leaves those that write unprepared.
   mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count, newest;
-  std::int64_t durable = -1;  // not looked up yet
+  std::int64_t durable = 0;
   Statement add_first, add_event, add_note, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();
@@ -186,7 +186,9 @@ Expected<std::unique_ptr<Journal>> Journal::open(const std::filesystem::path& fi
     }
     if (auto set = impl->database.execute("PRAGMA synchronous=FULL;PRAGMA foreign_keys=ON"); !set) return set;
     if (auto begun = impl->begin_run(); !begun) return begun;
-    return impl->prepare(Database::Mode::kCreate);
+    if (auto prepared = impl->prepare(Database::Mode::kCreate); !prepared) return prepared;
+    (void)impl->look_up_durable();  // of a damaged file `check` tells more
+    return {};
   };
   if (auto done = steps(); !done) return std::unexpected(done.error());
   return std::unique_ptr<Journal>(new Journal(std::move(impl)));
@@ -426,10 +428,7 @@ Expected<std::optional<TaskHistory>> Journal::task(std::string_view id) const {
 
 Expected<std::vector<Event>> Journal::notes() const { return impl_->all_of(impl_->notes); }
 
-std::int64_t Journal::durable() const {
-  if (impl_->durable < 0 && !impl_->look_up_durable()) return 0;
-  return impl_->durable;
-}
+std::int64_t Journal::durable() const { return impl_->durable; }
 
 Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64_t after) const {
   return impl_->all_of(impl_->events_of_order.bind(order).bind(after));

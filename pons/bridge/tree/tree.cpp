@@ -135,8 +135,11 @@ class Timeout final : public Decorator {
   Timeout(Duration limit, NodePtr child) : Decorator(std::move(child)), limit_(limit) {}
 
   Progress tick(Time now) override {
-    if (!ends_) ends_ = now + limit_;
-    if (paused_) *ends_ += now - last_tick_;
+    if (!ends_) {
+      ends_ = now + limit_;
+    } else if (paused_) {
+      *ends_ += now - last_tick_;
+    }
     last_tick_ = now;
     Progress progress = child().tick(now);
     paused_ = progress.status == Status::kPaused;
