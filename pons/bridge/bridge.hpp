@@ -73,7 +73,8 @@ class Bridge {
 
   // The verbs that a sender has. What comes of them the task's events and its outcome say, with what was measured:
   // "stop" is CONFIRMED, UNCERTAIN or FAILED. Errors: no such open task, or it is ending already.
-  // Waiting: leaves the queue. Running: stops at its next safe point and keeps its plan and its resources.
+  // Waiting: leaves the queue. Running: stops at its next safe point and keeps its plan and its resources. Error also:
+  // it is paused already.
   [[nodiscard]] Expected<void> pause(std::string_view id, Time now, std::string_view reason);
   // Error also: it is not paused.
   [[nodiscard]] Expected<void> resume(std::string_view id, Time now);
@@ -106,8 +107,8 @@ class Bridge {
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
-  // How an open task stands, for a person to read: "waiting", "running", "pausing", "paused", "making way", "preempted",
-  // "ending"; empty when there is no such open task.
+  // How an open task stands, for a person to read: "waiting", "running", "pausing", "paused", "making way",
+  // "preempted", "ending"; empty when there is no such open task.
   [[nodiscard]] std::string_view state(std::string_view id) const;
   // Waiting ones that a person has paused.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
