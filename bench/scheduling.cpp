@@ -186,6 +186,10 @@ int run(const Options& options) {
   std::ofstream csv;
   if (!options.csv.empty()) {
     csv.open(options.csv);
+    if (!csv) {
+      fmt::print(stderr, "scheduling: {}: cannot be written; name a file in a folder that exists\n", options.csv);
+      return 2;
+    }
     csv << "waiting,arbiter_us,ageing_us,heap_us\n";
   }
   for (std::size_t waiting = 10; waiting <= 100'000; waiting *= 10) {
@@ -199,7 +203,8 @@ int run(const Options& options) {
     fmt::print(
         "{:>7} waiting: {:5.2f} us a task in and out, {:5.2f} us at 1,000 a second; std::priority_queue {:5.2f}\n",
         waiting, median(ours), median(ageing), median(heap));
-    if (csv) csv << fmt::format("{},{:.4f},{:.4f},{:.4f}\n", waiting, median(ours), median(ageing), median(heap));
+    if (csv.is_open())
+      csv << fmt::format("{},{:.4f},{:.4f},{:.4f}\n", waiting, median(ours), median(ageing), median(heap));
   }
   std::vector<double> dispatch;
   for (int round = 0; round < options.rounds; ++round) dispatch.push_back(dispatch_us(2'000, 0));

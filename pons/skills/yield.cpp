@@ -69,10 +69,7 @@ class Yield final : public ArmSkill {
     }
     return now >= *stiff_from_ && cell_.arm.state().controller == link::Controller::kTracking;
   }
-  void go_on(Time, Duration) override {
-    stiff_from_.reset();
-    phase_ = Phase::kRest;
-  }
+  void go_on(Time, Duration) override { phase_ = Phase::kRest; }
 
  private:
   enum class Phase : std::uint8_t { kRest, kYield, kHold };
@@ -83,7 +80,8 @@ class Yield final : public ArmSkill {
     if (cell_.held) return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
     if (cell_.world.robot.drive_delay_s > kLatestDrives_s)
       return {Status::kFailed, "the drives act too late to be a spring: see robot.drive_delay_s", {}};
-    if (now < cell_.arm.motion_end() + kRested) return {};
+    if (now < cell_.arm.motion_end() + kRested || now < stiff_from_.value_or(now)) return {};
+    stiff_from_.reset();
     if (cell_.arm.state().controller != link::Controller::kImpedance) {
       held_at_ = tip();
       cell_.arm.expect_contact(kPush_n);

@@ -117,6 +117,19 @@ TEST_P(VerbsOfASkill, PausedItStandsAndThenGoesOnToItsEnd) {
   EXPECT_GT(paused, 0) << "it has no safe point";
 }
 
+TEST_P(VerbsOfASkill, PausedAndResumedBeforeItStandsItGoesOn) {
+  at_each_moment([&](TaskRun& cell) {
+    ASSERT_TRUE(cell.bridge().pause(id(), cell.now(), "test"));
+    for (const Time until = cell.now() + 20ms; cell.now() < until;) cell.step();
+    if (is_open(cell)) {
+      ASSERT_TRUE(cell.bridge().resume(id(), cell.now()));
+      cell.await(id(), kLongest, [](Time) {});
+    }
+    EXPECT_EQ(cell.journal().task(id()).value()->record.outcome->outcome, Outcome::kSucceeded) << cell.reason;
+    EXPECT_EQ(cell.cerebellum().statistics().stops, 0u);
+  });
+}
+
 TEST_P(VerbsOfASkill, ItMakesWayForAnUrgentTaskAndGoesOnByItself) {
   at_each_moment([&](TaskRun& cell) {
     ASSERT_TRUE(cell.bridge().submit(
