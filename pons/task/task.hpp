@@ -27,7 +27,7 @@ struct Task {
   std::string id;                // 1–64 of A–Z a–z 0–9 - _ . :
   std::string order;             // what it is part of, under which its story is told; likewise, or empty: its id
   int priority = 50;             // 0 … 100, higher first
-  std::optional<Time> deadline;  // of no use afterwards; among equal priorities the earlier goes first
+  std::optional<Time> deadline;  // to the microsecond; of no use after it; the earlier first, priorities being equal
   std::vector<Step> steps;       // run in order
 };
 

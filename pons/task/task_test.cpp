@@ -29,6 +29,19 @@ TEST(Task, SurvivesTheWayThroughJson) {
   EXPECT_EQ(to_json(*task_from(to_json(*task))), good());
 }
 
+// The text of a task is what the journal holds: coming back from it changes nothing, however late the deadline.
+TEST(Task, KeepsADeadlineOnEveryWayThroughText) {
+  for (const double deadline_s :
+       {0.0, 0.1, 12.345678, 2600012.4, 4503599.627371, 4503599.1, 999999999.0, 987654321.123456}) {
+    Json json = good();
+    json["deadline_s"] = deadline_s;
+    const auto task = task_from(json);
+    ASSERT_TRUE(task) << task.error().line();
+    EXPECT_EQ(to_json(*task), json) << deadline_s;
+    EXPECT_EQ(task_from(Json::parse(to_json(*task).dump()))->deadline, task->deadline) << deadline_s;
+  }
+}
+
 TEST(Task, HasDefaults) {
   const auto task = task_from(Json::parse(R"({"id":"a","steps":[{"skill":"home"}]})"));
   ASSERT_TRUE(task);
