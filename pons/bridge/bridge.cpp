@@ -54,6 +54,8 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   if (*held) return Admission{task->id, Accepted::kAlready};
   if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
   if (auto good = review_.check(*task, now); !good) return std::unexpected(good.error());
+  auto program = review_.program(*task);
+  if (!program) return std::unexpected(program.error());
   if (open_.size() >= (task->priority < urgent_priority_ ? kMaxOpen : kMaxUrgent))
     return fail(fmt::format("{} tasks are open already", open_.size()), {}, "submit it again later");
   const auto accepted = journal_.accept(*task, now);
@@ -63,21 +65,18 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   }
   unkept_ = true;
   std::string id = task->id;
-  enqueue(add_open(std::move(*task), now));
+  enqueue(add_open(std::move(*task), *std::move(program), now));
   return Admission{std::move(id), *accepted};
 }
 
-std::vector<std::string> Bridge::resources_of(const task::Task& task) const {
-  std::vector<std::string> resources;
+Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted) {
+  auto open = std::make_unique<Open>();
+  if (program) open->resources = program->resources;
   for (const task::Step& step : task.steps) {
     const auto& needs = skills_.find(step.skill)->resources;
-    resources.insert(resources.end(), needs.begin(), needs.end());
+    open->resources.insert(open->resources.end(), needs.begin(), needs.end());
   }
-  return resources;
-}
-
-Bridge::Open& Bridge::add_open(task::Task task, Time accepted) {
-  auto open = std::make_unique<Open>();
+  open->program = std::move(program);
   open->accepted = accepted;
   open->waits_since = accepted - held_for_;
   open->priority = task.priority;
@@ -88,7 +87,7 @@ Bridge::Open& Bridge::add_open(task::Task task, Time accepted) {
 
 void Bridge::enqueue(const Open& open) {
   const auto deadline = open.begun ? std::nullopt : open.task.deadline;
-  arbiter_.add({open.task.id, open.priority, deadline, open.waits_since, resources_of(open.task)});
+  arbiter_.add({open.task.id, open.priority, deadline, open.waits_since, open.resources});
 }
 
 // ---- after another bridge ----
@@ -101,14 +100,15 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
     // Its skills and places are those of the program and the world that run now.
     if (auto good = review_.check(record.task, record.accepted); !good) {
       finish_unopened(record.task.id, task::Outcome::kFailed, good.error().line(), now);
-    } else if (auto taken = take_up(record, resume, now); !taken) {
+    } else if (auto taken = take_up(record, *review_.program(record.task), resume, now); !taken) {
       return taken;
     }
   }
   return commit(now);
 }
 
-Expected<void> Bridge::take_up(const TaskRecord& record, const Resume& resume, Time now) {
+Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
+                               const Resume& resume, Time now) {
   const auto events = journal_.history(record.task.id);
   if (!events) return std::unexpected(events.error());
   Story story;
@@ -125,9 +125,10 @@ Expected<void> Bridge::take_up(const TaskRecord& record, const Resume& resume, T
     return {};
   }
   const bool begun = story.started();
+  if (begun && program) return go_on_in_tree(record, std::move(program), story, resume, now);
   if (begun && !story.handed_over()) return go_on(record, story, resume, now);
   if (begun) keep(journal_.event(record.task.id, now, kResumedEvent, {{"step", story.done()}}));
-  Open& open = add_open(record.task, record.accepted);
+  Open& open = add_open(record.task, std::move(program), record.accepted);
   open.begun = begun;
   open.done = story.done();
   if (story.paused()) {
@@ -152,13 +153,68 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
     return {};
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", what.done}}));
-  Open& open = add_open(task, record.accepted);
+  Open& open = add_open(task, nullptr, record.accepted);
   open.done = what.done;
   open.begun = true;
   open.priority = Arbiter::kFirst;  // it may hold what the next one would need
   if (story.paused()) open.told = Open::Told::kPause;
   enqueue(open);
   return {};
+}
+
+// A tree goes on as it was at its last checkpoint. Of the leaves whose skills nobody saw end, `resume` says what has
+// become of them; what nobody knows has failed, and the tree deals with it as with any failure.
+Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
+                                     const Story& story, const Resume& resume, Time now) {
+  const task::Task& task = record.task;
+  auto tree = tree_of(task, program);
+  if (!story.checkpoint().is_null()) {
+    if (auto restored = tree->restore(story.checkpoint()); !restored) {
+      finish_unopened(task.id, task::Outcome::kFailed, restored.error().line(), now);
+      return {};
+    }
+  }
+  Json anew = Json::array();
+  for (const std::size_t leaf : story.trying()) {
+    if (leaf >= program->uses.size()) continue;
+    const auto step = tree->step(leaf);
+    if (!step) continue;  // the leaf itself will say so
+    Resumption what;
+    if (!story.handed_over()) what = resume({.id = task.id, .order = task.order, .steps = {*step}}, 0);
+    if (what.outcome == task::Outcome::kException) {
+      tree->settle(leaf, {task::Status::kException, what.reason, Json::object()});
+    } else if (what.outcome && what.outcome != task::Outcome::kSucceeded) {
+      tree->settle(leaf, {task::Status::kFailed, what.reason, Json::object()});
+    } else if (what.done > 0 || what.outcome) {
+      keep(journal_.event(task.id, now, kFoundDoneEvent, {{"step", leaf}}));
+      tree->settle(leaf, {task::Status::kSucceeded, {}, Json::object()});
+    } else {
+      anew.push_back(leaf);
+    }
+  }
+  keep(journal_.event(task.id, now, kResumedEvent, {{"step", std::move(anew)}}));
+  Open& open = add_open(task, std::move(program), record.accepted);
+  open.tree = std::move(tree);
+  open.begun = true;
+  if (!story.handed_over()) {
+    open.priority = Arbiter::kFirst;  // it may hold what the next one would need
+    if (story.paused()) open.told = Open::Told::kPause;
+  } else if (story.paused()) {
+    park(open, now);
+    return {};
+  }
+  enqueue(open);
+  return {};
+}
+
+std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_ptr<const tree::Program> program) {
+  auto tree = std::make_unique<tree::Tree>(
+      std::move(program),
+      [this, id = task.id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); });
+  if (!task.tree) return tree;
+  // The review has seen that it knows them.
+  for (const auto& [name, value] : task.tree->inputs.items()) (void)tree->set(name, value);
+  return tree;
 }
 
 void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now) {
@@ -192,8 +248,7 @@ void Bridge::tick(Time now) {
 void Bridge::stand_still(Time now) {
   if (last_tick_ > Time{}) held_for_ += now - last_tick_;
   for (const auto& [id, open] : running_) {
-    open->root->stand_still(now);
-    if (!open->cancelled && !open->rests) open->rests = last_tick_;
+    open->tree->stand_still();
   }
 }
 
@@ -210,7 +265,7 @@ std::vector<std::string> Bridge::start_granted(Time now) {
     Open& open = *open_.find(id)->second;
     open.stage = Open::Stage::kRuns;
     running_.emplace(id, &open);
-    if (open.root) {
+    if (std::exchange(open.handed_over, false)) {
       regain(open, now);
     } else {
       start(open, now);
@@ -225,27 +280,25 @@ void Bridge::regain(Open& open, Time now) {
   keep(journal_.event(open.task.id, now, kRegainedEvent));
   // Before anything moves, as with an attempt. Where that cannot be written, it is cancelled where it stands.
   keep(commit(now));
-  if (!fault_) open.root->resume(now);
+  if (!fault_) open.tree->resume(now);
 }
 
 void Bridge::start(Open& open, Time now) {
   const std::string& id = open.task.id;
   if (!std::exchange(open.begun, true))
     keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
-  open.observer = [this, id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); };
-  const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
-                                     open.task.steps.end());
-  open.root = tree::from_steps(left, skills_, open.observer);
-  open.give_up_at = now;
-  for (const task::Step& step : open.task.steps) open.give_up_at += skills_.find(step.skill)->timeout + kCancelGrace;
-  if (open.told == Open::Told::kPause) open.root->pause(now, task::Pause::kStand);
+  if (!open.tree) {
+    const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
+                                       open.task.steps.end());
+    open.tree = tree_of(open.task, open.program ? open.program : tree::program_of(left, skills_));
+  }
+  if (open.told == Open::Told::kPause) open.tree->pause(now, task::Pause::kStand);
 }
 
 void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
     Open& open = *running_.find(id)->second;
-    if (open.rests) open.give_up_at += now - *std::exchange(open.rests, {});
-    const task::Progress progress = open.root->tick(now);
+    const task::Status status = open.tree->tick(now);
     // Never begun, because the journal could not say that it would: it stays open there.
     if (fault_ && open.attempts == 0) {
       arbiter_.release(id);
@@ -253,18 +306,27 @@ void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
       open_.erase(id);
       continue;
     }
-    if (task::is_end(progress.status)) {
-      conclude(id, open, progress, now);
-    } else if (progress.status == task::Status::kPaused && !open.cancelled) {
-      stands(open, progress, now);
-    } else if (give_up(open, now)) {
+    if (task::is_end(status)) {
+      conclude(id, open, open.tree->result(), now);
+      continue;
+    }
+    if (open.unwritten) checkpoint(open, now);
+    if (status == task::Status::kPaused && !open.cancelled) {
+      stands(open, now);
+    } else if (give_up(open)) {
       conclude(id, open, {task::Status::kFailed, "a skill did not end when it was told to", Json::object()}, now);
     }
   }
 }
 
-bool Bridge::give_up(Open& open, Time now) {
-  if (now < open.give_up_at) return false;
+// Of steps the attempts tell all.
+void Bridge::checkpoint(Open& open, Time now) {
+  open.unwritten = false;
+  if (open.program) keep(journal_.event(open.task.id, now, kCheckpointEvent, open.tree->checkpoint()));
+}
+
+bool Bridge::give_up(const Open& open) {
+  if (!open.tree->overdue(kCancelGrace)) return false;
   set_fault(
       {fmt::format("a skill of task '{}' did not end within {} s of being cancelled", open.task.id, to_s(kCancelGrace)),
        "bridge", "stop the robot and mend the skill"});
@@ -285,6 +347,7 @@ void Bridge::conclude(const std::string& id, Open& open, const task::Progress& p
   }
   Json detail{{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
   if (progress.stop) detail["stop"] = task::name(*progress.stop);
+  if (open.program) detail["blackboard"] = open.tree->blackboard();
   arbiter_.release(id);
   running_.erase(id);
   finish(id, outcome, std::move(reason), std::move(detail), now);
@@ -315,6 +378,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
   Json detail{{"step", open.done + attempt.step}, {"skill", attempt.skill}, {"attempt", attempt.number}};
   if (attempt.ended == nullptr) {
     if (fault_) return std::unexpected(*fault_);
+    checkpoint(open, now);
     keep(journal_.event(id, now, kAttemptEvent, detail));
     // Before anything moves: whoever reads this after a crash must know what may have been moved, and what was done
     // before it.
@@ -329,6 +393,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
   detail["reason"] = attempt.ended->reason;
   detail["detail"] = attempt.ended->detail;
   keep(journal_.event(id, now, kAttemptEndedEvent, detail));
+  open.unwritten = true;
   return {};
 }
 
@@ -357,7 +422,7 @@ std::vector<std::string> Bridge::running() const {
 }
 
 bool Bridge::uses_resources() const {
-  return std::ranges::any_of(running_, [&](const auto& entry) { return !resources_of(entry.second->task).empty(); });
+  return std::ranges::any_of(running_, [](const auto& entry) { return !entry.second->resources.empty(); });
 }
 
 void Bridge::keep(const Expected<void>& written) {

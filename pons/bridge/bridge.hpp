@@ -51,6 +51,7 @@ struct Resumption {
   std::string reason;                    // of the outcome
 };
 // Looks at the world. `done`: of so many of its first steps the journal has it; an answer of fewer counts as that many.
+// Of a tree it is asked for each skill that nobody saw end, as for a task of that one step.
 using Resume = std::function<Resumption(const task::Task& task, std::size_t done)>;
 
 class Bridge {
@@ -60,6 +61,8 @@ class Bridge {
   ~Bridge();
 
   void add_reviewer(Reviewer reviewer);
+  // The trees that tasks may name, from the XML files of a folder. Errors name file and line; nothing is taken up then.
+  [[nodiscard]] Expected<void> load_trees(const std::filesystem::path& folder) { return review_.load_trees(folder); }
 
   // The task is for good in the journal after the next commit(), which tick() calls: tell a sender who may not hear it
   // otherwise then. Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge
@@ -127,22 +130,27 @@ class Bridge {
   struct Open;
 
   [[nodiscard]] Expected<Admission> admit(std::string_view json, Time now);
-  [[nodiscard]] std::vector<std::string> resources_of(const task::Task& task) const;
-  [[nodiscard]] Open& add_open(task::Task task, Time accepted);
+  [[nodiscard]] Open& add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted);
+  [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,
+                                                    std::shared_ptr<const tree::Program> program);
   void enqueue(const Open& open);
   void park(Open& open, Time now);
   [[nodiscard]] Expected<Open*> find_open(std::string_view id);
-  [[nodiscard]] Expected<void> take_up(const TaskRecord& record, const Resume& resume, Time now);
+  [[nodiscard]] Expected<void> take_up(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
+                                       const Resume& resume, Time now);
   [[nodiscard]] Expected<void> go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now);
+  [[nodiscard]] Expected<void> go_on_in_tree(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
+                                             const Story& story, const Resume& resume, Time now);
   void expire(Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
   void start(Open& open, Time now);
   void regain(Open& open, Time now);
   void stand_still(Time now);
   void preempt(Time now);
-  void stands(Open& open, const task::Progress& progress, Time now);
+  void stands(Open& open, Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
-  [[nodiscard]] bool give_up(Open& open, Time now);
+  [[nodiscard]] bool give_up(const Open& open);
+  void checkpoint(Open& open, Time now);
   void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
   enum class Ending : std::uint8_t { kCancel, kHalt };
   [[nodiscard]] Expected<void> end(std::string_view id, Ending ending, Time now, std::string_view reason);

@@ -24,20 +24,22 @@ struct Bridge::Open {
   task::Task task;
   int priority = 50;  // it waits with
   Time accepted;
-  Time waits_since;         // it ages from then on, in the arbiter's time, which stands while nothing may start
-  Time parked_at;           // in that time, too
-  std::size_t done = 0;     // steps that an earlier bridge has seen succeed
-  tree::Observer observer;  // the tree refers to it
-  tree::NodePtr root;       // none before it was granted for the first time
+  Time waits_since;      // it ages from then on, in the arbiter's time, which stands while nothing may start
+  Time parked_at;        // in that time, too
+  std::size_t done = 0;  // steps that an earlier bridge has seen succeed
+  std::shared_ptr<const tree::Program> program;  // of its tree; none of steps
+  std::vector<std::string> resources;
+  std::unique_ptr<tree::Tree>
+      tree;                // none before it was granted for the first time, but for one that was begun earlier
+  bool unwritten = false;  // a leaf has ended since the last checkpoint
   Stage stage = Stage::kWaits;
   Told told = Told::kNothing;
-  bool begun = false;   // by this bridge or one before
-  bool stands = false;  // as it was told
-  bool held = false;    // by an emergency stop
+  bool begun = false;        // by this bridge or one before
+  bool stands = false;       // as it was told
+  bool handed_over = false;  // by this bridge: it stands, and waits to regain its resources
+  bool held = false;         // by an emergency stop
   bool cancelled = false, halted = false;
   std::string cancel_reason;
-  Time give_up_at;            // by then every step has had its timeout, and grace to leave the world safe
-  std::optional<Time> rests;  // since then its time stands
   int attempts = 0;
   Json steps = Json::array();  // what each step that ended had to tell
 };

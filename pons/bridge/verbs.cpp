@@ -52,7 +52,7 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   open.told = Open::Told::kPause;
   open.stands = false;
   keep(journal_.event(open.task.id, now, kPausingEvent, {{"reason", reason}}));
-  if (open.root) open.root->pause(now, task::Pause::kStand);
+  if (open.tree) open.tree->pause(now, task::Pause::kStand);
   return {};
 }
 
@@ -78,8 +78,8 @@ Expected<void> Bridge::resume(std::string_view id, Time now) {
     open.waits_since += (now - held_for_) - open.parked_at;
     parked_.erase(open.task.id);
     enqueue(open);
-  } else if (open.root) {
-    open.root->resume(now);
+  } else if (open.tree) {
+    open.tree->resume(now);
   }
   return {};
 }
@@ -94,14 +94,14 @@ void Bridge::preempt(Time now) {
     open.told = Open::Told::kPreempt;
     open.stands = false;
     keep(journal_.event(id, now, kPreemptingEvent, {{"by", by}}));
-    open.root->pause(now, task::Pause::kHandOver);
+    open.tree->pause(now, task::Pause::kHandOver);
   }
 }
 
 // A running task has come to rest as it was told.
-void Bridge::stands(Open& open, const task::Progress& progress, Time now) {
-  open.rests = now;
+void Bridge::stands(Open& open, Time now) {
   if (std::exchange(open.stands, true)) return;
+  const task::Progress& progress = open.tree->result();
   const Json detail{{"stop", task::name(progress.stop.value_or(task::StopResult::kUncertain))}};
   const std::string& id = open.task.id;
   unkept_ = true;
@@ -117,6 +117,7 @@ void Bridge::stands(Open& open, const task::Progress& progress, Time now) {
   running_.erase(id);
   arbiter_.hand_over(id);
   open.stage = Open::Stage::kWaits;
+  open.handed_over = true;
 }
 
 // ---- cancel, halt ----
@@ -146,7 +147,7 @@ void Bridge::end_waiting(Open& open, Time now, std::string_view reason) {
   const std::string id = open.task.id;
   arbiter_.remove(id);
   Json detail = Json::object();
-  if (open.root) detail = {{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
+  if (open.tree) detail = {{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
   finish(id, task::Outcome::kCancelled, std::string(reason), std::move(detail), now);
 }
 
@@ -156,14 +157,12 @@ void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view r
   open.cancelled = true;
   open.halted = open.halted || halts;
   open.cancel_reason = reason;
-  open.give_up_at = std::min(open.give_up_at, now + kCancelGrace);
-  open.rests.reset();
   unkept_ = true;
   // What moves is stopped before anything waits for the disk.
   if (halts) {
-    open.root->halt(now);
+    open.tree->halt(now);
   } else {
-    open.root->cancel(now);
+    open.tree->cancel(now);
   }
   // After a fault nobody has told it to end: another bridge goes on with it.
   if (fault_) return;

@@ -35,6 +35,17 @@ const Schema& task_schema() {
   return schema;
 }
 
+Json json_of_tree(const TreeRequest& tree) {
+  Json json{{"inputs", tree.inputs}};
+  if (!tree.name.empty()) json["name"] = tree.name;
+  if (!tree.xml.empty()) json["xml"] = tree.xml;
+  return json;
+}
+
+TreeRequest tree_from(const Json& json) {
+  return {json.value("name", std::string{}), json.value("xml", std::string{}), json.value("inputs", Json::object())};
+}
+
 }  // namespace
 
 std::string_view name(Outcome outcome) {
@@ -53,10 +64,11 @@ Expected<Outcome> outcome_from(std::string_view name) {
 }
 
 Json to_json(const Task& task) {
-  Json json{{"id", task.id}, {"priority", task.priority}, {"steps", Json::array()}};
+  Json json{{"id", task.id}, {"priority", task.priority}};
   if (!task.order.empty()) json["order"] = task.order;
   if (task.deadline) json["deadline_s"] = seconds_of(*task.deadline);
   for (const Step& step : task.steps) json["steps"].push_back({{"skill", step.skill}, {"arguments", step.arguments}});
+  if (task.tree) json["tree"] = json_of_tree(*task.tree);
   return json;
 }
 
@@ -68,6 +80,16 @@ Expected<Task> task_from(const Json& json) {
   // Through double: JSON Schema calls 50.0 an integer, too.
   if (json.contains("priority")) task.priority = static_cast<int>(json.at("priority").get<double>());
   if (json.contains("deadline_s")) task.deadline = deadline_from(json.at("deadline_s").get<double>());
+  if (json.contains("steps") == json.contains("tree")) {
+    return fail(json.contains("tree") ? "it has both steps and a tree" : "it has neither steps nor a tree", "/",
+                "give one of them");
+  }
+  if (json.contains("tree")) {
+    task.tree = tree_from(json.at("tree"));
+    if (task.tree->name.empty() && task.tree->xml.empty())
+      return fail("the tree has neither a name nor its XML", "/tree", "name one of the world's, or write its XML");
+    return task;
+  }
   for (const Json& step : json.at("steps")) {
     task.steps.push_back({step.at("skill").get<std::string>(), step.value("arguments", Json::object())});
   }

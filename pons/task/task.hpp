@@ -21,6 +21,15 @@ struct Step {
   Json arguments = Json::object();
 };
 
+// A behaviour tree instead of steps: one that the world has, by its name, or one sent along (BehaviorTree.CPP 4 XML).
+struct TreeRequest {
+  std::string name;              // of `xml`, which of its trees: the main one where this is empty
+  std::string xml;               // empty: the world's
+  Json inputs = Json::object();  // what its blackboard holds at the beginning
+
+  bool operator==(const TreeRequest&) const = default;
+};
+
 // What a brain asks for: {"id":"P000123.2","order":"P000123","priority":50,"deadline_s":12.5,
 //   "steps":[{"skill":"pick","arguments":{"object":"P000123"}},…]}
 struct Task {
@@ -28,7 +37,8 @@ struct Task {
   std::string order;             // what it is part of, under which its story is told; likewise, or empty: its id
   int priority = 50;             // 0 … 100, higher first
   std::optional<Time> deadline;  // to the microsecond; of no use after it; the earlier first, priorities being equal
-  std::vector<Step> steps;       // run in order
+  std::vector<Step> steps;       // run in order; none where there is a tree
+  std::optional<TreeRequest> tree = {};
 };
 
 // Exactly one a task.

@@ -10,9 +10,9 @@ inline constexpr std::size_t kMaxSteps = 32;
 inline constexpr std::string_view kTaskSchema = R"({
   "$schema": "https://json-schema.org/draft/2020-12/schema",
   "title": "task",
-  "description": "What a brain asks the bridge for: steps, run in order.",
+  "description": "What a brain asks the bridge for: steps, run in order, or a behaviour tree.",
   "type": "object",
-  "required": ["id", "steps"],
+  "required": ["id"],
   "additionalProperties": false,
   "properties": {
     "id": {
@@ -61,6 +61,29 @@ inline constexpr std::string_view kTaskSchema = R"({
             "description": "As the skill's own schema says.",
             "type": "object"
           }
+        }
+      }
+    },
+    "tree": {
+      "description": "A tree of the world's, by its name, or one sent along. A task has either steps or a tree.",
+      "type": "object",
+      "additionalProperties": false,
+      "properties": {
+        "name": {
+          "description": "A name that `pons trees` lists; with xml, which of its trees.",
+          "type": "string",
+          "minLength": 1,
+          "maxLength": 64
+        },
+        "xml": {
+          "description": "BehaviorTree.CPP 4 XML, as Groot2 writes it.",
+          "type": "string",
+          "minLength": 1,
+          "maxLength": 65536
+        },
+        "inputs": {
+          "description": "Entries of the tree's blackboard at the beginning.",
+          "type": "object"
         }
       }
     }

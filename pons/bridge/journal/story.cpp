@@ -16,20 +16,22 @@ std::unexpected<Error> impossible(const Event& event, std::string_view why) {
   return fail(fmt::format("event {} ({}) of task '{}' {}", event.sequence, event.kind, event.task, why));
 }
 
+constexpr auto kNoStep = std::numeric_limits<std::size_t>::max();
+
 // Of an attempt; what is no number is no step that any task has.
 std::size_t step_of(const Event& event) {
   const auto found = event.detail.is_object() ? event.detail.find("step") : event.detail.end();
   const bool is_step = found != event.detail.end() && found->is_number_integer() && *found >= 0;
-  return is_step ? found->get<std::size_t>() : std::numeric_limits<std::size_t>::max();
+  return is_step ? found->get<std::size_t>() : kNoStep;
 }
 
 }  // namespace
 
 bool tells_state(std::string_view kind) {
-  constexpr std::array kKinds{kAcceptedEvent,  kStartedEvent,  kAttemptEvent, kAttemptEndedEvent, kCancellingEvent,
-                              kHaltingEvent,   kPausingEvent,  kPausedEvent,  kPreemptingEvent,   kPreemptedEvent,
-                              kContinuedEvent, kRegainedEvent, kHeldEvent,    kReleasedEvent,     kResumedEvent,
-                              kFoundDoneEvent, kEndedEvent};
+  constexpr std::array kKinds{kAcceptedEvent,  kStartedEvent,    kAttemptEvent, kAttemptEndedEvent, kCancellingEvent,
+                              kHaltingEvent,   kPausingEvent,    kPausedEvent,  kPreemptingEvent,   kPreemptedEvent,
+                              kContinuedEvent, kRegainedEvent,   kHeldEvent,    kReleasedEvent,     kResumedEvent,
+                              kFoundDoneEvent, kCheckpointEvent, kEndedEvent};
   return std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
@@ -58,7 +60,8 @@ Expected<void> Story::take(const Event& event) {
   if (event.kind == kPreemptedEvent) handed_over_ = true;
   if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = false;
   // What the bridge before was at, nobody saw end.
-  if (event.kind == kResumedEvent) trying_.reset();
+  if (event.kind == kResumedEvent) trying_.clear();
+  if (event.kind == kCheckpointEvent) checkpoint_ = event.detail;
   if (!taken) return taken;
   sequence_ = event.sequence;
   run_ = event.run;
@@ -72,6 +75,7 @@ Expected<void> Story::take_acceptance(const Event& event) {
   if (!task) return impossible(event, "holds no task: " + task.error().line());
   if (task->id != event.task) return impossible(event, fmt::format("holds the task '{}'", task->id));
   steps_ = task->steps.size();
+  is_tree_ = task->tree.has_value();
   accepted_ = true;
   return {};
 }
@@ -79,26 +83,31 @@ Expected<void> Story::take_acceptance(const Event& event) {
 Expected<void> Story::take_attempt(const Event& event) {
   const std::size_t step = step_of(event);
   if (!started_) return impossible(event, "comes before it was started");
+  if (is_tree_) {
+    if (step == kNoStep) return impossible(event, "is of no leaf");
+    if (!trying_.insert(step).second) return impossible(event, fmt::format("comes while leaf {} goes on", step));
+    return {};
+  }
   if (step >= steps_) return impossible(event, "is of a step that it does not have");
   if (step < done_) return impossible(event, fmt::format("starts step {} again, which has succeeded", step));
   if (step > done_) return impossible(event, fmt::format("starts step {} before step {} has succeeded", step, done_));
-  if (trying_) return impossible(event, fmt::format("comes while step {} goes on", *trying_));
-  trying_ = step;
+  if (!trying_.empty()) return impossible(event, fmt::format("comes while step {} goes on", *trying_.begin()));
+  trying_.insert(step);
   return {};
 }
 
 Expected<void> Story::take_attempt_end(const Event& event) {
   const std::size_t step = step_of(event);
-  if (trying_ != step) return impossible(event, "ends a step that does not go on");
-  trying_.reset();
-  if (task::text_of(event.detail, "status") == task::name(task::Status::kSucceeded)) done_ = std::max(done_, step + 1);
+  if (trying_.erase(step) == 0) return impossible(event, "ends a step that does not go on");
+  if (!is_tree_ && task::text_of(event.detail, "status") == task::name(task::Status::kSucceeded))
+    done_ = std::max(done_, step + 1);
   return {};
 }
 
 Expected<void> Story::take_found_done(const Event& event) {
   const std::size_t step = step_of(event);
   if (!started_ || step >= steps_ || step != done_) return impossible(event, "is of a step that was never begun");
-  trying_.reset();
+  trying_.clear();
   done_ = std::max(done_, step + 1);
   return {};
 }

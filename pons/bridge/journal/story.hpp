@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -24,6 +25,9 @@ inline constexpr std::string_view kRegainedEvent = "regained";           // pree
 inline constexpr std::string_view kHeldEvent = "held";                   // {"cause"}: an emergency stop has come,
 inline constexpr std::string_view kReleasedEvent = "released";           // and is over
 inline constexpr std::string_view kResumedEvent = "resumed";  // {"step"}: another bridge goes on, with this step
+// What the tree of a task remembers (tree/tree.hpp): at the start of each attempt, and when one has ended and the tree
+// goes on.
+inline constexpr std::string_view kCheckpointEvent = "checkpoint";
 // {"step"}: nobody saw this step end, but the world shows that it had succeeded.
 inline constexpr std::string_view kFoundDoneEvent = "found_done";
 
@@ -44,8 +48,12 @@ class Story {
   [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
   // It was preempted and has not gone on: what it had begun stands at a safe point, with nothing in use.
   [[nodiscard]] bool handed_over() const { return handed_over_; }
-  // So many of its first steps have succeeded.
+  // So many of its first steps have succeeded; of a tree, none.
   [[nodiscard]] std::size_t done() const { return done_; }
+  // The skills that run: a step, or leaves of a tree.
+  [[nodiscard]] const std::set<std::size_t>& trying() const { return trying_; }
+  // The last; null when there is none.
+  [[nodiscard]] const Json& checkpoint() const { return checkpoint_; }
 
  private:
   [[nodiscard]] Expected<void> take_acceptance(const Event& event);
@@ -56,11 +64,13 @@ class Story {
 
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
-  std::optional<std::size_t> trying_;  // the step whose skill runs
+  std::set<std::size_t> trying_;
+  Json checkpoint_;
   std::optional<std::string> ending_;
   std::int64_t sequence_ = 0, run_ = 0;
   Time stamp_;
   bool accepted_ = false, started_ = false, paused_ = false, handed_over_ = false, ended_ = false;
+  bool is_tree_ = false;
 };
 
 // Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and

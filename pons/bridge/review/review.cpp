@@ -43,7 +43,7 @@ std::string skill_hint(std::string_view wrong, const task::SkillRegistry& skills
 }  // namespace
 
 Review::Review(const task::SkillRegistry& skills, std::vector<std::string> resources)
-    : skills_(skills), resources_(std::move(resources)) {
+    : skills_(skills), resources_(std::move(resources)), trees_(skills) {
   for (const auto& [name, type] : skills.all()) schemas_.emplace(name, task::Schema::compile(type.schema));
 }
 
@@ -67,10 +67,33 @@ Expected<void> Review::check_step(const task::Step& step, const std::string& whe
                 "mend the skill");
   }
   if (auto fits = schema->check(step.arguments, where + "/arguments"); !fits) return fits;
-  for (const std::string& resource : type->resources) {
+  return check_resources(*type, where + "/skill");
+}
+
+Expected<void> Review::check_resources(const task::SkillType& type, const std::string& where) const {
+  for (const std::string& resource : type.resources) {
     if (std::find(resources_.begin(), resources_.end(), resource) != resources_.end()) continue;
-    return fail(fmt::format("the skill '{}' needs '{}', which this world does not have", step.skill, resource),
-                where + "/skill", "use a skill that this world can do, or add the resource to its file");
+    return fail(fmt::format("the skill '{}' needs '{}', which this world does not have", type.name, resource), where,
+                "use a skill that this world can do, or add the resource to its file");
+  }
+  return {};
+}
+
+Expected<std::shared_ptr<const tree::Program>> Review::program(const task::Task& task) const {
+  if (!task.tree) return nullptr;
+  return trees_.program(*task.tree);
+}
+
+Expected<void> Review::check_tree(const task::Task& task) const {
+  const auto program = this->program(task);
+  if (!program) return std::unexpected(program.error());
+  task::Task constant = task;
+  for (const tree::SkillUse& use : (*program)->uses) {
+    if (auto good = check_resources(*use.type, "/tree/" + use.name); !good) return good;
+    if (use.bound.empty()) constant.steps.push_back({use.type->name, use.arguments});
+  }
+  for (const Reviewer& reviewer : reviewers_) {
+    if (auto good = reviewer(constant); !good) return good;
   }
   return {};
 }
@@ -83,6 +106,7 @@ Expected<void> Review::check(const task::Task& task, Time now) const {
     return fail(fmt::format("the deadline of {} s has passed, it is {} s now", task.deadline->s(), now.s()),
                 "/deadline_s", "name a later one, or none");
   }
+  if (task.tree) return check_tree(task);
   for (const Reviewer& reviewer : reviewers_) {
     if (auto good = reviewer(task); !good) return good;
   }

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "pons/bridge/tree/library.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
 #include "pons/task/schema.hpp"
@@ -15,7 +16,8 @@
 
 namespace pons::bridge {
 
-// A further check of a well-formed task: reach, rules of the site. Says yes, or why not.
+// A further check of a well-formed task: reach, rules of the site. Says yes, or why not. Of a tree it is given, as
+// steps, the skills whose arguments are constants.
 using Reviewer = std::function<Expected<void>(const task::Task&)>;
 
 class Review {
@@ -23,22 +25,30 @@ class Review {
   // `skills` must outlive it and must not change. `resources` are those of the world.
   Review(const task::SkillRegistry& skills, std::vector<std::string> resources);
 
+  // The trees of the world, from the XML files of a folder. Errors: as of Library::load().
+  [[nodiscard]] Expected<void> load_trees(const std::filesystem::path& folder) { return trees_.load(folder); }
+
   // Asked in the order of their adding, after the built-in checks.
   void add(Reviewer reviewer);
 
   // Text to task: size, depth, encoding, shape (docs/schema/task.json).
   [[nodiscard]] static Expected<task::Task> parse(std::string_view json);
   // Known skills (an unknown one is answered with the nearest name), each step's arguments against the skill's schema,
-  // its resources against the world's, the deadline against `now`, then the reviewers.
+  // its resources against the world's, the deadline against `now`, then the reviewers. Of a tree: that it can be run.
   [[nodiscard]] Expected<void> check(const task::Task& task, Time now) const;
+  // What the task's tree runs as; of steps nullptr. Error: the tree cannot be run.
+  [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> program(const task::Task& task) const;
 
  private:
+  [[nodiscard]] Expected<void> check_resources(const task::SkillType& type, const std::string& where) const;
+  [[nodiscard]] Expected<void> check_tree(const task::Task& task) const;
   [[nodiscard]] Expected<void> check_step(const task::Step& step, const std::string& where) const;
 
   const task::SkillRegistry& skills_;
   std::vector<std::string> resources_;
   std::map<std::string, Expected<task::Schema>, std::less<>> schemas_;
   std::vector<Reviewer> reviewers_;
+  tree::Library trees_;
 };
 
 }  // namespace pons::bridge

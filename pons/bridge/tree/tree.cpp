@@ -2,267 +2,345 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cassert>
-#include <optional>
+#include <chrono>
 #include <utility>
 
 namespace pons::bridge::tree {
 namespace {
 
-// `stop`: of what came before it.
-Progress broken_off(std::optional<task::StopResult> stop = {}) {
-  Progress progress{Status::kFailed, "cancelled before it started", Json::object()};
-  progress.stop = stop;
-  return progress;
-}
-
-// Ticks its children one after the other; `goes_on` says after which status the next one is tried.
-class Series final : public Node {
- public:
-  Series(std::vector<NodePtr> children, bool (*goes_on)(Status)) : children_(std::move(children)), goes_on_(goes_on) {
-    assert(!children_.empty());
-  }
-
-  Progress tick(Time now) override {
-    for (;;) {
-      Progress progress = children_[current_]->tick(now);
-      if (!task::is_end(progress.status) || !goes_on_(progress.status)) return progress;
-      if (current_ + 1 == children_.size()) return progress;
-      if (cancelled_) return progress.status == Status::kSucceeded ? broken_off(progress.stop) : progress;
-      ++current_;
-      if (pause_) children_[current_]->pause(now, *pause_);
-    }
-  }
-  void pause(Time now, Pause pause) override {
-    pause_ = pause;
-    children_[current_]->pause(now, pause);
-  }
-  void resume(Time now) override {
-    pause_.reset();
-    children_[current_]->resume(now);
-  }
-  void cancel(Time now) override {
-    cancelled_ = true;
-    children_[current_]->cancel(now);
-  }
-  void halt(Time now) override {
-    cancelled_ = true;
-    children_[current_]->halt(now);
-  }
-  void stand_still(Time now) override { children_[current_]->stand_still(now); }
-  void reset() override {
-    for (NodePtr& child : children_) child->reset();
-    current_ = 0;
-    pause_.reset();
-    cancelled_ = false;
-  }
-
- private:
-  std::vector<NodePtr> children_;
-  bool (*goes_on_)(Status);
-  std::size_t current_ = 0;
-  std::optional<Pause> pause_;
-  bool cancelled_ = false;
-};
-
-// A node with one child, which hears what it hears.
-class Decorator : public Node {
- public:
-  explicit Decorator(NodePtr child) : child_(std::move(child)) {}
-  void pause(Time now, Pause pause) override { child_->pause(now, pause); }
-  void resume(Time now) override { child_->resume(now); }
-  void cancel(Time now) override { child_->cancel(now); }
-  void halt(Time now) override { child_->halt(now); }
-  void stand_still(Time now) override { child_->stand_still(now); }
-  void reset() override { child_->reset(); }
-
- protected:
-  [[nodiscard]] Node& child() { return *child_; }
-
- private:
-  NodePtr child_;
-};
-
-class Retry final : public Decorator {
- public:
-  Retry(int attempts, NodePtr child) : Decorator(std::move(child)), attempts_(attempts) { assert(attempts_ >= 1); }
-
-  Progress tick(Time now) override {
-    Progress progress = child().tick(now);
-    if (progress.status != Status::kRetry) return progress;
-    ++done_;
-    if (done_ < attempts_ && !cancelled_) {
-      child().reset();
-      if (pause_) child().pause(now, *pause_);
-      return {};
-    }
-    progress.status = Status::kFailed;
-    if (done_ > 1) progress.reason = fmt::format("{}; gave up after {} attempts", progress.reason, done_);
-    return progress;
-  }
-  void pause(Time now, Pause pause) override {
-    pause_ = pause;
-    Decorator::pause(now, pause);
-  }
-  void resume(Time now) override {
-    pause_.reset();
-    Decorator::resume(now);
-  }
-  void cancel(Time now) override {
-    cancelled_ = true;
-    Decorator::cancel(now);
-  }
-  void halt(Time now) override {
-    cancelled_ = true;
-    Decorator::halt(now);
-  }
-  void reset() override {
-    Decorator::reset();
-    done_ = 0;
-    pause_.reset();
-    cancelled_ = false;
-  }
-
- private:
-  int attempts_;
-  int done_ = 0;
-  std::optional<Pause> pause_;
-  bool cancelled_ = false;
-};
-
-class Timeout final : public Decorator {
- public:
-  Timeout(Duration limit, NodePtr child) : Decorator(std::move(child)), limit_(limit) {}
-
-  Progress tick(Time now) override {
-    if (!ends_) {
-      ends_ = now + limit_;
-    } else if (paused_) {
-      *ends_ += now - last_tick_;
-    }
-    last_tick_ = now;
-    Progress progress = child().tick(now);
-    paused_ = progress.status == Status::kPaused;
-    if (!task::is_end(progress.status)) {
-      if (!expired_ && progress.status == Status::kRunning && now >= *ends_) {
-        expired_ = true;
-        child().cancel(now);
-      }
-      return progress;
-    }
-    if (!expired_ || progress.status == Status::kSucceeded || progress.status == Status::kException) return progress;
-    progress.status = Status::kFailed;
-    progress.reason = fmt::format("timed out after {} s: {}", to_s(limit_), progress.reason);
-    return progress;
-  }
-  void stand_still(Time now) override {
-    paused_ = true;
-    Decorator::stand_still(now);
-  }
-  void reset() override {
-    Decorator::reset();
-    ends_.reset();
-    paused_ = false;
-    expired_ = false;
-  }
-
- private:
-  Duration limit_;
-  std::optional<Time> ends_;
-  Time last_tick_;
-  bool paused_ = false;  // since the last tick
-  bool expired_ = false;
-};
-
-class Action final : public Node {
- public:
-  Action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer)
-      : type_(type), arguments_(std::move(arguments)), step_(step), observer_(observer) {}
-
-  Progress tick(Time now) override {
-    if (!skill_) {
-      if (cancelled_) return broken_off();
-      if (auto told = observer_({step_, type_.name, ++attempts_}, now); !told) {
-        return {Status::kFailed, told.error().line(), Json::object()};
-      }
-      skill_ = type_.start(arguments_, now);
-      if (!skill_) return end({Status::kFailed, "the skill did not start", Json::object()}, now);
-      if (pause_) skill_->pause(now, *pause_);
-    }
-    Progress progress = skill_->tick(now);
-    for (const task::Note& note : std::exchange(progress.notes, {}))
-      (void)observer_({step_, type_.name, attempts_, nullptr, &note}, now);
-    return task::is_end(progress.status) ? end(std::move(progress), now) : progress;
-  }
-  // What comes before the skill has begun, it hears when it does.
-  void pause(Time now, Pause pause) override {
-    pause_ = pause;
-    if (skill_) skill_->pause(now, pause);
-  }
-  void resume(Time now) override {
-    pause_.reset();
-    if (skill_) skill_->resume(now);
-  }
-  void cancel(Time now) override {
-    if (skill_ && !cancelled_) skill_->cancel(now);
-    cancelled_ = true;
-  }
-  void stand_still(Time) override {}
-  void halt(Time now) override {
-    if (skill_) skill_->halt(now);
-    cancelled_ = true;
-  }
-  // Attempts go on counting: a retry is the same step.
-  void reset() override {
-    skill_.reset();
-    pause_.reset();
-    cancelled_ = false;
-  }
-
- private:
-  Progress end(Progress progress, Time now) {
-    (void)observer_({step_, type_.name, attempts_, &progress}, now);
-    return progress;
-  }
-
-  const task::SkillType& type_;
-  Json arguments_;
-  std::size_t step_;
-  const Observer& observer_;
-  std::unique_ptr<task::Skill> skill_;
-  int attempts_ = 0;
-  std::optional<Pause> pause_;
-  bool cancelled_ = false;
-};
+// A node that yields is come back to in the same tick, as by tickOnce() there; so often, lest one that does nothing but
+// yield holds up the bridge.
+constexpr int kMostRounds = 100;
 
 }  // namespace
 
-NodePtr sequence(std::vector<NodePtr> children) {
-  return std::make_unique<Series>(std::move(children), [](Status status) { return status == Status::kSucceeded; });
+Tree::Tree(std::shared_ptr<const Program> program, Observer observer)
+    : program_(std::move(program)),
+      observer_(std::move(observer)),
+      states_(program_->nodes.size()),
+      slots_(program_->entries.size()),
+      leaves_(program_->uses.size()),
+      queues_(program_->loops.size()) {
+  for (std::size_t i = 0; i < slots_.size(); ++i)
+    slots_[i] = {program_->entries[i].initial, 0, program_->entries[i].exists};
+  active_.reserve(leaves_.size());
 }
 
-NodePtr fallback(std::vector<NodePtr> children) {
-  return std::make_unique<Series>(std::move(children),
-                                  [](Status status) { return status == Status::kFailed || status == Status::kRetry; });
+Expected<void> Tree::set(std::string_view name, const Json& value) {
+  const auto found = program_->root.find(name);
+  if (found == program_->root.end())
+    return fail(fmt::format("the tree reads and writes no '{}'", name), {}, "leave it out");
+  slot(found->second) = {value_of(value), 1, true};
+  return {};
 }
 
-NodePtr retry(int attempts, NodePtr child) { return std::make_unique<Retry>(attempts, std::move(child)); }
-
-NodePtr timeout(Duration limit, NodePtr child) { return std::make_unique<Timeout>(limit, std::move(child)); }
-
-NodePtr action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer) {
-  return std::make_unique<Action>(type, std::move(arguments), step, observer);
-}
-
-NodePtr from_steps(const std::vector<task::Step>& steps, const task::SkillRegistry& skills, const Observer& observer) {
-  std::vector<NodePtr> children;
-  for (const task::Step& step : steps) {
-    const task::SkillType* type = skills.find(step.skill);
-    assert(type != nullptr);
-    children.push_back(
-        timeout(type->timeout, retry(type->attempts, action(*type, step.arguments, children.size(), observer))));
+Json Tree::blackboard() const {
+  Json entries = Json::object();
+  for (const auto& [name, index] : program_->root) {
+    const Slot& entry = slots_[static_cast<std::size_t>(index)];
+    if (entry.exists && !is_empty(entry.value)) entries[name] = json_of(entry.value);
   }
-  return sequence(std::move(children));
+  return entries;
+}
+
+// ---- a tick ----
+
+Status Tree::tick(Time now) {
+  const bool stood = std::exchange(stood_still_, false) || stands_ || !ticked_;
+  const Duration passed = stood ? Duration{0} : now - now_;
+  now_ = now;
+  ticked_ = true;
+  clock_ += passed;
+  run_skills(passed);
+  if (end_) return active_.empty() ? ended(*end_) : Status::kRunning;
+  if (stands_ && active_.empty() && pause_ && !cancelled_) return Status::kPaused;
+
+  auto status = NodeStatus::kRunning;
+  waits_ = false;
+  for (int round = 0; round < kMostRounds; ++round) {
+    wakes_ = false;
+    status = tick_node(0);
+    if (status != NodeStatus::kRunning || !wakes_) break;
+  }
+  if (status == NodeStatus::kRunning && cancelled_ && active_.empty()) status = broken({"cancelled", {}, {}});
+  if (status == NodeStatus::kRunning) return goes_on();
+  for (std::size_t step = 0; step < leaves_.size() && status == NodeStatus::kBroken; ++step) drain(step);
+  end_ = status;
+  return active_.empty() ? ended(status) : Status::kRunning;
+}
+
+Status Tree::goes_on() {
+  const auto rests = [&](std::size_t step) { return leaves_[step].last.status == Status::kPaused; };
+  stands_ = pause_ && !waits_ && !wakes_ && std::ranges::all_of(active_, rests);
+  if (!stands_) return Status::kRunning;
+  result_ = {Status::kPaused, {}, Json::object()};
+  result_.stop = task::StopResult::kConfirmed;
+  for (const std::size_t step : active_)
+    result_.stop = std::max(*result_.stop, leaves_[step].last.stop.value_or(task::StopResult::kUncertain));
+  return Status::kPaused;
+}
+
+Status Tree::ended(NodeStatus status) {
+  if (status == NodeStatus::kBroken) {
+    result_ = broken_.value_or(Progress{});
+  } else if (status == NodeStatus::kFailure) {
+    result_ = failure_.value_or(Progress{Status::kFailed, "the tree has failed", Json::object()});
+  } else {
+    result_ = {Status::kSucceeded, status == NodeStatus::kSkipped ? "skipped" : "", Json::object()};
+  }
+  result_.stop = stop_;
+  return result_.status;
+}
+
+NodeStatus Tree::broken(Error error) {
+  if (!broken_) broken_ = Progress{Status::kFailed, error.line(), Json::object()};
+  return NodeStatus::kBroken;
+}
+
+NodeStatus Tree::tick_node(std::int32_t index) {
+  const Node& node = this->node(index);
+  State& state = this->state(index);
+  NodeStatus status;
+  if (node.conditions < 0) [[likely]] {
+    status = dispatch(index);
+  } else {
+    const auto instead = precondition(index);
+    status = instead ? *instead : dispatch(index);
+    const Conditions& conditions = program_->conditions[static_cast<std::size_t>(node.conditions)];
+    const bool success = status == NodeStatus::kSuccess, failure = status == NodeStatus::kFailure;
+    const bool good = (!success || run_script(conditions.on_success)) &&
+                      (!failure || run_script(conditions.on_failure)) &&
+                      (!(success || failure) || run_script(conditions.post));
+    if (!good) return NodeStatus::kBroken;
+  }
+  if (status != NodeStatus::kSkipped) state.status = status;
+  if (is_decorator(node.kind)) {
+    NodeStatus& child = this->state(index + 1).status;
+    if (child == NodeStatus::kSuccess || child == NodeStatus::kFailure) child = NodeStatus::kIdle;
+  }
+  return status;
+}
+
+NodeStatus Tree::dispatch(std::int32_t index) {
+  constexpr auto kSuccess = NodeStatus::kSuccess, kFailure = NodeStatus::kFailure;
+  const Node& node = this->node(index);
+  switch (node.kind) {
+    case Kind::kSequence:
+    case Kind::kAsyncSequence:
+    case Kind::kSequenceWithMemory:
+      return in_turn(index, kSuccess);
+    case Kind::kFallback:
+    case Kind::kAsyncFallback:
+      return in_turn(index, kFailure);
+    case Kind::kReactiveSequence:
+      return reactive(index, kSuccess);
+    case Kind::kReactiveFallback:
+      return reactive(index, kFailure);
+    case Kind::kParallel:
+      return parallel(index);
+    case Kind::kParallelAll:
+      return parallel_all(index);
+    case Kind::kIfThenElse:
+      return if_then_else(index);
+    case Kind::kWhileDoElse:
+      return while_do_else(index);
+    case Kind::kSwitch:
+      return switch_of(index);
+    case Kind::kTryCatch:
+      return try_catch(index);
+    case Kind::kInverter:
+      return forced(index, kFailure, kSuccess);
+    case Kind::kForceSuccess:
+      return forced(index, kSuccess, kSuccess);
+    case Kind::kForceFailure:
+      return forced(index, kFailure, kFailure);
+    case Kind::kRepeat:
+      return repeat(index);
+    case Kind::kRetry:
+      return retry(index);
+    case Kind::kKeepRunning:
+      return keep_running(index);
+    case Kind::kTimeout:
+      return timeout(index);
+    case Kind::kDelay:
+      return delay(index);
+    case Kind::kRunOnce:
+      return run_once(index);
+    case Kind::kPrecondition:
+      return guarded(index);
+    case Kind::kLoop:
+      return loop(index);
+    case Kind::kSkipUnlessUpdated:
+      return if_updated(index, NodeStatus::kSkipped);
+    case Kind::kWaitValueUpdate:
+      return if_updated(index, NodeStatus::kRunning);
+    case Kind::kSubTree:
+      return passed_on(index);
+    case Kind::kAlwaysSuccess:
+      return kSuccess;
+    case Kind::kAlwaysFailure:
+      return kFailure;
+    case Kind::kScript:
+      return run_script(node.index) ? kSuccess : NodeStatus::kBroken;
+    case Kind::kScriptCondition:
+      return script_condition(index);
+    case Kind::kSetBlackboard:
+      return set_blackboard(index);
+    case Kind::kUnsetBlackboard:
+      slot(port(node, 0).slot) = {};
+      return kSuccess;
+    case Kind::kSleep:
+      return sleep(index);
+    case Kind::kWasEntryUpdated:
+      return was_updated(index) ? kSuccess : kFailure;
+    case Kind::kSkill:
+      return skill(index);
+  }
+  assert(false);
+  return NodeStatus::kBroken;
+}
+
+// ---- conditions ----
+
+// What it comes to instead of being ticked. Only `_while` is looked at again while it runs.
+std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
+  const Conditions& conditions = program_->conditions[static_cast<std::size_t>(node(index).conditions)];
+  const NodeStatus status = state(index).status;
+  const auto holds = [&](std::int32_t script) -> std::optional<bool> {
+    const auto result = program_->scripts[static_cast<std::size_t>(script)].holds(slots_);
+    if (result) return *result;
+    (void)broken(result.error());
+    return {};
+  };
+  if (status == NodeStatus::kIdle) {
+    for (const auto& [script, then] : {std::pair{conditions.failure_if, NodeStatus::kFailure},
+                                       std::pair{conditions.success_if, NodeStatus::kSuccess},
+                                       std::pair{conditions.skip_if, NodeStatus::kSkipped}}) {
+      if (script < 0) continue;
+      const auto held = holds(script);
+      if (!held) return NodeStatus::kBroken;
+      if (*held) return then;
+    }
+  }
+  if (conditions.while_true < 0 || (status != NodeStatus::kIdle && status != NodeStatus::kRunning)) return {};
+  const auto held = holds(conditions.while_true);
+  if (!held) return NodeStatus::kBroken;
+  if (*held) return {};
+  if (status == NodeStatus::kRunning) halt_node(index);
+  return NodeStatus::kSkipped;
+}
+
+bool Tree::run_script(std::int32_t script) {
+  if (script < 0) return true;
+  const auto result = program_->scripts[static_cast<std::size_t>(script)].run(slots_);
+  if (!result) (void)broken(result.error());
+  return result.has_value();
+}
+
+// ---- halting ----
+
+void Tree::halt_node(std::int32_t index) {
+  const Node& node = this->node(index);
+  State& state = this->state(index);
+  state.status = NodeStatus::kIdle;
+  switch (node.kind) {
+    case Kind::kSequenceWithMemory:  // keeps its place
+    case Kind::kRunOnce:             // and this, that it has run
+    case Kind::kSkipUnlessUpdated:
+    case Kind::kWaitValueUpdate:
+    case Kind::kWasEntryUpdated:
+      if (node.kind == Kind::kSkipUnlessUpdated || node.kind == Kind::kWaitValueUpdate) state.on = false;
+      break;
+    case Kind::kParallel:
+    case Kind::kParallelAll:
+      forget_completed(index);
+      break;
+    case Kind::kSkill:
+      drain(static_cast<std::size_t>(node.index));
+      break;
+    default:
+      state = {};
+  }
+  halt_children(index);
+  if (node.conditions >= 0) (void)run_script(program_->conditions[static_cast<std::size_t>(node.conditions)].on_halted);
+}
+
+void Tree::halt_child(std::int32_t index) {
+  State& state = this->state(index);
+  if (state.status == NodeStatus::kRunning) halt_node(index);
+  state.status = NodeStatus::kIdle;
+}
+
+void Tree::halt_children(std::int32_t index, std::int32_t but) {
+  for (std::int32_t child = index + 1; child < node(index).end; child = node(child).end) {
+    if (child != but) halt_child(child);
+  }
+}
+
+// ---- what tells the whole tree ----
+
+void Tree::pause(Time now, Pause pause) {
+  pause_ = pause;
+  for (const std::size_t step : active_) {
+    if (!leaves_[step].draining) leaves_[step].skill->pause(now, pause);
+  }
+}
+
+void Tree::resume(Time now) {
+  pause_.reset();
+  for (const std::size_t step : active_) {
+    if (!leaves_[step].draining) leaves_[step].skill->resume(now);
+  }
+}
+
+void Tree::cancel(Time now) {
+  if (std::exchange(cancelled_, true)) return;
+  for (const std::size_t step : active_) {
+    Leaf& leaf = leaves_[step];
+    if (leaf.draining) continue;
+    leaf.told_to_end = true;
+    leaf.skill->cancel(now);
+  }
+}
+
+void Tree::halt(Time now) {
+  cancelled_ = true;
+  for (const std::size_t step : active_) {
+    leaves_[step].told_to_end = true;
+    leaves_[step].skill->halt(now);
+  }
+}
+
+bool Tree::overdue(Duration grace) const {
+  return std::ranges::any_of(active_, [&](std::size_t step) { return leaves_[step].ending >= grace; });
+}
+
+// ---- what nodes are given ----
+
+const Value* Tree::value(const Port& port) {
+  if (port.slot < 0) return &port.literal;
+  const Slot& entry = slot(port.slot);
+  return entry.exists && !is_empty(entry.value) ? &entry.value : nullptr;
+}
+
+std::optional<std::int64_t> Tree::integer(std::int32_t index, std::int32_t which) {
+  const Value* const given = value(port(node(index), which));
+  const auto number = given != nullptr ? integer_of(*given) : std::nullopt;
+  if (!number || std::abs(*number) > INT32_MAX) {
+    (void)broken(
+        {fmt::format("{} is given {} where a whole number is needed", program_->names[static_cast<std::size_t>(index)],
+                     given != nullptr ? kind_of(*given) : "nothing"),
+         {},
+         {}});
+    return {};
+  }
+  return number;
+}
+
+bool Tree::elapsed(std::int32_t index, std::int64_t msec) {
+  return clock_.count() - state(index).stamp >= Duration(std::chrono::milliseconds(msec)).count();
 }
 
 }  // namespace pons::bridge::tree

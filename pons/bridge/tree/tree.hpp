@@ -1,58 +1,38 @@
-// Behaviour trees: what a task runs as. A node is ticked until it ends; nodes are allocated when the tree is built, and
-// a tick visits each at most once per step that ends in it.
+// A behaviour tree that runs: what a task runs as. Nodes, blackboard and scripts are those of BehaviorTree.CPP 4
+// (program.hpp says which), and mean the same, but for what this page says.
 //
-// clang-format off
-// | status     | Sequence            | Fallback                 | Retry                            | Timeout                       |
-// |------------|---------------------|--------------------------|----------------------------------|-------------------------------|
-// | kRunning   | runs                | runs                     | runs                             | runs; expired, it is cancelled |
-// | kPaused    | is paused           | is paused                | is paused                        | is paused; its time stands    |
-// | kSucceeded | next child, or ends | ends                     | ends                             | ends                          |
-// | kRetry     | fails               | next child, or fails     | starts the child again, or fails | passed up                     |
-// | kFailed    | fails               | next child, or fails     | fails                            | fails                         |
-// | kException | ends                | ends                     | ends                             | ends                          |
-// clang-format on
+// A skill is a leaf. Its kSucceeded is SUCCESS, its kFailed FAILURE; kRetry starts it again, as often and as long as
+// its type allows, and then is FAILURE; kException ends the whole tree, whatever is above. Each skill that runs is
+// ticked once a tick, whether the tree comes by its leaf or not.
 //
-// pause(), resume(), cancel() and halt() reach the running leaf, which knows what they mean (task::Skill), and the tree
-// goes on being ticked until that has ended. A pause that comes between two leaves is the next one's. After cancel() or
-// halt() nothing new is started; a leaf that nevertheless ends with kSucceeded counts as done.
+// A leaf that is halted by a node above is told to cancel, and leaves the world safe while the tree goes on: a leaf
+// that needs what another one still uses waits. The tree has not ended before they have.
+//
+// Time is the tree's own: it stands while the tree is paused, and while the robot is.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "pons/bridge/tree/program.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
 #include "pons/task/skill.hpp"
 
 namespace pons::bridge::tree {
 
-using task::Json;
 using task::Pause;
 using task::Progress;
 using task::Status;
 
-class Node {
- public:
-  virtual ~Node() = default;
-  // Not to be called again after it has ended, until reset().
-  [[nodiscard]] virtual Progress tick(Time now) = 0;
-  virtual void pause(Time now, Pause pause) = 0;
-  virtual void resume(Time now) = 0;
-  virtual void cancel(Time now) = 0;
-  virtual void halt(Time now) = 0;
-  // Before a tick: the time since the one before does not count.
-  virtual void stand_still(Time now) = 0;
-  // As newly built. Not while it runs.
-  virtual void reset() = 0;
-};
-
-using NodePtr = std::unique_ptr<Node>;
-
-// What an Action tells of one attempt: that it starts, what its skill notes, that it has ended.
+// What a leaf tells of one attempt: that it starts, what its skill notes, that it has ended.
 struct Attempt {
-  std::size_t step = 0;  // from 0
+  std::size_t step = 0;  // which of the program's skill leaves, from 0
   std::string_view skill;
   int number = 0;  // from 1
   const Progress* ended = nullptr;
@@ -62,18 +42,151 @@ struct Attempt {
 // of it.
 using Observer = std::function<Expected<void>(const Attempt& attempt, Time now)>;
 
-[[nodiscard]] NodePtr sequence(std::vector<NodePtr> children);
-[[nodiscard]] NodePtr fallback(std::vector<NodePtr> children);
-// The child is started again on the tick after its kRetry, `attempts` times in all; then it has failed.
-[[nodiscard]] NodePtr retry(int attempts, NodePtr child);
-// From the first tick, pauses not counted. When the child, cancelled, ends with anything but kSucceeded or kException,
-// it has failed.
-[[nodiscard]] NodePtr timeout(Duration limit, NodePtr child);
-// `type` and `observer` must outlive the node.
-[[nodiscard]] NodePtr action(const task::SkillType& type, Json arguments, std::size_t step, const Observer& observer);
+class Tree {
+ public:
+  Tree(std::shared_ptr<const Program> program, Observer observer);
 
-// A task's steps: Sequence of Timeout(Retry(Action)). Every step's skill must be in `skills`.
-[[nodiscard]] NodePtr from_steps(const std::vector<task::Step>& steps, const task::SkillRegistry& skills,
-                                 const Observer& observer);
+  // Sets an entry of the main tree's blackboard, before the first tick. Error: the program has none of that name.
+  [[nodiscard]] Expected<void> set(std::string_view name, const Json& value);
+  // The main tree's blackboard, as far as it is set: {"mass_kg":1.5}.
+  [[nodiscard]] Json blackboard() const;
+
+  // kRunning, kPaused, or an end: kSucceeded, kFailed, kException. Not to be called after that. Allocates nothing but
+  // where a skill, or a text, does.
+  [[nodiscard]] Status tick(Time now);
+  // Of a pause or an end.
+  [[nodiscard]] const Progress& result() const { return result_; }
+
+  // Those that run hear it, and those that start before resume(). A tree in which no skill runs stands at once.
+  void pause(Time now, Pause pause);
+  void resume(Time now);
+  // Those that run hear it; nothing new is started. A last skill that nevertheless succeeds counts as done.
+  void cancel(Time now);
+  void halt(Time now);
+  // Before a tick: the time since the one before does not count.
+  void stand_still() { stood_still_ = true; }
+  // Whether a skill has not ended so long after it was told to.
+  [[nodiscard]] bool overdue(Duration grace) const;
+
+  // All that is needed to go on in another process, but for what the skills themselves were at.
+  [[nodiscard]] Json checkpoint() const;
+  // Before the first tick. Leaves that were running start anew, but for those that settle() knows the end of. Error: it
+  // is of another program, or damaged.
+  [[nodiscard]] Expected<void> restore(const Json& checkpoint);
+  // What has become of the attempt that was under way at that leaf.
+  void settle(std::size_t step, Progress ended);
+  // What the leaf would start its skill with. Error: an argument is not set, or does not fit.
+  [[nodiscard]] Expected<task::Step> step(std::size_t step) const;
+
+ private:
+  // What a node remembers; what `on`, `count` and the others mean is its kind's.
+  struct State {
+    NodeStatus status = NodeStatus::kIdle;
+    NodeStatus returned = NodeStatus::kIdle;
+    bool on = false;
+    bool completed = false;   // for its Parallel
+    std::int32_t child = -1;  // whose turn it is, by node
+    std::int32_t count = 0, other = 0;
+    std::int64_t stamp = 0;  // when it began, in the tree's time, ns; or how often an entry had been written
+    bool operator==(const State&) const = default;
+  };
+  // What a leaf that uses a skill remembers.
+  struct Leaf {
+    std::unique_ptr<task::Skill> skill;
+    Progress last;
+    int tries = 0;
+    Duration spent{0};   // since it began, pauses not counted
+    Duration ending{0};  // since it was told to end
+    bool told_to_end = false, expired = false;
+    bool draining = false;  // halted by a node above; what it comes to matters to nobody
+    bool ended = false;     // `last` is its end, and waits for the tree to come by
+  };
+
+  [[nodiscard]] const Node& node(std::int32_t index) const { return program_->nodes[static_cast<std::size_t>(index)]; }
+  [[nodiscard]] State& state(std::int32_t index) { return states_[static_cast<std::size_t>(index)]; }
+  [[nodiscard]] const Port& port(const Node& node, std::int32_t which) const {
+    return program_->ports[static_cast<std::size_t>(node.ports + which)];
+  }
+  [[nodiscard]] Slot& slot(std::int32_t index) { return slots_[static_cast<std::size_t>(index)]; }
+
+  [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;  // checkpoint.cpp
+
+  // tree.cpp
+  [[nodiscard]] NodeStatus tick_node(std::int32_t index);
+  [[nodiscard]] NodeStatus dispatch(std::int32_t index);
+  [[nodiscard]] std::optional<NodeStatus> precondition(std::int32_t index);
+  [[nodiscard]] bool run_script(std::int32_t script);
+  [[nodiscard]] NodeStatus broken(Error error);
+  void halt_node(std::int32_t index);
+  void halt_child(std::int32_t index);
+  void halt_children(std::int32_t index, std::int32_t but = -1);
+  void reset_child(std::int32_t index) { halt_child(index + 1); }
+  [[nodiscard]] Status ended(NodeStatus status);
+  [[nodiscard]] Status goes_on();
+  // Nothing: it could not be read, and the tree is broken.
+  [[nodiscard]] std::optional<std::int64_t> integer(std::int32_t index, std::int32_t which);
+  [[nodiscard]] const Value* value(const Port& port);
+  [[nodiscard]] bool elapsed(std::int32_t index, std::int64_t msec);
+
+  // control.cpp
+  [[nodiscard]] NodeStatus in_turn(std::int32_t index, NodeStatus goes_on);
+  [[nodiscard]] NodeStatus reactive(std::int32_t index, NodeStatus goes_on);
+  [[nodiscard]] NodeStatus parallel(std::int32_t index);
+  [[nodiscard]] NodeStatus parallel_all(std::int32_t index);
+  [[nodiscard]] NodeStatus if_then_else(std::int32_t index);
+  [[nodiscard]] NodeStatus while_do_else(std::int32_t index);
+  [[nodiscard]] NodeStatus switch_of(std::int32_t index);
+  [[nodiscard]] NodeStatus try_catch(std::int32_t index);
+  void forget_completed(std::int32_t index);
+
+  // decorators.cpp
+  [[nodiscard]] NodeStatus forced(std::int32_t index, NodeStatus success, NodeStatus failure);
+  [[nodiscard]] NodeStatus repeat(std::int32_t index);
+  [[nodiscard]] NodeStatus retry(std::int32_t index);
+  [[nodiscard]] NodeStatus keep_running(std::int32_t index);
+  [[nodiscard]] NodeStatus timeout(std::int32_t index);
+  [[nodiscard]] NodeStatus delay(std::int32_t index);
+  [[nodiscard]] NodeStatus run_once(std::int32_t index);
+  [[nodiscard]] NodeStatus guarded(std::int32_t index);
+  [[nodiscard]] NodeStatus loop(std::int32_t index);
+  [[nodiscard]] bool fill_queue(std::int32_t index);
+  [[nodiscard]] NodeStatus if_updated(std::int32_t index, NodeStatus otherwise);
+  [[nodiscard]] NodeStatus passed_on(std::int32_t index);
+  [[nodiscard]] bool was_updated(std::int32_t index);
+
+  // leaves.cpp
+  [[nodiscard]] NodeStatus script_condition(std::int32_t index);
+  [[nodiscard]] NodeStatus set_blackboard(std::int32_t index);
+  [[nodiscard]] NodeStatus sleep(std::int32_t index);
+  [[nodiscard]] NodeStatus skill(std::int32_t index);
+  [[nodiscard]] std::optional<NodeStatus> begin(std::size_t step);
+  [[nodiscard]] NodeStatus skill_ended(std::size_t step);
+  [[nodiscard]] bool resources_free(std::size_t step) const;
+  void run_skills(Duration passed);
+  void run_skill(std::size_t step, Duration passed);
+  void end_skill(Leaf& leaf, std::size_t step, Progress progress);
+  void drain(std::size_t step);
+
+  std::shared_ptr<const Program> program_;
+  Observer observer_;
+  std::vector<State> states_;
+  std::vector<Slot> slots_;
+  std::vector<Leaf> leaves_;
+  std::vector<std::size_t> active_;         // leaves whose skill runs, in the order of their start
+  std::vector<std::vector<Value>> queues_;  // of the Loops that read one from the blackboard
+  Progress result_;
+  std::optional<Progress> broken_, failure_;  // why the tree was broken off; the last skill that failed
+  std::optional<task::StopResult> stop_;      // of what was told to stop, the worst
+  std::optional<NodeStatus> end_;             // the root's, while skills are left to end
+  std::optional<Pause> pause_;
+  Duration clock_{0};
+  Time now_;  // of the last tick
+  bool ticked_ = false;
+  bool wakes_ = false;   // a node wants another round in this tick
+  bool waits_ = false;   // a leaf is to start a skill as soon as it can
+  bool stands_ = false;  // the last tick said kPaused
+  bool stood_still_ = false;
+  bool cancelled_ = false;
+};
 
 }  // namespace pons::bridge::tree

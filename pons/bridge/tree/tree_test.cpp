@@ -1,191 +1,302 @@
+// What a tree makes of skills: attempts, timeouts, pauses, ends.
 #include "pons/bridge/tree/tree.hpp"
 
 #include <gtest/gtest.h>
 
-#include "pons/bridge/test_kit.hpp"
+#include "pons/bridge/tree/test_tree.hpp"
 
 namespace pons::bridge::tree {
 namespace {
 
-constexpr int kForEver = 1'000'000;
+using Seen = std::vector<std::string>;
 
-class TreeTest : public testing::Test {
+class SkillsInATree : public TreeTest {
  protected:
-  // Ticks every 10 ms until it ends.
-  Progress run(Node& node, int most_ticks = 10'000) {
-    for (int i = 0; i < most_ticks; ++i) {
-      const Progress progress = node.tick(now_);
-      now_ += from_s(0.01);
-      if (progress.status != Status::kRunning) return progress;
-    }
-    return {};
+  SkillsInATree() {
+    for (Actor* actor : {&good_, &bad_, &odd_, &slow_, &other_}) add(*actor);
+    add(again_, 2);
   }
-  task::SkillType& add(Actor& actor, int attempts = 1) {
-    types_.push_back(std::make_unique<task::SkillType>(actor.type(attempts)));
-    return *types_.back();
-  }
-  NodePtr leaf(Actor& actor) { return action(add(actor), Json::object(), 0, observer_); }
-  template <typename... Nodes>
-  static std::vector<NodePtr> list(Nodes... nodes) {
-    std::vector<NodePtr> result;
-    (result.push_back(std::move(nodes)), ...);
-    return result;
-  }
-
-  Time now_;
-  std::vector<std::string> seen_;
-  Observer observer_ = [this](const Attempt& attempt, Time) -> Expected<void> {
-    const char* const what = attempt.ended != nullptr ? "e" : (attempt.note != nullptr ? "n" : "s");
-    seen_.push_back(std::string(attempt.skill) + std::to_string(attempt.number) + what);
-    return {};
-  };
-  std::vector<std::unique_ptr<task::SkillType>> types_;
 
   Actor good_{"good", {{.ticks = 3}}};
+  Actor other_{"other", {{.ticks = 2}}};
   Actor bad_{"bad", {{.end = ends(Status::kFailed, "no")}}};
   Actor odd_{"odd", {{.end = ends(Status::kException, "set aside")}}};
   Actor again_{"again", {{.end = ends(Status::kRetry, "missed")}}};
   Actor slow_{"slow", {{.ticks = kForEver, .ticks_after_cancel = 5}}};
 };
 
-TEST_F(TreeTest, SequenceRunsAllInOrderAndStartsTheNextInTheSameTick) {
-  Actor other("other", {{.ticks = 2}});
-  const NodePtr node = sequence(list(leaf(good_), leaf(other)));
-  EXPECT_EQ(run(*node).status, Status::kSucceeded);
-  EXPECT_EQ(seen_, (std::vector<std::string>{"good1s", "good1e", "other1s", "other1e"}));
+TEST_F(SkillsInATree, TheNextStartsInTheTickInWhichTheOneBeforeEnds) {
+  const auto tree = tree_of("<Sequence><good/><other/></Sequence>");
+  EXPECT_EQ(run(*tree), Status::kSucceeded);
+  EXPECT_EQ(seen_, (Seen{"good1s", "good1e", "other1s", "other1e"}));
   EXPECT_EQ(now_, at(0.04));
 }
 
-TEST_F(TreeTest, AnAttemptThatCannotBeWrittenDownDoesNotStart) {
-  const Observer deaf = [](const Attempt&, Time) -> Expected<void> { return fail("the disk is full"); };
-  const auto progress = run(*action(add(good_), Json::object(), 0, deaf));
-  EXPECT_EQ(progress.status, Status::kFailed);
-  EXPECT_EQ(progress.reason, "the disk is full");
+TEST_F(SkillsInATree, AnAttemptThatCannotBeWrittenDownDoesNotStart) {
+  observer_ = [](const Attempt&, Time) -> Expected<void> { return fail("the disk is full"); };
+  const auto tree = tree_of("<Fallback><good/><other/></Fallback>");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "the disk is full");
+  EXPECT_TRUE(good_.log.started.empty());
+  EXPECT_TRUE(other_.log.started.empty());
+}
+
+TEST_F(SkillsInATree, WhatASkillNotesIsToldBeforeItsEnd) {
+  Actor notes("notes", {{.ticks = 1, .end = {Status::kSucceeded, "", Json::object(), {{"plan", 1}, {"plan", 2}}}}});
+  add(notes);
+  EXPECT_EQ(run(*tree_of("<notes/>")), Status::kSucceeded);
+  EXPECT_EQ(seen_, (Seen{"notes1s", "notes1n", "notes1n", "notes1e"}));
+}
+
+TEST_F(SkillsInATree, AnExceptionEndsTheWholeTreeWhateverIsAbove) {
+  const auto tree = tree_of("<ForceSuccess><Fallback><Inverter><odd/></Inverter><good/></Fallback></ForceSuccess>");
+  EXPECT_EQ(run(*tree), Status::kException);
+  EXPECT_EQ(tree->result().reason, "set aside");
   EXPECT_TRUE(good_.log.started.empty());
 }
 
-TEST_F(TreeTest, WhatASkillNotesIsToldBeforeItsEnd) {
-  Actor notes("notes", {{.ticks = 1, .end = {Status::kSucceeded, "", Json::object(), {{"plan", 1}, {"plan", 2}}}}});
-  const Progress progress = run(*leaf(notes));
-  EXPECT_TRUE(progress.notes.empty()) << "told once";
-  EXPECT_EQ(seen_, (std::vector<std::string>{"notes1s", "notes1n", "notes1n", "notes1e"}));
+TEST_F(SkillsInATree, AnExceptionBesideOthersWaitsUntilTheyHaveLeftTheWorldSafe) {
+  Actor aside("aside", {{.end = ends(Status::kException, "set aside")}});
+  task::SkillType type = aside.type();
+  type.resources = {"gripper"};
+  skills_.add(type);
+  const auto tree = tree_of("<Parallel><slow/><aside/></Parallel>");
+  EXPECT_EQ(run(*tree), Status::kException);
+  EXPECT_EQ(slow_.log.cancels, 1);
+  EXPECT_EQ(seen_, (Seen{"slow1s", "aside1s", "aside1e", "slow1e"}));
 }
 
-TEST_F(TreeTest, SequenceEndsWithTheFirstThatDoesNotSucceed) {
-  for (Actor* actor : {&bad_, &odd_, &again_}) {
-    Actor never("never", {{}});
-    const NodePtr node = sequence(list(leaf(good_), leaf(*actor), leaf(never)));
-    EXPECT_NE(run(*node).status, Status::kSucceeded);
-    EXPECT_TRUE(never.log.started.empty());
-  }
+TEST_F(SkillsInATree, FallbackTellsWhyTheLastOneFailed) {
+  const auto tree = tree_of("<Fallback><again/><bad/></Fallback>");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "no");
+  const auto saved = tree_of("<Fallback><bad/><good/></Fallback>");
+  EXPECT_EQ(run(*saved), Status::kSucceeded);
+  EXPECT_EQ(saved->result().reason, "");
 }
 
-TEST_F(TreeTest, FallbackTriesUntilOneSucceedsOrHandlesIt) {
-  const NodePtr node = fallback(list(leaf(bad_), leaf(again_), leaf(good_), leaf(odd_)));
-  EXPECT_EQ(run(*node).status, Status::kSucceeded);
-  EXPECT_TRUE(odd_.log.started.empty());
-  EXPECT_EQ(run(*fallback(list(leaf(bad_), leaf(odd_), leaf(good_)))).status, Status::kException);
-  const Progress none = run(*fallback(list(leaf(again_), leaf(bad_))));
-  EXPECT_EQ(none.status, Status::kFailed);
-  EXPECT_EQ(none.reason, "no");
-}
-
-TEST_F(TreeTest, RetryStartsAgainWhatSaysSoAndNothingElse) {
+TEST_F(SkillsInATree, OneIsTriedAgainWhenItSaysSoAndNothingElse) {
   Actor third("third", {{.end = ends(Status::kRetry, "a")}, {.end = ends(Status::kRetry, "b")}, {}});
-  EXPECT_EQ(run(*retry(3, leaf(third))).status, Status::kSucceeded);
+  add(third, 3);
+  EXPECT_EQ(run(*tree_of("<third/>")), Status::kSucceeded);
   EXPECT_EQ(third.log.started.size(), 3u);
   EXPECT_EQ(seen_.back(), "third3e");
 
-  EXPECT_EQ(run(*retry(3, leaf(bad_))).status, Status::kFailed);
-  EXPECT_EQ(bad_.log.started.size(), 1u);
-
-  const Progress gave_up = run(*retry(2, leaf(again_)));
-  EXPECT_EQ(gave_up.status, Status::kFailed);
-  EXPECT_EQ(gave_up.reason, "missed; gave up after 2 attempts");
+  const auto gave_up = tree_of("<again/>");
+  EXPECT_EQ(run(*gave_up), Status::kFailed);
+  EXPECT_EQ(gave_up->result().reason, "missed; gave up after 2 attempts");
   EXPECT_EQ(again_.log.started.size(), 2u);
+
+  EXPECT_EQ(run(*tree_of("<bad/>")), Status::kFailed);
+  EXPECT_EQ(bad_.log.started.size(), 1u);
 }
 
-TEST_F(TreeTest, TimeoutCancelsAndWaitsUntilTheSkillHasEnded) {
-  const NodePtr node = timeout(from_s(0.5), leaf(slow_));
-  const Progress progress = run(*node);
-  EXPECT_EQ(progress.status, Status::kFailed);
-  EXPECT_EQ(progress.reason, "timed out after 0.5 s: broken off");
-  EXPECT_EQ(slow_.log.cancels, 1);
+TEST_F(SkillsInATree, AnotherUseOfTheLeafHasItsOwnTries) {
+  EXPECT_EQ(run(*tree_of("<RetryUntilSuccessful num_attempts=\"3\"><again/></RetryUntilSuccessful>")), Status::kFailed);
+  EXPECT_EQ(again_.log.started.size(), 6u);
+}
+
+TEST_F(SkillsInATree, ATimeoutCancelsAndWaitsUntilTheSkillHasEnded) {
+  Actor late("late", {{.ticks = kForEver, .ticks_after_cancel = 5}});
+  add(late, 1, from_s(0.5));
+  const auto tree = tree_of("<late/>");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "timed out after 0.5 s: broken off");
+  EXPECT_EQ(late.log.cancels, 1);
   EXPECT_EQ(now_, at(0.51 + 0.06));  // expires in the tick at 0.5 s, then six more
 }
 
-TEST_F(TreeTest, TimeoutCountsAllAttemptsTogether) {
+TEST_F(SkillsInATree, ATimeoutCountsAllAttemptsTogether) {
   Actor misses("misses", {{.ticks = 20, .end = ends(Status::kRetry, "missed")}});
-  const Progress progress = run(*timeout(from_s(0.5), retry(1000, leaf(misses))));
-  EXPECT_EQ(progress.status, Status::kFailed);
+  add(misses, 1000, from_s(0.5));
+  EXPECT_EQ(run(*tree_of("<misses/>")), Status::kFailed);
   EXPECT_EQ(misses.log.started.size(), 3u);
   EXPECT_LT(now_, at(0.6));
 }
 
-TEST_F(TreeTest, WhatIsDoneInSpiteOfTheTimeoutIsDone) {
+TEST_F(SkillsInATree, WhatIsDoneInSpiteOfTheTimeoutIsDone) {
   Actor late("late", {{.ticks = kForEver, .cancelled_end = ends(Status::kSucceeded)}});
-  EXPECT_EQ(run(*timeout(from_s(0.1), leaf(late))).status, Status::kSucceeded);
   Actor aside("aside", {{.ticks = kForEver, .cancelled_end = ends(Status::kException, "set aside")}});
-  EXPECT_EQ(run(*timeout(from_s(0.1), leaf(aside))).status, Status::kException);
+  add(late, 1, from_s(0.1));
+  add(aside, 1, from_s(0.1));
+  EXPECT_EQ(run(*tree_of("<late/>")), Status::kSucceeded);
+  EXPECT_EQ(run(*tree_of("<aside/>")), Status::kException);
 }
 
-TEST_F(TreeTest, CancelledSequenceStartsNothingMore) {
+TEST_F(SkillsInATree, NoTimePassesWhileTheRobotStands) {
+  Actor late("late", {{.ticks = kForEver}});
+  add(late, 1, from_s(0.5));
+  const auto tree = tree_of("<late/>");
+  for (int i = 0; i < 100; ++i) {
+    tree->stand_still();
+    EXPECT_EQ(tick(*tree), Status::kRunning);
+  }
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_GT(now_, at(1.5));
+}
+
+TEST_F(SkillsInATree, ASkillThatDoesNotStartHasFailed) {
+  task::SkillType broken = Actor("broken", {{}}).type();
+  broken.start = [](const Json&, Time) { return nullptr; };
+  skills_.add(broken);
+  const auto tree = tree_of("<broken/>");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "the skill did not start");
+}
+
+TEST_F(SkillsInATree, StepsBecomeASequence) {
+  Actor third("third", {{.end = ends(Status::kRetry, "a")}, {.end = ends(Status::kRetry, "b")}, {}});
+  add(third, 3);
+  Tree tree(program_of({{"third", {{"object", "x"}}}, {"bad", Json::object()}, {"good", Json::object()}}, skills_),
+            observer_);
+  EXPECT_EQ(run(tree), Status::kFailed);
+  EXPECT_EQ(tree.result().reason, "no");
+  EXPECT_EQ(third.log.started, std::vector<Json>(3, {{"object", "x"}}));
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
+// ---- several at once ----
+
+TEST_F(SkillsInATree, LeavesThatNeedTheSameWaitForOneAnother) {
+  EXPECT_EQ(run(*tree_of("<Parallel><good/><other/></Parallel>")), Status::kSucceeded);
+  EXPECT_EQ(seen_, (Seen{"good1s", "good1e", "other1s", "other1e"}));
+}
+
+TEST_F(SkillsInATree, LeavesThatNeedDifferentThingsRunTogether) {
+  Actor scans("scan", {{.ticks = 2}});
+  task::SkillType scan = scans.type();
+  scan.resources = {"camera"};
+  skills_.add(scan);
+  EXPECT_EQ(run(*tree_of("<Parallel><good/><scan/></Parallel>")), Status::kSucceeded);
+  EXPECT_EQ(seen_, (Seen{"good1s", "scan1s", "scan1e", "good1e"}));
+  EXPECT_EQ(now_, at(0.03));
+}
+
+TEST_F(SkillsInATree, WhatANodeAboveHaltsLeavesTheWorldSafeBeforeTheNextMoves) {
+  // Once the flag is set, `slow` is halted, and `good`, which needs the arm as well, waits for it.
+  const auto tree = tree_of(R"(<Sequence><Script code="n := 0"/>
+      <ReactiveFallback>
+        <Inverter><ScriptCondition code="(n += 1) &lt; 10"/></Inverter>
+        <slow/>
+      </ReactiveFallback>
+      <good/></Sequence>)");
+  EXPECT_EQ(run(*tree), Status::kSucceeded);
+  EXPECT_EQ(slow_.log.cancels, 1);
+  EXPECT_EQ(seen_, (Seen{"slow1s", "slow1e", "good1s", "good1e"}));
+  EXPECT_EQ(tree->blackboard(), (Json{{"n", 10.0}}));
+}
+
+TEST_F(SkillsInATree, ATreeHasNotEndedBeforeWhatItHaltedHas) {
+  const auto tree = tree_of(R"(<Parallel success_count="1"><slow/><Sleep msec="100"/></Parallel>)");
+  EXPECT_EQ(run(*tree), Status::kSucceeded);
+  EXPECT_EQ(seen_, (Seen{"slow1s", "slow1e"}));
+  EXPECT_EQ(now_, at(0.10 + 0.07));
+}
+
+// ---- cancel, halt ----
+
+TEST_F(SkillsInATree, CancelledItStartsNothingMore) {
   Actor done("done", {{.ticks = kForEver, .cancelled_end = ends(Status::kSucceeded)}});
-  const NodePtr node = sequence(list(leaf(done), leaf(good_)));
-  (void)node->tick(now_);
-  node->cancel(now_);
-  node->cancel(now_);
-  EXPECT_EQ(run(*node).status, Status::kFailed);
+  add(done);
+  const auto tree = tree_of("<Sequence><done/><good/></Sequence>");
+  (void)tick(*tree);
+  tree->cancel(now_);
+  tree->cancel(now_);
+  EXPECT_EQ(run(*tree), Status::kFailed);
   EXPECT_EQ(done.log.cancels, 1);
   EXPECT_TRUE(good_.log.started.empty());
 }
 
-TEST_F(TreeTest, CancelledInTheLastStepThatIsDoneAllTheSameHasSucceeded) {
+TEST_F(SkillsInATree, CancelledInTheLastThatIsDoneAllTheSameItHasSucceeded) {
   Actor done("done", {{.ticks = kForEver, .cancelled_end = ends(Status::kSucceeded)}});
-  const NodePtr node = sequence(list(leaf(good_), leaf(done)));
-  for (int i = 0; i < 5; ++i) (void)node->tick(now_);
-  node->cancel(now_);
-  EXPECT_EQ(run(*node).status, Status::kSucceeded);
+  add(done);
+  const auto tree = tree_of("<Sequence><good/><done/></Sequence>");
+  for (int i = 0; i < 5; ++i) (void)tick(*tree);
+  tree->cancel(now_);
+  EXPECT_EQ(run(*tree), Status::kSucceeded);
 }
 
-TEST_F(TreeTest, CancelledRetryDoesNotTryAgain) {
+TEST_F(SkillsInATree, CancelledItTriesNotAgainAndTellsWhatWasBrokenOff) {
   Actor misses("misses", {{.ticks = kForEver, .cancelled_end = ends(Status::kRetry, "missed")}});
-  const NodePtr node = retry(3, leaf(misses));
-  (void)node->tick(now_);
-  node->cancel(now_);
-  EXPECT_EQ(run(*node).status, Status::kFailed);
+  add(misses, 3);
+  const auto tree = tree_of("<Fallback><misses/><good/></Fallback>");
+  (void)tick(*tree);
+  tree->cancel(now_);
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "missed");
   EXPECT_EQ(misses.log.started.size(), 1u);
+  EXPECT_TRUE(good_.log.started.empty());
 
-  const NodePtr between = retry(3, leaf(again_));
-  EXPECT_EQ(between->tick(now_).status, Status::kRunning);
+  const auto between = tree_of("<again/>");
+  EXPECT_EQ(tick(*between), Status::kRunning);
   between->cancel(now_);
-  EXPECT_EQ(run(*between).status, Status::kFailed);
+  EXPECT_EQ(run(*between), Status::kFailed);
   EXPECT_EQ(again_.log.started.size(), 1u);
 }
 
-TEST_F(TreeTest, CancelledBeforeItsFirstTickNeverStarts) {
-  const NodePtr node = sequence(list(timeout(from_s(1), retry(2, leaf(good_)))));
-  node->cancel(now_);
-  EXPECT_EQ(run(*node).status, Status::kFailed);
+TEST_F(SkillsInATree, CancelledWhereNoSkillRunsItEndsAtOnce) {
+  for (const char* nodes : {"<good/>", "<Sleep msec=\"100000\"/>", "<Delay delay_msec=\"100000\"><good/></Delay>",
+                            "<KeepRunningUntilFailure><AlwaysSuccess/></KeepRunningUntilFailure>"}) {
+    const auto tree = tree_of(nodes);
+    const bool begins = std::string_view(nodes) != "<good/>";
+    EXPECT_EQ(begins ? tick(*tree) : Status::kRunning, Status::kRunning);
+    tree->cancel(now_);
+    EXPECT_EQ(tick(*tree), Status::kFailed) << nodes;
+  }
   EXPECT_TRUE(seen_.empty());
 }
 
-TEST_F(TreeTest, StepsBecomeATreeWithEachSkillsTimeoutAndAttempts) {
-  Actor third("third", {{.end = ends(Status::kRetry, "a")}, {.end = ends(Status::kRetry, "b")}, {}});
-  task::SkillRegistry skills;
-  skills.add(third.type(3));
-  skills.add(slow_.type(1, from_s(0.2)));
-  const NodePtr node = from_steps({{"third", {{"object", "x"}}}, {"slow", Json::object()}}, skills, observer_);
-  const Progress progress = run(*node);
-  EXPECT_EQ(progress.reason, "timed out after 0.2 s: broken off");
-  EXPECT_EQ(third.log.started, std::vector<Json>(3, {{"object", "x"}}));
-  EXPECT_EQ(seen_.back(), "slow1e");
+TEST_F(SkillsInATree, HaltReachesWhatIsBeingCancelled) {
+  Actor deaf("deaf", {{.ticks = kForEver, .ticks_after_cancel = kForEver, .stop = task::StopResult::kUncertain}});
+  add(deaf);
+  const auto tree = tree_of("<deaf/>");
+  (void)tick(*tree);
+  tree->cancel(now_);
+  for (int i = 0; i < 500; ++i) EXPECT_EQ(tick(*tree), Status::kRunning);
+  EXPECT_FALSE(tree->overdue(from_s(5.1)));
+  EXPECT_TRUE(tree->overdue(from_s(4.9)));
+  tree->halt(now_);
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(deaf.log.halts, 1);
+  EXPECT_EQ(tree->result().stop, task::StopResult::kUncertain);
 }
 
-TEST_F(TreeTest, ASkillThatDoesNotStartHasFailed) {
-  task::SkillType broken = good_.type();
-  broken.start = [](const Json&, Time) { return nullptr; };
-  EXPECT_EQ(run(*action(broken, Json::object(), 0, observer_)).reason, "the skill did not start");
+// ---- pause ----
+
+TEST_F(SkillsInATree, PausedItStandsWhenAllThatRunStand) {
+  Actor tardy("tardy", {{.ticks = 10, .ticks_after_cancel = 20, .stop = task::StopResult::kUncertain}});
+  task::SkillType type = tardy.type();
+  type.resources = {"camera"};
+  skills_.add(type);
+  const auto tree = tree_of("<Parallel><good/><tardy/></Parallel>");
+  (void)tick(*tree);
+  tree->pause(now_, Pause::kStand);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(tick(*tree), Status::kRunning) << i;
+  EXPECT_EQ(tick(*tree), Status::kPaused);
+  EXPECT_EQ(tree->result().stop, task::StopResult::kUncertain) << "the worst";
+  tree->resume(now_);
+  EXPECT_EQ(run(*tree), Status::kSucceeded);
+  EXPECT_EQ(good_.log.resumes, 1);
+}
+
+TEST_F(SkillsInATree, APauseBetweenTwoIsTheNextOnes) {
+  const auto tree = tree_of("<Sequence><good/><other/></Sequence>");
+  tree->pause(now_, Pause::kHandOver);
+  EXPECT_EQ(tick(*tree), Status::kPaused);
+  EXPECT_EQ(good_.log.pauses, std::vector{Pause::kHandOver});
+}
+
+TEST_F(SkillsInATree, PausedItsTimeStands) {
+  const auto tree = tree_of("<Sequence><Sleep msec=\"100\"/><good/></Sequence>");
+  for (int i = 0; i < 5; ++i) (void)tick(*tree);
+  tree->pause(now_, Pause::kStand);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(tick(*tree), Status::kPaused);
+  EXPECT_EQ(tree->result().stop, task::StopResult::kConfirmed);
+  tree->resume(now_);
+  // The tick at which it was paused counted; five more of 10 ms are left of the sleep.
+  int ticks = 0;
+  while (seen_.empty()) ++ticks, (void)tick(*tree);
+  EXPECT_EQ(ticks, 6);
 }
 
 }  // namespace

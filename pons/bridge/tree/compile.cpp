@@ -1,0 +1,443 @@
+// Document to Program. What BehaviorTree.CPP finds out while it ticks (a port that is missing, a script that is none, a
+// name that means nothing) is found out here.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+#include "pons/bridge/tree/node_kinds.hpp"
+#include "pons/bridge/tree/program.hpp"
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge::tree {
+namespace {
+
+using task::excerpt;
+
+constexpr std::size_t kMostDepth = 256;  // nodes inside one another, through all SubTrees
+
+constexpr std::array kConditionNames{
+    std::pair{std::string_view("_failureIf"), &Conditions::failure_if},
+    std::pair{std::string_view("_successIf"), &Conditions::success_if},
+    std::pair{std::string_view("_skipIf"), &Conditions::skip_if},
+    std::pair{std::string_view("_while"), &Conditions::while_true},
+    std::pair{std::string_view("_onHalted"), &Conditions::on_halted},
+    std::pair{std::string_view("_onFailure"), &Conditions::on_failure},
+    std::pair{std::string_view("_onSuccess"), &Conditions::on_success},
+    std::pair{std::string_view("_post"), &Conditions::post},
+};
+
+// The name in "{name}"; empty when it is none. "{=}" is the port's own.
+std::string_view entry_in(std::string_view text, std::string_view port) {
+  const std::size_t first = text.find_first_not_of(' ');
+  if (first == text.npos) return {};
+  text = text.substr(first, text.find_last_not_of(' ') + 1 - first);
+  if (text == "{=}" || text == "=") return port;
+  if (text.size() < 3 || text.front() != '{' || text.back() != '}') return {};
+  return text.substr(1, text.size() - 2);
+}
+
+// FNV-1a (Fowler, Noll, Vo).
+void stir(std::uint64_t& hash, std::string_view text) {
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  hash = (hash ^ 0xffU) * 0x100000001b3U;
+}
+
+std::optional<Value> status_of(std::string_view text) {
+  constexpr std::array kNames{std::pair{std::string_view("SUCCESS"), NodeStatus::kSuccess},
+                              std::pair{std::string_view("FAILURE"), NodeStatus::kFailure},
+                              std::pair{std::string_view("SKIPPED"), NodeStatus::kSkipped},
+                              std::pair{std::string_view("RUNNING"), NodeStatus::kRunning}};
+  const auto* found = std::ranges::find(kNames, text, [](const auto& pair) { return pair.first; });
+  if (found == kNames.end()) return {};
+  return std::int64_t{std::to_underlying(found->second)};
+}
+
+class Compiler {
+ public:
+  Compiler(const Document& document, const task::SkillRegistry& skills) : document_(document), skills_(skills) {}
+
+  Expected<std::shared_ptr<const Program>> compile(std::string_view main);
+
+ private:
+  // A blackboard: of the main tree, or of one SubTree.
+  struct Scope {
+    std::int32_t parent = -1;
+    std::string path;  // "weigh/"
+    bool remaps_all = false;
+    std::map<std::string, std::string, std::less<>> remaps;
+    std::map<std::string, std::int32_t, std::less<>> own;
+  };
+
+  Expected<void> tree(std::string_view id, std::int32_t scope, const std::string& where);
+  Expected<void> node(const Element& element, std::int32_t scope);
+  Expected<void> subtree(const Element& element, std::int32_t scope);
+  Expected<void> give(Scope& inner, std::string_view name, const std::string& value);
+  Expected<void> ports(const Element& element, const KindInfo& info, std::int32_t scope, Node& node);
+  Expected<Port> port(const Element& element, const PortType& type, const std::string& text, std::int32_t scope,
+                      const KindInfo& info, Node& node);
+  Expected<void> conditions(const Element& element, std::int32_t scope, Node& node);
+  Expected<void> skill(const Element& element, std::int32_t scope, const task::SkillType& type, Node& node);
+  Expected<void> claim(SkillUse& use, const std::string& where);
+  Expected<std::int32_t> script(const std::string& text, std::int32_t scope, const std::string& where);
+  Expected<std::int32_t> slot(std::int32_t scope, std::string_view name);
+  Expected<std::int32_t> slot_of_port(std::int32_t scope, std::string_view name, const std::string& where);
+  std::unexpected<Error> unknown(const Element& element) const;
+
+  Scope& at(std::int32_t scope) { return scopes_[static_cast<std::size_t>(scope)]; }
+
+  const Document& document_;
+  const task::SkillRegistry& skills_;
+  Program program_;
+  std::vector<Scope> scopes_;
+  std::vector<std::string> within_;  // the trees that this one stands in
+  std::size_t depth_ = 0;
+};
+
+Expected<std::shared_ptr<const Program>> Compiler::compile(std::string_view main) {
+  if (main.empty()) main = document_.main;
+  if (main.empty()) {
+    return fail("nothing says which of the trees is meant", {}, "name it, or write main_tree_to_execute into <root>");
+  }
+  program_.fingerprint = 0xcbf29ce484222325U;
+  scopes_.emplace_back();
+  if (auto done = tree(main, 0, {}); !done) return std::unexpected(done.error());
+  program_.root = scopes_[0].own;
+  return std::make_shared<const Program>(std::move(program_));
+}
+
+Expected<void> Compiler::tree(std::string_view id, std::int32_t scope, const std::string& where) {
+  const auto found = document_.trees.find(id);
+  if (found == document_.trees.end()) {
+    std::string names;
+    for (const auto& [name, root] : document_.trees) names += (names.empty() ? "" : ", ") + excerpt(name, 32);
+    return fail(fmt::format("there is no tree '{}'", excerpt(id)), where, "the trees are " + excerpt(names, 300));
+  }
+  if (std::ranges::find(within_, id) != within_.end())
+    return fail(fmt::format("the tree '{}' is in itself", excerpt(id)), where, "use Repeat, or a Loop");
+  within_.emplace_back(id);
+  auto done = node(found->second, scope);
+  within_.pop_back();
+  return done;
+}
+
+std::unexpected<Error> Compiler::unknown(const Element& element) const {
+  if (const auto why = why_not(element.tag); !why.empty())
+    return fail(fmt::format("there is no node '{}' here", element.tag), element.where, std::string(why));
+  return fail(fmt::format("'{}' is no node and no skill", excerpt(element.tag)), element.where,
+              "pons trees nodes lists the nodes, pons skills the skills");
+}
+
+Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
+  if (program_.nodes.size() >= kMaxNodes)
+    return fail(fmt::format("the tree has more than {} nodes", kMaxNodes), element.where, "divide it");
+  if (depth_ >= kMostDepth)
+    return fail(fmt::format("more than {} nodes inside one another", kMostDepth), element.where, "flatten them");
+  ++depth_;
+  stir(program_.fingerprint, element.tag);
+  stir(program_.fingerprint, element.id);
+  for (const auto& [name, value] : element.attributes) {
+    stir(program_.fingerprint, name);
+    stir(program_.fingerprint, value);
+  }
+  const KindInfo* const info = find_kind(element.tag);
+  const task::SkillType* const type = info == nullptr ? skills_.find(element.tag) : nullptr;
+  if (info == nullptr && type == nullptr) return unknown(element);
+
+  const auto index = program_.nodes.size();
+  const std::string* const name = element.attribute("name");
+  program_.names.push_back(at(scope).path + excerpt(name != nullptr ? *name : element.tag));
+  program_.nodes.push_back({.kind = info != nullptr ? info->kind : Kind::kSkill});
+  Node made = program_.nodes.back();
+  made.children = static_cast<std::int32_t>(element.children.size());
+  if (auto done = conditions(element, scope, made); !done) return done;
+  const auto fewest = info != nullptr ? info->fewest_children : 0, most = info != nullptr ? info->most_children : 0;
+  if (made.children < fewest || made.children > most) {
+    const std::string wanted = fewest == most ? fmt::to_string(fewest)
+                               : most > 3     ? fmt::format("{} or more", fewest)
+                                              : fmt::format("{} or {}", fewest, most);
+    return fail(fmt::format("a {} has {} children, this one {}", element.tag, wanted, made.children), element.where,
+                "add or remove some");
+  }
+  Expected<void> done;
+  if (type != nullptr) {
+    done = skill(element, scope, *type, made);
+  } else if (made.kind == Kind::kSubTree) {
+    made.children = 1;
+    done = subtree(element, scope);
+  } else {
+    done = ports(element, *info, scope, made);
+    for (const Element& child : element.children) {
+      if (done) done = node(child, scope);
+    }
+  }
+  --depth_;
+  made.end = static_cast<std::int32_t>(program_.nodes.size());
+  stir(program_.fingerprint, "end");
+  program_.nodes[index] = made;
+  return done;
+}
+
+// ---- blackboards ----
+
+// As Blackboard::getEntry finds it there: its own entries first, then what was remapped, then, if all is, the parent's.
+Expected<std::int32_t> Compiler::slot(std::int32_t scope, std::string_view name) {
+  if (name.starts_with('@')) {
+    if (name.find('@', 1) != name.npos || name.size() == 1)
+      return fail(fmt::format("'{}' is no name of an entry", excerpt(name)));
+    return slot(0, name.substr(1));
+  }
+  Scope& here = at(scope);
+  if (const auto own = here.own.find(name); own != here.own.end()) return own->second;
+  if (const auto remapped = here.remaps.find(name); remapped != here.remaps.end())
+    return slot(here.parent, remapped->second);
+  if (here.remaps_all && here.parent >= 0 && !name.starts_with('_')) return slot(here.parent, name);
+  if (program_.entries.size() >= kMaxSlots)
+    return fail(fmt::format("the blackboards have more than {} entries", kMaxSlots));
+  const auto made = static_cast<std::int32_t>(program_.entries.size());
+  program_.entries.push_back({.name = here.path + std::string(name)});
+  here.own.emplace(name, made);
+  return made;
+}
+
+Expected<std::int32_t> Compiler::slot_of_port(std::int32_t scope, std::string_view name, const std::string& where) {
+  auto found = slot(scope, name);
+  if (!found) {
+    found.error().where = where;
+    return found;
+  }
+  program_.entries[static_cast<std::size_t>(*found)].exists = true;
+  return found;
+}
+
+Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
+  Scope inner;
+  inner.parent = scope;
+  const std::string* const name = element.attribute("name");
+  inner.path = fmt::format("{}{}/", at(scope).path, excerpt(name != nullptr ? *name : element.id));
+  for (const auto& [key, value] : element.attributes) {
+    if (key == "name" || key.starts_with('_')) continue;
+    if (auto given = give(inner, key, value); !given) return given;
+  }
+  if (const std::string* const all = element.attribute("_autoremap")) {
+    const auto on = boolean_of(*all);
+    if (!on) return fail("_autoremap is true or false", element.where, "write one of them");
+    inner.remaps_all = number_of(*on) != 0;
+  }
+  if (const auto model = document_.models.find(element.id); model != document_.models.end() && !inner.remaps_all) {
+    for (const ModelPort& port : model->second) {
+      if (inner.remaps.contains(port.name) || inner.own.contains(port.name)) continue;
+      if (!port.value) {
+        return fail(fmt::format("the port '{}' of '{}' is not given", excerpt(port.name), excerpt(element.id)),
+                    element.where, "give it, or give it a default in <TreeNodesModel>");
+      }
+      if (auto given = give(inner, port.name, *port.value); !given) return given;
+    }
+  }
+  scopes_.push_back(std::move(inner));
+  return tree(element.id, static_cast<std::int32_t>(scopes_.size() - 1), element.where);
+}
+
+// A constant is the SubTree's own.
+Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::string& value) {
+  if (const auto entry = entry_in(value, name); !entry.empty()) {
+    inner.remaps.emplace(name, entry);
+    return {};
+  }
+  if (program_.entries.size() >= kMaxSlots)
+    return fail(fmt::format("the blackboards have more than {} entries", kMaxSlots));
+  inner.own.emplace(name, static_cast<std::int32_t>(program_.entries.size()));
+  program_.entries.push_back({inner.path + std::string(name), value_of_literal(value), true});
+  return {};
+}
+
+// ---- what a node is given ----
+
+Expected<std::int32_t> Compiler::script(const std::string& text, std::int32_t scope, const std::string& where) {
+  if (!entry_in(text, "").empty())
+    return fail("a script that is read from the blackboard is not run", where, "write the script itself");
+  auto parsed = Script::parse(text, [&](std::string_view name) { return slot(scope, name); });
+  if (!parsed) {
+    parsed.error().where = where;
+    return std::unexpected(parsed.error());
+  }
+  program_.scripts.push_back(*std::move(parsed));
+  return static_cast<std::int32_t>(program_.scripts.size() - 1);
+}
+
+Expected<void> Compiler::conditions(const Element& element, std::int32_t scope, Node& node) {
+  const auto lower = [](std::string_view text) {
+    std::string result(text);
+    std::ranges::transform(result, result.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+    return result;
+  };
+  Conditions found;
+  bool any = false;
+  for (const auto& [name, text] : element.attributes) {
+    for (const auto& [known, member] : kConditionNames) {
+      if (name != known && lower(name) == lower(known))
+        return fail(fmt::format("there is no attribute '{}'", name), element.where, fmt::format("write {}", known));
+      if (name != known) continue;
+      const auto made = script(text, scope, element.where);
+      if (!made) return std::unexpected(made.error());
+      found.*member = *made;
+      any = true;
+    }
+  }
+  if (!any) return {};
+  node.conditions = static_cast<std::int32_t>(program_.conditions.size());
+  program_.conditions.push_back(found);
+  return {};
+}
+
+Expected<void> Compiler::ports(const Element& element, const KindInfo& info, std::int32_t scope, Node& node) {
+  for (const auto& [name, text] : element.attributes) {
+    const bool known = std::ranges::find(info.ports, name, &PortType::name) != info.ports.end();
+    if (!known && name != "name" && !name.starts_with('_'))
+      return fail(fmt::format("a {} has no port '{}'", info.name, excerpt(name)), element.where,
+                  "pons trees nodes shows its ports");
+  }
+  std::vector<Port> made;
+  for (const PortType& type : info.ports) {
+    const std::string* const given = element.attribute(type.name);
+    if (given == nullptr && type.standard.empty()) {
+      if (type.need == PortType::Need::kMust)
+        return fail(fmt::format("the port '{}' of this {} is missing", type.name, info.name), element.where, "add it");
+      made.emplace_back();
+      continue;
+    }
+    const auto read = port(element, type, given != nullptr ? *given : std::string(type.standard), scope, info, node);
+    if (!read) return std::unexpected(read.error());
+    made.push_back(*read);
+  }
+  node.ports = static_cast<std::int32_t>(program_.ports.size());
+  program_.ports.insert(program_.ports.end(), made.begin(), made.end());
+  return {};
+}
+
+Expected<Port> Compiler::port(const Element& element, const PortType& type, const std::string& text, std::int32_t scope,
+                              const KindInfo& info, Node& node) {
+  using Of = PortType::Of;
+  const std::string_view entry = entry_in(text, type.name);
+  const auto wrong = [&](std::string_view what) {
+    return fail(fmt::format("the port '{}' of this {} is '{}': {}", type.name, info.name, excerpt(text), what),
+                element.where, "pons trees nodes shows its ports");
+  };
+  if (type.of == Of::kScript) {
+    const auto made = script(text, scope, element.where);
+    if (!made) return std::unexpected(made.error());
+    node.index = *made;
+    return Port{};
+  }
+  if (type.of == Of::kKey) {
+    if (node.kind == Kind::kSetBlackboard && !entry.empty()) return wrong("write the entry's name without braces");
+    const auto found = slot(scope, entry.empty() ? std::string_view(text) : entry);
+    if (!found) return wrong(found.error().what);
+    return Port{.slot = *found};
+  }
+  if (type.of == Of::kQueue) {
+    Loop loop{.of = info.loop, .fixed = {}};
+    if (entry.empty()) loop.fixed = queue_of(text, info.loop);
+    if (entry.empty() && !loop.fixed) return wrong("no values of this Loop's type, apart by ';'");
+    node.index = static_cast<std::int32_t>(program_.loops.size());
+    program_.loops.push_back(std::move(loop));
+  }
+  if (!entry.empty()) {
+    if (type.of == Of::kBoolean || type.of == Of::kStatus) return wrong("it must be a constant");
+    const auto found = slot_of_port(scope, entry, element.where);
+    if (!found) return std::unexpected(found.error());
+    return Port{.slot = *found};
+  }
+  Port made;
+  std::optional<Value> value = Value(text);
+  if (type.of == Of::kInteger || type.of == Of::kUnsigned) {
+    const auto integer = integer_of(*value);
+    const bool fits = integer && *integer >= (type.of == Of::kUnsigned ? 0 : INT32_MIN) && *integer <= INT32_MAX;
+    value = fits ? std::optional<Value>(*integer) : std::nullopt;
+  } else if (type.of == Of::kBoolean) {
+    value = boolean_of(text);
+  } else if (type.of == Of::kStatus) {
+    value = status_of(text);
+  } else if (type.of == Of::kOut) {
+    return wrong("write the entry to write to, in braces");
+  }
+  if (!value) return wrong("it cannot be read");
+  if (node.kind == Kind::kTryCatch && number_of(*value) != 0)
+    return wrong("what is halted leaves the world safe by itself here; write false");
+  made.literal = *std::move(value);
+  return made;
+}
+
+// ---- skills ----
+
+Expected<void> Compiler::skill(const Element& element, std::int32_t scope, const task::SkillType& type, Node& node) {
+  SkillUse use;
+  use.type = &type;
+  use.name = program_.names.back();
+  auto schema = task::Schema::compile(type.schema);
+  if (!schema) {
+    return fail(fmt::format("the skill '{}' cannot be used: {}", type.name, schema.error().line()), element.where,
+                "mend the skill");
+  }
+  const Json properties = type.schema.value("properties", Json::object());
+  for (const auto& [name, text] : element.attributes) {
+    if (name == "name" || name.starts_with('_')) continue;
+    const std::string_view entry = entry_in(text, name);
+    const bool is_output = std::ranges::find(type.outputs, name) != type.outputs.end();
+    if (!is_output && !properties.contains(name)) {
+      return fail(fmt::format("the skill '{}' has no port '{}'", type.name, excerpt(name)), element.where,
+                  fmt::format("pons skills {} shows its ports", type.name));
+    }
+    if (is_output && entry.empty()) {
+      return fail(fmt::format("the output '{}' of '{}' is a constant", name, type.name), element.where,
+                  "write the entry to write to, in braces");
+    }
+    if (entry.empty()) {
+      auto value = argument_of(Value(text), properties.at(name));
+      if (!value) {
+        return fail(fmt::format("the port '{}' of '{}': {}", name, type.name, value.error().what), element.where,
+                    value.error().mend);
+      }
+      use.arguments[name] = *std::move(value);
+      continue;
+    }
+    const auto found = slot_of_port(scope, entry, element.where);
+    if (!found) return std::unexpected(found.error());
+    if (is_output) {
+      use.outputs.push_back({name, *found});
+    } else {
+      use.bound.push_back({name, properties.at(name), *found});
+    }
+  }
+  if (use.bound.empty()) {
+    if (auto fits = schema->check(use.arguments); !fits)
+      return fail(fits.error().line(), element.where, fmt::format("pons skills {} shows its ports", type.name));
+  } else {
+    use.schema = *std::move(schema);
+  }
+  if (auto claimed = claim(use, element.where); !claimed) return claimed;
+  node.index = static_cast<std::int32_t>(program_.uses.size());
+  program_.uses.push_back(std::move(use));
+  return {};
+}
+
+Expected<void> Compiler::claim(SkillUse& use, const std::string& where) {
+  for (const std::string& resource : use.type->resources) {
+    auto& all = program_.resources;
+    const auto found = std::ranges::find(all, resource) - all.begin();
+    if (found >= 64) return fail("its skills need more than 64 resources", where, "divide it");
+    if (found == std::ssize(all)) all.push_back(resource);
+    use.resources |= std::uint64_t{1} << found;
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<std::shared_ptr<const Program>> compile(const Document& document, std::string_view main,
+                                                 const task::SkillRegistry& skills) {
+  return Compiler(document, skills).compile(main);
+}
+
+}  // namespace pons::bridge::tree

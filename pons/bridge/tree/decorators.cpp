@@ -1,0 +1,248 @@
+// Nodes with one child.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "pons/bridge/tree/tree.hpp"
+
+namespace pons::bridge::tree {
+namespace {
+
+bool has_ended(NodeStatus status) { return status == NodeStatus::kSuccess || status == NodeStatus::kFailure; }
+
+}  // namespace
+
+// Inverter, ForceSuccess, ForceFailure.
+NodeStatus Tree::forced(std::int32_t index, NodeStatus success, NodeStatus failure) {
+  state(index).status = NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (!has_ended(status)) return status;
+  reset_child(index);
+  return status == NodeStatus::kSuccess ? success : failure;
+}
+
+NodeStatus Tree::passed_on(std::int32_t index) {
+  State& state = this->state(index);
+  if (state.status == NodeStatus::kIdle) state.status = NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (has_ended(status)) reset_child(index);
+  return status;
+}
+
+NodeStatus Tree::repeat(std::int32_t index) {
+  State& state = this->state(index);
+  const auto cycles = integer(index, 0);
+  if (!cycles) return NodeStatus::kBroken;
+  state.status = NodeStatus::kRunning;
+  while (state.count < *cycles || *cycles == -1) {
+    const bool fresh = this->state(index + 1).status == NodeStatus::kIdle;
+    const NodeStatus status = tick_node(index + 1);
+    if (status == NodeStatus::kRunning || status == NodeStatus::kBroken) return status;
+    reset_child(index);
+    if (status == NodeStatus::kSkipped) return status;
+    if (status == NodeStatus::kFailure) {
+      state.count = 0;
+      return status;
+    }
+    if (state.count < INT32_MAX) ++state.count;
+    if (fresh && (state.count < *cycles || *cycles == -1)) {
+      wakes_ = true;
+      return NodeStatus::kRunning;
+    }
+  }
+  state.count = 0;
+  return NodeStatus::kSuccess;
+}
+
+NodeStatus Tree::retry(std::int32_t index) {
+  State& state = this->state(index);
+  auto attempts = integer(index, 0);
+  if (!attempts) return NodeStatus::kBroken;
+  state.status = NodeStatus::kRunning;
+  while (state.count < *attempts || *attempts == -1) {
+    const bool fresh = this->state(index + 1).status == NodeStatus::kIdle;
+    const NodeStatus status = tick_node(index + 1);
+    if (status == NodeStatus::kRunning || status == NodeStatus::kBroken) return status;
+    reset_child(index);
+    if (status == NodeStatus::kSkipped) return status;
+    if (status == NodeStatus::kSuccess) {
+      state.count = 0;
+      return status;
+    }
+    if (state.count < INT32_MAX) ++state.count;
+    // The child may have changed it.
+    attempts = integer(index, 0);
+    if (!attempts) return NodeStatus::kBroken;
+    if (fresh && (state.count < *attempts || *attempts == -1)) {
+      wakes_ = true;
+      return NodeStatus::kRunning;
+    }
+  }
+  state.count = 0;
+  return NodeStatus::kFailure;
+}
+
+NodeStatus Tree::keep_running(std::int32_t index) {
+  state(index).status = NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (status == NodeStatus::kBroken) return status;
+  if (has_ended(status)) reset_child(index);
+  return status == NodeStatus::kFailure ? status : NodeStatus::kRunning;
+}
+
+// `on`: its time runs, since `stamp`.
+NodeStatus Tree::timeout(std::int32_t index) {
+  State& state = this->state(index);
+  const auto msec = integer(index, 0);
+  if (!msec) return NodeStatus::kBroken;
+  if (!state.on) {
+    state.on = true;
+    state.stamp = clock_.count();
+    state.status = NodeStatus::kRunning;
+  } else if (*msec > 0 && elapsed(index, *msec) && this->state(index + 1).status == NodeStatus::kRunning) {
+    state.on = false;
+    reset_child(index);
+    return NodeStatus::kFailure;
+  }
+  const NodeStatus status = tick_node(index + 1);
+  if (has_ended(status)) {
+    state.on = false;
+    reset_child(index);
+  }
+  return status;
+}
+
+// Likewise.
+NodeStatus Tree::delay(std::int32_t index) {
+  State& state = this->state(index);
+  const auto msec = integer(index, 0);
+  if (!msec) return NodeStatus::kBroken;
+  if (!state.on) {
+    state.on = true;
+    state.stamp = clock_.count();
+    state.status = NodeStatus::kRunning;
+  }
+  if (!elapsed(index, *msec)) return NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (has_ended(status)) {
+    state.on = false;
+    reset_child(index);
+  }
+  return status;
+}
+
+// `on`: it has run, and came to `returned`.
+NodeStatus Tree::run_once(std::int32_t index) {
+  State& state = this->state(index);
+  const bool then_skip = number_of(port(node(index), 0).literal) != 0;
+  if (state.on) return then_skip ? NodeStatus::kSkipped : state.returned;
+  state.status = NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (has_ended(status)) {
+    state.on = true;
+    state.returned = status;
+    reset_child(index);
+  }
+  return status;
+}
+
+// Precondition. `on`: the child has begun, and its condition is asked no more. There, that outlives a halt; here, what
+// was halted is asked anew.
+NodeStatus Tree::guarded(std::int32_t index) {
+  State& state = this->state(index);
+  if (!state.on) {
+    const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+    if (!held) return broken(held.error());
+    if (!*held) return static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
+    state.on = true;
+  }
+  const NodeStatus status = tick_node(index + 1);
+  if (has_ended(status)) {
+    reset_child(index);
+    state.on = false;
+  }
+  return status;
+}
+
+// ---- loops ----
+
+// `on`: the child is at one of the values; `count`: the next one's place; `other`: there is a queue. As there, one that
+// is ticked again after its end, without having been reset, finds it empty.
+NodeStatus Tree::loop(std::int32_t index) {
+  const Node& node = this->node(index);
+  State& state = this->state(index);
+  const Loop& loop = program_->loops[static_cast<std::size_t>(node.index)];
+  if (state.status == NodeStatus::kIdle) {
+    state = {};
+    state.other = loop.fixed ? 1 : 0;
+  }
+  if (!state.on) {
+    if (!fill_queue(index)) return NodeStatus::kBroken;
+    const auto& queue = loop.fixed ? *loop.fixed : queues_[static_cast<std::size_t>(node.index)];
+    if (state.other == 0 || static_cast<std::size_t>(state.count) >= queue.size())
+      return static_cast<NodeStatus>(std::get<std::int64_t>(port(node, 1).literal));
+    if (const std::int32_t out = port(node, 2).slot; out >= 0) {
+      slot(out).value = queue[static_cast<std::size_t>(state.count)];
+      slot(out).exists = true;
+      ++slot(out).writes;
+    }
+    ++state.count;
+    state.on = true;
+  }
+  state.status = NodeStatus::kRunning;
+  const NodeStatus status = tick_node(index + 1);
+  if (status == NodeStatus::kBroken) return status;
+  state.on = status == NodeStatus::kRunning;
+  if (has_ended(status)) reset_child(index);
+  return status == NodeStatus::kFailure ? status : NodeStatus::kRunning;
+}
+
+// From the blackboard: a list, or a text of values apart by ';'. False: it is something else.
+bool Tree::fill_queue(std::int32_t index) {
+  const Node& node = this->node(index);
+  const Loop& loop = program_->loops[static_cast<std::size_t>(node.index)];
+  State& state = this->state(index);
+  auto& queue = queues_[static_cast<std::size_t>(node.index)];
+  const Value* const given = value(port(node, 0));
+  if (loop.fixed || state.other != 0) return true;
+  queue.clear();
+  if (given == nullptr) return true;
+  state.other = 1;
+  const auto* const json = std::get_if<Json>(given);
+  std::optional<std::vector<Value>> read;
+  if (json != nullptr && json->is_array()) {
+    read.emplace();
+    for (const Json& item : *json) read->push_back(value_of(item));
+  } else if (const auto* text = std::get_if<std::string>(given)) {
+    read = queue_of(*text, loop.of);
+  }
+  if (!read) {
+    (void)broken({fmt::format("{} is given {} where a list is needed", program_->names[static_cast<std::size_t>(index)],
+                              kind_of(*given)),
+                  {},
+                  "a list, or values apart by ';'"});
+    return false;
+  }
+  queue = *std::move(read);
+  return true;
+}
+
+// ---- entries that change ----
+
+bool Tree::was_updated(std::int32_t index) {
+  const Slot& entry = slot(port(node(index), 0).slot);
+  if (!entry.exists) return false;
+  return std::exchange(state(index).stamp, entry.writes) != entry.writes;
+}
+
+// `on`: the child runs.
+NodeStatus Tree::if_updated(std::int32_t index, NodeStatus otherwise) {
+  State& state = this->state(index);
+  if (!state.on && !was_updated(index)) return otherwise;
+  state.on = true;
+  const NodeStatus status = tick_node(index + 1);
+  state.on = status == NodeStatus::kRunning;
+  return status;
+}
+
+}  // namespace pons::bridge::tree

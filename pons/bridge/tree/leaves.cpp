@@ -1,0 +1,190 @@
+// Nodes without children; and skills.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "pons/bridge/tree/tree.hpp"
+
+namespace pons::bridge::tree {
+
+NodeStatus Tree::script_condition(std::int32_t index) {
+  const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+  if (!held) return broken(held.error());
+  return *held ? NodeStatus::kSuccess : NodeStatus::kFailure;
+}
+
+NodeStatus Tree::set_blackboard(std::int32_t index) {
+  const Value* const given = value(port(node(index), 0));
+  Slot& to = slot(port(node(index), 1).slot);
+  if (given == nullptr) return NodeStatus::kFailure;
+  to.value = *given;
+  to.exists = true;
+  ++to.writes;
+  return NodeStatus::kSuccess;
+}
+
+NodeStatus Tree::sleep(std::int32_t index) {
+  State& state = this->state(index);
+  if (state.status != NodeStatus::kIdle && state.status != NodeStatus::kRunning) return state.status;
+  const auto msec = integer(index, 0);
+  if (!msec) return NodeStatus::kBroken;
+  if (state.status == NodeStatus::kIdle) state.stamp = clock_.count();
+  return elapsed(index, *msec) ? NodeStatus::kSuccess : NodeStatus::kRunning;
+}
+
+// ---- skills ----
+
+NodeStatus Tree::skill(std::int32_t index) {
+  State& state = this->state(index);
+  const auto step = static_cast<std::size_t>(node(index).index);
+  Leaf& leaf = leaves_[step];
+  if (state.status != NodeStatus::kIdle && state.status != NodeStatus::kRunning) return state.status;
+  if (leaf.draining) {
+    waits_ = true;
+    return NodeStatus::kRunning;
+  }
+  if (state.status == NodeStatus::kIdle) leaf = {};
+  state.status = NodeStatus::kRunning;
+  if (!leaf.skill && !leaf.ended) {
+    if (const auto instead = begin(step)) return *instead;
+  }
+  return leaf.ended ? skill_ended(step) : NodeStatus::kRunning;
+}
+
+Expected<task::Step> Tree::step(std::size_t step) const {
+  const SkillUse& use = program_->uses[step];
+  Json arguments = use.arguments;
+  for (const SkillUse::Argument& bound : use.bound) {
+    auto value = argument_of(slots_[static_cast<std::size_t>(bound.slot)].value, bound.schema);
+    if (!value) return fail(value.error().what, fmt::format("{}/{}", use.name, bound.name), value.error().mend);
+    arguments[bound.name] = *std::move(value);
+  }
+  if (use.schema) {
+    if (auto fits = use.schema->check(arguments, use.name); !fits) return std::unexpected(fits.error());
+  }
+  return task::Step{use.type->name, std::move(arguments)};
+}
+
+bool Tree::resources_free(std::size_t step) const {
+  std::uint64_t used = 0;
+  for (const std::size_t other : active_) used |= program_->uses[other].resources;
+  return (used & program_->uses[step].resources) == 0;
+}
+
+// Nothing: its skill runs, or has ended at once.
+std::optional<NodeStatus> Tree::begin(std::size_t step) {
+  Leaf& leaf = leaves_[step];
+  const SkillUse& use = program_->uses[step];
+  if (cancelled_) {
+    if (failure_ && !broken_) broken_ = failure_;
+    return broken({"cancelled before it started", {}, {}});
+  }
+  if (!resources_free(step)) {
+    waits_ = true;
+    return NodeStatus::kRunning;
+  }
+  const auto what = this->step(step);
+  if (!what) {
+    failure_ = Progress{Status::kFailed, what.error().line(), Json::object()};
+    return NodeStatus::kFailure;
+  }
+  ++leaf.tries;
+  if (auto told = observer_({step, use.type->name, leaf.tries}, now_); !told) return broken(told.error());
+  stop_.reset();
+  leaf.last = {};
+  leaf.told_to_end = false;
+  leaf.ending = Duration{0};
+  leaf.skill = use.type->start(what->arguments, now_);
+  if (!leaf.skill) {
+    end_skill(leaf, step, {Status::kFailed, "the skill did not start", Json::object()});
+    return {};
+  }
+  active_.push_back(step);
+  if (pause_) leaf.skill->pause(now_, *pause_);
+  run_skill(step, Duration{0});
+  std::erase_if(active_, [&](std::size_t other) { return !leaves_[other].skill; });
+  return {};
+}
+
+// What the leaf comes to.
+NodeStatus Tree::skill_ended(std::size_t step) {
+  Leaf& leaf = leaves_[step];
+  const SkillUse& use = program_->uses[step];
+  leaf.ended = false;
+  Progress& last = leaf.last;
+  if (last.status == Status::kSucceeded) {
+    for (const SkillUse::Output& output : use.outputs) {
+      const auto told = last.detail.find(output.name);
+      if (!last.detail.is_object() || told == last.detail.end()) continue;
+      Slot& to = slot(output.slot);
+      to = {value_of(*told), to.writes + 1, true};
+    }
+    return NodeStatus::kSuccess;
+  }
+  if (last.status == Status::kException) {
+    if (!broken_) broken_ = last;
+    return NodeStatus::kBroken;
+  }
+  if (last.status == Status::kRetry) {
+    if (leaf.tries < use.type->attempts && !cancelled_ && !leaf.expired) {
+      waits_ = true;
+      return NodeStatus::kRunning;
+    }
+    if (leaf.tries > 1) last.reason = fmt::format("{}; gave up after {} attempts", last.reason, leaf.tries);
+  }
+  if (leaf.expired) last.reason = fmt::format("timed out after {} s: {}", to_s(use.type->timeout), last.reason);
+  last.status = Status::kFailed;
+  failure_ = last;
+  return NodeStatus::kFailure;
+}
+
+void Tree::run_skills(Duration passed) {
+  for (const std::size_t step : active_) run_skill(step, passed);
+  std::erase_if(active_, [&](std::size_t step) { return !leaves_[step].skill; });
+}
+
+void Tree::run_skill(std::size_t step, Duration passed) {
+  Leaf& leaf = leaves_[step];
+  const SkillUse& use = program_->uses[step];
+  if (leaf.last.status != Status::kPaused) leaf.spent += passed;
+  if (leaf.told_to_end) leaf.ending += passed;
+  Progress progress = leaf.skill->tick(now_);
+  for (const task::Note& note : std::exchange(progress.notes, {}))
+    (void)observer_({step, use.type->name, leaf.tries, nullptr, &note}, now_);
+  if (task::is_end(progress.status)) {
+    end_skill(leaf, step, std::move(progress));
+    return;
+  }
+  leaf.last = std::move(progress);
+  if (leaf.expired || leaf.last.status != Status::kRunning || leaf.spent < use.type->timeout) return;
+  leaf.expired = leaf.told_to_end = true;
+  leaf.skill->cancel(now_);
+}
+
+void Tree::end_skill(Leaf& leaf, std::size_t step, Progress progress) {
+  (void)observer_({step, program_->uses[step].type->name, leaf.tries, &progress}, now_);
+  if (progress.stop) stop_ = std::max(stop_.value_or(*progress.stop), *progress.stop);
+  leaf.skill.reset();
+  leaf.ended = !std::exchange(leaf.draining, false);
+  leaf.last = std::move(progress);
+}
+
+// It goes on by itself until it has left the world safe.
+void Tree::drain(std::size_t step) {
+  Leaf& leaf = leaves_[step];
+  leaf.ended = false;
+  if (!leaf.skill || std::exchange(leaf.draining, true)) return;
+  if (!std::exchange(leaf.told_to_end, true)) leaf.skill->cancel(now_);
+}
+
+// ---- another process ----
+
+void Tree::settle(std::size_t step, Progress ended) {
+  Leaf& leaf = leaves_[step];
+  leaf.last = std::move(ended);
+  leaf.ended = true;
+}
+
+}  // namespace pons::bridge::tree

@@ -1,0 +1,76 @@
+#include "pons/bridge/tree/library.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge::tree {
+
+namespace fs = std::filesystem;
+
+Expected<void> Library::load(const fs::path& folder) {
+  std::set<fs::path> files;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none)) {
+    if (entry.path().extension() == ".xml") files.insert(entry.path());
+  }
+  auto programs = programs_;
+  std::map<std::string, std::string> files_of;
+  for (const fs::path& file : files) {
+    const auto document = read_document(file);
+    if (!document) return std::unexpected(document.error());
+    for (const auto& [name, root] : document->trees) {
+      // What another file includes is that file's as well.
+      const auto [known, added] = files_of.emplace(name, root.where);
+      if (!added && known->second == root.where) continue;
+      if (!added || programs.contains(name))
+        return fail(fmt::format("there are two trees '{}'", task::excerpt(name)), root.where, "rename one");
+      auto program = compile(*document, name, skills_);
+      if (!program) return std::unexpected(program.error());
+      programs.emplace(name, *std::move(program));
+    }
+  }
+  programs_ = std::move(programs);
+  return {};
+}
+
+std::vector<std::string> Library::names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, program] : programs_) names.push_back(name);
+  return names;
+}
+
+std::shared_ptr<const Program> Library::find(std::string_view name) const {
+  const auto found = programs_.find(name);
+  return found == programs_.end() ? nullptr : found->second;
+}
+
+Expected<std::shared_ptr<const Program>> Library::program(const task::TreeRequest& request) const {
+  std::shared_ptr<const Program> program;
+  if (request.xml.empty()) {
+    program = find(request.name);
+    if (program == nullptr) {
+      return fail(
+          fmt::format("the world has no tree '{}'", task::excerpt(request.name)), "/tree/name",
+          programs_.empty() ? "it has none; send the XML along" : fmt::format("it has {}", fmt::join(names(), ", ")));
+    }
+  } else {
+    const auto document = read_document(request.xml, "/tree/xml");
+    if (!document) return std::unexpected(document.error());
+    auto compiled = compile(*document, request.name, skills_);
+    if (!compiled) return compiled;
+    program = *std::move(compiled);
+  }
+  for (const auto& [name, value] : request.inputs.items()) {
+    if (!program->root.contains(name)) {
+      return fail(fmt::format("the tree reads and writes no '{}'", task::excerpt(name)), "/tree/inputs",
+                  "leave it out, or name an entry of its main tree");
+    }
+  }
+  return program;
+}
+
+}  // namespace pons::bridge::tree

@@ -1,0 +1,229 @@
+#include "pons/bridge/tree/script.hpp"
+
+#include <fmt/format.h>
+
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge::tree {
+namespace {
+
+constexpr double kSame = std::numeric_limits<float>::epsilon();
+
+Value truth(bool holds) { return holds ? 1.0 : 0.0; }
+
+// Nothing that is negative is a truth value, nor an integer above 1, as there.
+std::optional<bool> truth_of(const Value& value) {
+  if (!is_number(value) || number_of(value) < 0) return {};
+  if (const auto* integer = std::get_if<std::int64_t>(&value); integer != nullptr && *integer > 1) return {};
+  return number_of(value) != 0;
+}
+
+template <typename Left, typename Right>
+bool holds_of(Operator op, const Left& left, const Right& right, bool same) {
+  switch (op) {
+    case Operator::kEqual:
+      return same;
+    case Operator::kUnequal:
+      return !same;
+    case Operator::kLess:
+      return !(left >= right);
+    case Operator::kGreater:
+      return !(left <= right);
+    case Operator::kLessEqual:
+      return !(left > right);
+    default:
+      return !(left < right);
+  }
+}
+
+std::optional<double> calculate(Operator op, double left, double right) {
+  switch (op) {
+    case Operator::kPlus:
+    case Operator::kAddTo:
+      return left + right;
+    case Operator::kMinus:
+    case Operator::kTakeFrom:
+      return left - right;
+    case Operator::kTimes:
+    case Operator::kMultiplyBy:
+      return left * right;
+    case Operator::kDivide:
+    case Operator::kDivideBy:
+      return left / right;
+    default:
+      return {};
+  }
+}
+
+std::int64_t combine(Operator op, std::int64_t left, std::int64_t right) {
+  if (op == Operator::kBitAnd) return left & right;
+  return op == Operator::kBitOr ? left | right : left ^ right;
+}
+
+// The right side of an assignment into an entry that has a value: the entry keeps its kind. Nothing: it cannot.
+std::optional<Value> fitted(const Value& to, Value value) {
+  if (is_number(to)) {
+    const auto number = to_number(value);
+    if (!number) return {};
+    // A text that becomes a number becomes a real one, as there.
+    if (is_text(value) || std::holds_alternative<double>(to)) return *number;
+    const auto integer = integer_of(value);
+    return integer ? std::optional<Value>(*integer) : std::nullopt;
+  }
+  if (to.index() != value.index()) return {};
+  return value;
+}
+
+}  // namespace
+
+std::unexpected<Error> Script::wrong(std::string what) const {
+  return fail(fmt::format("{} in the script '{}'", what, task::excerpt(text_, 120)));
+}
+
+Expected<Value> Script::run(std::span<Slot> slots) const {
+  Expected<Value> result{Value{}};
+  for (const std::int32_t statement : statements_) {
+    result = value(statement, slots);
+    if (!result) break;
+  }
+  return result;
+}
+
+Expected<bool> Script::holds(std::span<Slot> slots) const {
+  const auto result = run(slots);
+  if (!result) return std::unexpected(result.error());
+  const auto held = truth_of(*result);
+  if (!held) return wrong(fmt::format("{} is no truth value", kind_of(*result)));
+  return *held;
+}
+
+Expected<Value> Script::value(std::int32_t index, std::span<Slot> slots) const {
+  const Expression& expression = expressions_[static_cast<std::size_t>(index)];
+  switch (expression.op) {
+    case Operator::kLiteral:
+      return expression.literal;
+    case Operator::kVariable: {
+      const Slot& slot = slots[static_cast<std::size_t>(expression.slot)];
+      if (!slot.exists) return wrong(fmt::format("there is no '{}'", names_[static_cast<std::size_t>(index)]));
+      return slot.value;
+    }
+    case Operator::kNegate:
+    case Operator::kComplement:
+    case Operator::kNot:
+      return unary(expression, slots);
+    case Operator::kCompare:
+      return compare(expression, slots);
+    case Operator::kIf: {
+      const auto condition = value(expression.left, slots);
+      if (!condition) return condition;
+      const auto number = to_number(*condition);
+      if (!number) return wrong(fmt::format("{} is no truth value", kind_of(*condition)));
+      return value(*number != 0 ? expression.right : expression.third, slots);
+    }
+    case Operator::kCreate:
+    case Operator::kAssign:
+    case Operator::kAddTo:
+    case Operator::kTakeFrom:
+    case Operator::kMultiplyBy:
+    case Operator::kDivideBy:
+      return assign(expression, slots);
+    default:
+      return binary(expression, slots);
+  }
+}
+
+Expected<Value> Script::unary(const Expression& expression, std::span<Slot> slots) const {
+  const auto operand = value(expression.left, slots);
+  if (!operand) return operand;
+  if (!is_number(*operand)) return wrong(fmt::format("{} has no sign and no opposite", kind_of(*operand)));
+  const double number = number_of(*operand);
+  if (expression.op == Operator::kNegate) return -number;
+  if (expression.op == Operator::kNot) return truth(number == 0);
+  const auto bits = integer_of(std::trunc(number));
+  if (!bits) return wrong("a number is too large for '~'");
+  return static_cast<double>(~*bits);
+}
+
+Expected<Value> Script::binary(const Expression& expression, std::span<Slot> slots) const {
+  const auto left = value(expression.left, slots);
+  if (!left) return left;
+  const auto right = value(expression.right, slots);
+  if (!right) return right;
+  if (is_empty(*left) || is_empty(*right)) return wrong("a variable is used that is not set");
+  const bool texts = is_text(*left) && is_text(*right);
+  if (is_number(*left) && is_number(*right)) {
+    if (const auto result = calculate(expression.op, number_of(*left), number_of(*right))) return *result;
+    if (expression.op == Operator::kJoin) return wrong("two numbers cannot be joined");
+    if (expression.op == Operator::kAnd || expression.op == Operator::kOr) {
+      const auto a = truth_of(*left), b = truth_of(*right);
+      if (!a || !b) return wrong("a negative number, or an integer above 1, is no truth value");
+      return truth(expression.op == Operator::kAnd ? *a && *b : *a || *b);
+    }
+    const auto left_bits = integer_of(*left), right_bits = integer_of(*right);
+    if (!left_bits || !right_bits) return wrong("bits are of integers only");
+    return static_cast<double>(combine(expression.op, *left_bits, *right_bits));
+  }
+  const bool joins = expression.op == Operator::kJoin && (is_text(*left) || is_text(*right)) &&
+                     (is_text(*left) || is_number(*left)) && (is_text(*right) || is_number(*right));
+  if (joins || (texts && expression.op == Operator::kPlus)) return to_text(*left) + to_text(*right);
+  return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(*left), kind_of(*right)));
+}
+
+Expected<Value> Script::compare(const Expression& expression, std::span<Slot> slots) const {
+  auto left = value(expression.left, slots);
+  if (!left) return left;
+  for (std::int32_t next = expression.right; next >= 0;) {
+    const Expression& link = expressions_[static_cast<std::size_t>(next)];
+    auto right = value(link.left, slots);
+    if (!right) return right;
+    if (is_empty(*left) || is_empty(*right)) return wrong("a variable is compared that is not set");
+    bool holds = false;
+    if (is_text(*left) && is_text(*right)) {
+      holds = holds_of(link.op, std::get<std::string>(*left), std::get<std::string>(*right), *left == *right);
+    } else {
+      const auto a = to_number(*left), b = to_number(*right);
+      if (!a || !b) return wrong(fmt::format("{} cannot be compared with {}", kind_of(*left), kind_of(*right)));
+      holds = holds_of(link.op, *a, *b, std::abs(*a - *b) <= kSame);
+    }
+    if (!holds) return truth(false);
+    left = std::move(right);
+    next = link.third;
+  }
+  return truth(true);
+}
+
+Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slots) const {
+  Slot& slot = slots[static_cast<std::size_t>(expression.slot)];
+  const std::string& name = names_[static_cast<std::size_t>(expression.left)];
+  const Operator op = expression.op;
+  if (!slot.exists && op != Operator::kCreate) return wrong(fmt::format("there is no '{}' yet (':=' makes one)", name));
+  slot.exists = true;
+  auto given = value(expression.right, slots);
+  if (!given) return given;
+  if (is_empty(*given)) return wrong("a variable is assigned that is not set");
+  if (op != Operator::kCreate && op != Operator::kAssign) {
+    if (is_empty(slot.value)) return wrong(fmt::format("'{}' is not set", name));
+    if (is_number(slot.value) && is_number(*given)) {
+      given = calculate(op, number_of(slot.value), number_of(*given)).value_or(0);
+    } else if (is_text(slot.value) && is_text(*given) && op == Operator::kAddTo) {
+      given = std::get<std::string>(slot.value) + std::get<std::string>(*given);
+    } else {
+      return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(slot.value), kind_of(*given)));
+    }
+  }
+  if (!is_empty(slot.value)) {
+    auto kept = fitted(slot.value, *given);
+    if (!kept) return wrong(fmt::format("'{}' holds {}, and cannot take this", name, kind_of(slot.value)));
+    given = *std::move(kept);
+  }
+  slot.value = *given;
+  ++slot.writes;
+  return given;
+}
+
+}  // namespace pons::bridge::tree

@@ -1,0 +1,91 @@
+// The scripting language of BehaviorTree.CPP 4: statements apart by ';', variables of the blackboard, := = += -= *= /=,
+// ?:, || &&, comparisons in chains, | ^ & ~, + - * /, .. to join text, numbers, 'text', true and false.
+//
+// Both sides of && and || are evaluated. Equal are numbers within the epsilon of a float, as there. Enumerations are
+// not known: a name is a variable.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/bridge/tree/value.hpp"
+#include "pons/core/error.hpp"
+
+namespace pons::bridge::tree {
+
+enum class Operator : std::uint8_t {
+  kLiteral,
+  kVariable,
+  kNegate,
+  kComplement,
+  kNot,
+  kPlus,
+  kMinus,
+  kTimes,
+  kDivide,
+  kJoin,
+  kBitAnd,
+  kBitOr,
+  kBitXor,
+  kAnd,
+  kOr,
+  kEqual,
+  kUnequal,
+  kLess,
+  kGreater,
+  kLessEqual,
+  kGreaterEqual,
+  kCompare,  // left: the first operand; right: a link, which is a comparison with its left and has the next as its
+             // third
+  kIf,       // left ? right : third
+  kCreate,   // the assignments' left is a variable
+  kAssign,
+  kAddTo,
+  kTakeFrom,
+  kMultiplyBy,
+  kDivideBy,
+};
+
+struct Expression {
+  Operator op = Operator::kLiteral;
+  std::int32_t left = -1, right = -1, third = -1;
+  std::int32_t slot = -1;  // of a variable
+  Value literal = {};
+};
+
+class Script {
+ public:
+  // Says which slot a variable has; the name may begin with '@' (the root's).
+  using SlotOf = std::function<Expected<int>(std::string_view name)>;
+
+  Script() = default;
+  // Error: the text is no script; says where. Nesting is bounded.
+  [[nodiscard]] static Expected<Script> parse(std::string_view text, const SlotOf& slot_of);
+
+  // The value of its last statement. Error: a variable that does not exist or is not set, types that do not fit, a
+  // number that would lose digits in an entry that holds integers. What was assigned until then stays assigned.
+  // Allocates nothing but long texts.
+  [[nodiscard]] Expected<Value> run(std::span<Slot> slots) const;
+  // Likewise, as a truth value.
+  [[nodiscard]] Expected<bool> holds(std::span<Slot> slots) const;
+
+ private:
+  class Parser;
+  [[nodiscard]] Expected<Value> value(std::int32_t index, std::span<Slot> slots) const;
+  [[nodiscard]] Expected<Value> binary(const Expression& expression, std::span<Slot> slots) const;
+  [[nodiscard]] Expected<Value> unary(const Expression& expression, std::span<Slot> slots) const;
+  [[nodiscard]] Expected<Value> compare(const Expression& expression, std::span<Slot> slots) const;
+  [[nodiscard]] Expected<Value> assign(const Expression& expression, std::span<Slot> slots) const;
+  [[nodiscard]] std::unexpected<Error> wrong(std::string what) const;
+
+  std::vector<Expression> expressions_;
+  std::vector<std::int32_t> statements_;
+  std::vector<std::string> names_;  // of the variables, by expression
+  std::string text_;
+};
+
+}  // namespace pons::bridge::tree
