@@ -20,7 +20,8 @@ std::string ticks(BT::Tree& tree, BT::Blackboard& board) {
       board.set("t", static_cast<double>(t));
       auto status = tree.tickExactlyOnce();
       // As tickOnce(), but not for ever.
-      for (int round = 1; round < 100 && status == BT::NodeStatus::RUNNING && tree.sleep(std::chrono::milliseconds(0));
+      for (int round = 1; round < 100 && status == BT::NodeStatus::RUNNING &&
+                          tree.wakeUpSignal()->waitFor(std::chrono::milliseconds(0));
            ++round)
         status = tree.tickExactlyOnce();
       trace += status == BT::NodeStatus::SKIPPED ? 'K' : BT::toStr(status)[0];

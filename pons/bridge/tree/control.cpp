@@ -27,6 +27,36 @@ bool same(const Value& left, const Value& right) {
 
 }  // namespace
 
+NodeStatus Tree::control(std::int32_t index) {
+  switch (node(index).kind) {
+    case Kind::kSequence:
+    case Kind::kAsyncSequence:
+    case Kind::kSequenceWithMemory:
+      return in_turn(index, NodeStatus::kSuccess);
+    case Kind::kFallback:
+    case Kind::kAsyncFallback:
+      return in_turn(index, NodeStatus::kFailure);
+    case Kind::kReactiveSequence:
+      return reactive(index, NodeStatus::kSuccess);
+    case Kind::kReactiveFallback:
+      return reactive(index, NodeStatus::kFailure);
+    case Kind::kParallel:
+      return parallel(index);
+    case Kind::kParallelAll:
+      return parallel_all(index);
+    case Kind::kIfThenElse:
+      return if_then_else(index);
+    case Kind::kWhileDoElse:
+      return while_do_else(index);
+    case Kind::kSwitch:
+      return switch_of(index);
+    case Kind::kTryCatch:
+      return try_catch(index);
+    default:
+      return NodeStatus::kBroken;  // dispatch() sends no other here
+  }
+}
+
 // Sequence: after SUCCESS the next. Fallback: after FAILURE.
 NodeStatus Tree::in_turn(std::int32_t index, NodeStatus goes_on) {
   const Node& node = this->node(index);

@@ -12,6 +12,41 @@ bool has_ended(NodeStatus status) { return status == NodeStatus::kSuccess || sta
 
 }  // namespace
 
+NodeStatus Tree::decorator(std::int32_t index) {
+  switch (node(index).kind) {
+    case Kind::kInverter:
+      return forced(index, NodeStatus::kFailure, NodeStatus::kSuccess);
+    case Kind::kForceSuccess:
+      return forced(index, NodeStatus::kSuccess, NodeStatus::kSuccess);
+    case Kind::kForceFailure:
+      return forced(index, NodeStatus::kFailure, NodeStatus::kFailure);
+    case Kind::kRepeat:
+      return repeat(index);
+    case Kind::kRetry:
+      return retry(index);
+    case Kind::kKeepRunning:
+      return keep_running(index);
+    case Kind::kTimeout:
+      return timeout(index);
+    case Kind::kDelay:
+      return delay(index);
+    case Kind::kRunOnce:
+      return run_once(index);
+    case Kind::kPrecondition:
+      return guarded(index);
+    case Kind::kLoop:
+      return loop(index);
+    case Kind::kSkipUnlessUpdated:
+      return if_updated(index, NodeStatus::kSkipped);
+    case Kind::kWaitValueUpdate:
+      return if_updated(index, NodeStatus::kRunning);
+    case Kind::kSubTree:
+      return passed_on(index);
+    default:
+      return NodeStatus::kBroken;  // dispatch() sends no other here
+  }
+}
+
 // Inverter, ForceSuccess, ForceFailure.
 NodeStatus Tree::forced(std::int32_t index, NodeStatus success, NodeStatus failure) {
   state(index).status = NodeStatus::kRunning;

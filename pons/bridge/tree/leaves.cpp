@@ -9,6 +9,32 @@
 
 namespace pons::bridge::tree {
 
+NodeStatus Tree::leaf(std::int32_t index) {
+  switch (node(index).kind) {
+    case Kind::kAlwaysSuccess:
+      return NodeStatus::kSuccess;
+    case Kind::kAlwaysFailure:
+      return NodeStatus::kFailure;
+    case Kind::kScript:
+      return run_script(node(index).index) ? NodeStatus::kSuccess : NodeStatus::kBroken;
+    case Kind::kScriptCondition:
+      return script_condition(index);
+    case Kind::kSetBlackboard:
+      return set_blackboard(index);
+    case Kind::kUnsetBlackboard:
+      slot(port(node(index), 0).slot) = {};
+      return NodeStatus::kSuccess;
+    case Kind::kSleep:
+      return wait_out(index);
+    case Kind::kWasEntryUpdated:
+      return was_updated(index) ? NodeStatus::kSuccess : NodeStatus::kFailure;
+    case Kind::kSkill:
+      return skill(index);
+    default:
+      return NodeStatus::kBroken;  // dispatch() sends no other here
+  }
+}
+
 NodeStatus Tree::script_condition(std::int32_t index) {
   const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
   if (!held) return broken(held.error());
@@ -25,7 +51,7 @@ NodeStatus Tree::set_blackboard(std::int32_t index) {
   return NodeStatus::kSuccess;
 }
 
-NodeStatus Tree::sleep(std::int32_t index) {
+NodeStatus Tree::wait_out(std::int32_t index) {
   State& state = this->state(index);
   if (state.status != NodeStatus::kIdle && state.status != NodeStatus::kRunning) return state.status;
   const auto msec = integer(index, 0);

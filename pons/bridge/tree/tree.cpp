@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
 #include <chrono>
 #include <utility>
 
@@ -124,82 +123,9 @@ NodeStatus Tree::tick_node(std::int32_t index) {
 }
 
 NodeStatus Tree::dispatch(std::int32_t index) {
-  constexpr auto kSuccess = NodeStatus::kSuccess, kFailure = NodeStatus::kFailure;
-  const Node& node = this->node(index);
-  switch (node.kind) {
-    case Kind::kSequence:
-    case Kind::kAsyncSequence:
-    case Kind::kSequenceWithMemory:
-      return in_turn(index, kSuccess);
-    case Kind::kFallback:
-    case Kind::kAsyncFallback:
-      return in_turn(index, kFailure);
-    case Kind::kReactiveSequence:
-      return reactive(index, kSuccess);
-    case Kind::kReactiveFallback:
-      return reactive(index, kFailure);
-    case Kind::kParallel:
-      return parallel(index);
-    case Kind::kParallelAll:
-      return parallel_all(index);
-    case Kind::kIfThenElse:
-      return if_then_else(index);
-    case Kind::kWhileDoElse:
-      return while_do_else(index);
-    case Kind::kSwitch:
-      return switch_of(index);
-    case Kind::kTryCatch:
-      return try_catch(index);
-    case Kind::kInverter:
-      return forced(index, kFailure, kSuccess);
-    case Kind::kForceSuccess:
-      return forced(index, kSuccess, kSuccess);
-    case Kind::kForceFailure:
-      return forced(index, kFailure, kFailure);
-    case Kind::kRepeat:
-      return repeat(index);
-    case Kind::kRetry:
-      return retry(index);
-    case Kind::kKeepRunning:
-      return keep_running(index);
-    case Kind::kTimeout:
-      return timeout(index);
-    case Kind::kDelay:
-      return delay(index);
-    case Kind::kRunOnce:
-      return run_once(index);
-    case Kind::kPrecondition:
-      return guarded(index);
-    case Kind::kLoop:
-      return loop(index);
-    case Kind::kSkipUnlessUpdated:
-      return if_updated(index, NodeStatus::kSkipped);
-    case Kind::kWaitValueUpdate:
-      return if_updated(index, NodeStatus::kRunning);
-    case Kind::kSubTree:
-      return passed_on(index);
-    case Kind::kAlwaysSuccess:
-      return kSuccess;
-    case Kind::kAlwaysFailure:
-      return kFailure;
-    case Kind::kScript:
-      return run_script(node.index) ? kSuccess : NodeStatus::kBroken;
-    case Kind::kScriptCondition:
-      return script_condition(index);
-    case Kind::kSetBlackboard:
-      return set_blackboard(index);
-    case Kind::kUnsetBlackboard:
-      slot(port(node, 0).slot) = {};
-      return kSuccess;
-    case Kind::kSleep:
-      return sleep(index);
-    case Kind::kWasEntryUpdated:
-      return was_updated(index) ? kSuccess : kFailure;
-    case Kind::kSkill:
-      return skill(index);
-  }
-  assert(false);
-  return NodeStatus::kBroken;
+  const Kind kind = node(index).kind;
+  if (kind < Kind::kInverter) return control(index);
+  return is_decorator(kind) ? decorator(index) : leaf(index);
 }
 
 // ---- conditions ----

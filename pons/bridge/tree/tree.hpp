@@ -129,6 +129,7 @@ class Tree {
   [[nodiscard]] bool elapsed(std::int32_t index, std::int64_t msec);
 
   // control.cpp
+  [[nodiscard]] NodeStatus control(std::int32_t index);
   [[nodiscard]] NodeStatus in_turn(std::int32_t index, NodeStatus goes_on);
   [[nodiscard]] NodeStatus reactive(std::int32_t index, NodeStatus goes_on);
   [[nodiscard]] NodeStatus parallel(std::int32_t index);
@@ -140,6 +141,7 @@ class Tree {
   void forget_completed(std::int32_t index);
 
   // decorators.cpp
+  [[nodiscard]] NodeStatus decorator(std::int32_t index);
   [[nodiscard]] NodeStatus forced(std::int32_t index, NodeStatus success, NodeStatus failure);
   [[nodiscard]] NodeStatus repeat(std::int32_t index);
   [[nodiscard]] NodeStatus retry(std::int32_t index);
@@ -155,9 +157,10 @@ class Tree {
   [[nodiscard]] bool was_updated(std::int32_t index);
 
   // leaves.cpp
+  [[nodiscard]] NodeStatus leaf(std::int32_t index);
   [[nodiscard]] NodeStatus script_condition(std::int32_t index);
   [[nodiscard]] NodeStatus set_blackboard(std::int32_t index);
-  [[nodiscard]] NodeStatus sleep(std::int32_t index);
+  [[nodiscard]] NodeStatus wait_out(std::int32_t index);
   [[nodiscard]] NodeStatus skill(std::int32_t index);
   [[nodiscard]] std::optional<NodeStatus> begin(std::size_t step);
   [[nodiscard]] NodeStatus skill_ended(std::size_t step);
