@@ -103,7 +103,7 @@ bench-peers: ## build what the benchmarks compare against
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
 
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
-	for program in control_step inverse_kinematics journal scheduling stop_latency wake_up; do build/release/bench/$$program --gate || exit 1; done
+	for program in control_step inverse_kinematics journal scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
 	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose

@@ -196,6 +196,7 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
   Open& open = add_open(task, std::move(program), record.accepted);
   open.tree = std::move(tree);
   open.begun = true;
+  checkpoint(open, now);
   if (!story.handed_over()) {
     open.priority = Arbiter::kFirst;  // it may hold what the next one would need
     if (story.paused()) open.told = Open::Told::kPause;

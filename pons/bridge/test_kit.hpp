@@ -69,6 +69,7 @@ class Actor {
             .resources = {"arm"},
             .timeout = timeout,
             .attempts = attempts,
+            .outputs = {"mass_kg"},
             .start = [this](const Json& arguments, Time) {
               log.started.push_back(arguments);
               const Course course = courses_.front();

@@ -81,6 +81,24 @@ TEST(Task, RefusesWrongShapesAndRanges) {
   EXPECT_FALSE(task_from(Json::array()));
 }
 
+TEST(Task, HasEitherStepsOrATree) {
+  const Json named = Json::parse(R"({"id":"a","tree":{"name":"sort","inputs":{"code":"P1"}}})");
+  const auto task = task_from(named);
+  ASSERT_TRUE(task) << task.error().line();
+  EXPECT_TRUE(task->steps.empty());
+  EXPECT_EQ(task->tree->name, "sort");
+  EXPECT_EQ(task->tree->inputs, (Json{{"code", "P1"}}));
+  EXPECT_EQ(task_from(to_json(*task))->tree, task->tree);
+  EXPECT_EQ(task_from(Json::parse(R"({"id":"a","tree":{"xml":"<root/>"}})"))->tree->xml, "<root/>");
+  EXPECT_EQ(task_from(Json::parse(R"({"id":"a"})")).error().what, "it has neither steps nor a tree");
+  Json both = good();
+  both["tree"] = named["tree"];
+  EXPECT_EQ(task_from(both).error().what, "it has both steps and a tree");
+  EXPECT_FALSE(task_from(Json::parse(R"({"id":"a","tree":{}})")));
+  EXPECT_FALSE(task_from(Json::parse(R"({"id":"a","tree":{"name":""}})")));
+  EXPECT_FALSE(task_from(Json::parse(R"({"id":"a","tree":{"name":"sort","inputs":[]}})")));
+}
+
 TEST(TaskSchema, IsTheDocument) {
   std::ifstream file("docs/schema/task.json");
   std::stringstream text;

@@ -106,6 +106,8 @@ Expected<void> Story::take_attempt_end(const Event& event) {
 
 Expected<void> Story::take_found_done(const Event& event) {
   const std::size_t step = step_of(event);
+  if (is_tree_ && trying_.erase(step) == 0) return impossible(event, "is of a leaf that does not go on");
+  if (is_tree_) return {};
   if (!started_ || step >= steps_ || step != done_) return impossible(event, "is of a step that was never begun");
   trying_.clear();
   done_ = std::max(done_, step + 1);

@@ -47,6 +47,21 @@ class Numbers {
   std::size_t at_ = 0;
 };
 
+bool has_ended(NodeStatus status) { return status == NodeStatus::kSuccess || status == NodeStatus::kFailure; }
+
+Json of_end(const Progress& ended) {
+  return {{"status", task::name(ended.status)}, {"reason", ended.reason}, {"detail", ended.detail}};
+}
+
+bool read_end(const Json& json, Progress& ended) {
+  for (const Status status : {Status::kSucceeded, Status::kRetry, Status::kFailed, Status::kException}) {
+    if (task::text_of(json, "status") != task::name(status)) continue;
+    ended = {status, task::text_of(json, "reason"), json.value("detail", Json::object())};
+    return true;
+  }
+  return false;
+}
+
 std::unexpected<Error> damaged(std::string_view part) {
   return fail(fmt::format("what was written down of the tree's {} cannot be read", part), {}, "submit the task anew");
 }
@@ -74,7 +89,10 @@ Json Tree::checkpoint() const {
   }
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
     const Leaf& leaf = leaves_[i];
-    if (leaf.tries > 0) leaves.push_back({i, leaf.tries, leaf.spent.count()});
+    if (leaf.tries == 0) continue;
+    leaves.push_back({i, leaf.tries, leaf.spent.count()});
+    // The tree has not come by yet to take it up.
+    if (leaf.ended) leaves.back().push_back(of_end(leaf.last));
   }
   for (std::size_t i = 0; i < queues_.size(); ++i) {
     if (queues_[i].empty()) continue;
@@ -108,7 +126,9 @@ Expected<void> Tree::restore(const Json& checkpoint) {
                       numbers.next(state.completed) && numbers.next(state.child, -1, end) &&
                       numbers.next(state.count, 0) && numbers.next(state.other, 0) && numbers.next(state.stamp) &&
                       numbers.at_end();
-    if (!good || !is_child(i, state.child)) return damaged("nodes");
+    if (!good || !is_child(i, state.child) ||
+        (state.on && node(i).kind == Kind::kRunOnce && !has_ended(state.returned)))
+      return damaged("nodes");
   }
   for (const Json& list : part_of(checkpoint, "entries")) {
     Numbers numbers(list);
@@ -124,8 +144,10 @@ Expected<void> Tree::restore(const Json& checkpoint) {
     std::int64_t spent = 0;
     if (!numbers.next(i, 0, std::ssize(leaves_) - 1)) return damaged("leaves");
     Leaf& leaf = made.leaves_[static_cast<std::size_t>(i)];
-    if (!numbers.next(leaf.tries, 0) || !numbers.next(spent, 0) || !numbers.at_end()) return damaged("leaves");
+    if (!numbers.next(leaf.tries, 0) || !numbers.next(spent, 0)) return damaged("leaves");
     leaf.spent = Duration(spent);
+    leaf.ended = !numbers.at_end();
+    if (leaf.ended && (list.size() != 4 || !read_end(list[3], leaf.last))) return damaged("leaves");
   }
   for (const Json& list : part_of(checkpoint, "queues")) {
     Numbers numbers(list);
@@ -140,10 +162,11 @@ Expected<void> Tree::restore(const Json& checkpoint) {
   return {};
 }
 
-// Or none, or the place behind the last.
+// Or none; or, of what goes from one to the next, the place behind the last.
 bool Tree::is_child(std::int32_t index, std::int32_t child) const {
   const Node& parent = node(index);
-  if (child == -1 || child == parent.end) return true;
+  if (child == -1) return true;
+  if (child == parent.end) return parent.kind != Kind::kIfThenElse && parent.kind != Kind::kSwitch;
   std::int32_t at = index + 1;
   while (at < parent.end && at < child) at = node(at).end;
   return at == child;

@@ -17,7 +17,7 @@ Expected<void> Library::load(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder, none)) {
     if (entry.path().extension() == ".xml") files.insert(entry.path());
   }
-  auto programs = programs_;
+  decltype(programs_) programs;
   std::map<std::string, std::string> files_of;
   for (const fs::path& file : files) {
     const auto document = read_document(file);
@@ -26,7 +26,7 @@ Expected<void> Library::load(const fs::path& folder) {
       // What another file includes is that file's as well.
       const auto [known, added] = files_of.emplace(name, root.where);
       if (!added && known->second == root.where) continue;
-      if (!added || programs.contains(name))
+      if (!added)
         return fail(fmt::format("there are two trees '{}'", task::excerpt(name)), root.where, "rename one");
       auto program = compile(*document, name, skills_);
       if (!program) return std::unexpected(program.error());

@@ -20,7 +20,7 @@ class Library {
   explicit Library(const task::SkillRegistry& skills) : skills_(skills) {}
 
   // Every *.xml in it; a folder that does not exist holds none. Errors: of a document, of a tree that cannot run, one
-  // name twice. Nothing is taken up then.
+  // name twice; then it holds what it held. Else this takes the place of what was loaded before.
   [[nodiscard]] Expected<void> load(const std::filesystem::path& folder);
   // In the order of their names.
   [[nodiscard]] std::vector<std::string> names() const;

@@ -68,7 +68,8 @@ class Tree {
   // Whether a skill has not ended so long after it was told to.
   [[nodiscard]] bool overdue(Duration grace) const;
 
-  // All that is needed to go on in another process, but for what the skills themselves were at.
+  // All that is needed to go on in another process, but for what the skills themselves were at. Also within a tick, as
+  // when an observer is told.
   [[nodiscard]] Json checkpoint() const;
   // Before the first tick. Leaves that were running start anew, but for those that settle() knows the end of. Error: it
   // is of another program, or damaged.

@@ -1,0 +1,240 @@
+// Tasks that are trees: from the sender to the journal and, after a crash, on.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pons/bridge/journal/story.hpp"
+#include "pons/bridge/test_bridge.hpp"
+
+namespace pons::bridge {
+namespace {
+
+using task::Outcome;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// The parcel is picked, and brought to a second place where the first does not work out.
+constexpr const char* kSort = R"(<root BTCPP_format="4">
+  <BehaviorTree ID="sort">
+    <Sequence>
+      <pick object="{code}" mass_kg="{mass}"/>
+      <Script code="tried := 'first'"/>
+      <Sleep msec="500"/>
+      <Fallback>
+        <place object="{code}"/>
+        <Sequence><Script code="tried = 'second'"/><aside object="{code}"/></Sequence>
+      </Fallback>
+    </Sequence>
+  </BehaviorTree>
+</root>)";
+
+class TreesOfTasks : public BridgeTest {
+ protected:
+  TreesOfTasks() {
+    skills_.add(aside_.type());
+    std::filesystem::create_directory(folder_ / "trees");
+    std::ofstream(folder_ / "trees/sort.xml") << kSort;
+    reopen();
+  }
+  void reopen() {
+    BridgeTest::reopen();
+    const auto loaded = bridge_->load_trees(folder_ / "trees");
+    ASSERT_TRUE(loaded) << loaded.error().line();
+  }
+  Expected<Admission> submit_tree(const std::string& id, const Json& tree, int priority = 50) {
+    return bridge_->submit(Json{{"id", id}, {"priority", priority}, {"tree", tree}}.dump(), now_);
+  }
+  Expected<Admission> submit_sort(const std::string& id) {
+    return submit_tree(id, {{"name", "sort"}, {"inputs", {{"code", "P1"}}}});
+  }
+  void tick(int times = 1) {
+    for (int i = 0; i < times; ++i, now_ += from_s(0.01)) bridge_->tick(now_);
+  }
+  // The bridge dies, and another takes over.
+  void recover(const Resume& resume) {
+    reopen();
+    const auto recovered = bridge_->recover(resume, now_);
+    ASSERT_TRUE(recovered) << recovered.error().line();
+    EXPECT_THAT(audit(*journal_), testing::IsEmpty());
+  }
+  static Resumption goes_on(const task::Task&, std::size_t done) { return {.done = done}; }
+
+  Actor aside_{"aside", {{.ticks = 5}}};
+};
+
+TEST_F(TreesOfTasks, OneOfTheWorldRunsWithTheInputsThatItWasGiven) {
+  ASSERT_TRUE(submit_sort("T1"));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 1u);
+  EXPECT_EQ(reports[0].outcome, Outcome::kSucceeded);
+  EXPECT_EQ(reports[0].detail.at("blackboard"), (Json{{"code", "P1"}, {"mass", 1.5}, {"tried", "first"}}));
+  EXPECT_EQ(reports[0].detail.at("attempts"), 2);
+  EXPECT_EQ(place_.log.started, std::vector<Json>({{{"object", "P1"}}}));
+  EXPECT_THAT(kinds("T1"), ElementsAre("started", "checkpoint", "attempt", "attempt_ended", "checkpoint", "checkpoint",
+                                       "attempt", "attempt_ended"));
+  EXPECT_THAT(audit(*journal_), testing::IsEmpty());
+}
+
+TEST_F(TreesOfTasks, OneThatIsSentAlongRuns) {
+  ASSERT_TRUE(submit_tree("T1", {{"xml", kSort}, {"inputs", {{"code", "P2"}}}}));
+  EXPECT_EQ(run().at(0).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(submit_tree("T1", {{"xml", kSort}, {"inputs", {{"code", "P2"}}}})->accepted, Accepted::kAlready);
+  EXPECT_FALSE(submit_tree("T1", {{"xml", kSort}, {"inputs", {{"code", "P3"}}}}));
+}
+
+TEST_F(TreesOfTasks, WhatCannotRunIsRefusedWithALineThatHelps) {
+  const auto refusal = [&](const Json& tree) {
+    const auto admission = submit_tree("T1", tree);
+    return admission ? "accepted" : admission.error().line();
+  };
+  EXPECT_EQ(refusal({{"name", "store"}}), "/tree/name: the world has no tree 'store'; it has sort");
+  EXPECT_EQ(refusal({{"name", "sort"}, {"inputs", {{"kode", "P1"}}}}),
+            "/tree/inputs: the tree reads and writes no 'kode'; leave it out, or name an entry of its main tree");
+  EXPECT_THAT(refusal({{"xml", "<root BTCPP_format=\"4\"><BehaviorTree><pik/></BehaviorTree></root>"}}),
+              HasSubstr("/tree/xml:1: 'pik' is no node and no skill"));
+  EXPECT_THAT(refusal({{"xml", R"(<root BTCPP_format="4"><include path="/etc/passwd"/></root>)"}}),
+              HasSubstr("a tree that is sent names no files"));
+  EXPECT_THAT(refusal(Json::object()), HasSubstr("neither a name nor its XML"));
+  world_.resources.clear();
+  reopen();
+  EXPECT_THAT(refusal({{"name", "sort"}}), HasSubstr("needs 'arm', which this world does not have"));
+  EXPECT_TRUE(journal_->tasks()->empty());
+}
+
+TEST_F(TreesOfTasks, AnArgumentThatIsNotSetFailsTheLeafAndTheTreeDealsWithIt) {
+  ASSERT_TRUE(submit_tree("T1", {{"name", "sort"}}));
+  const auto reports = run();
+  EXPECT_EQ(reports.at(0).outcome, Outcome::kFailed);
+  EXPECT_EQ(reports[0].reason, "pick/object: it is not set; set it before the skill starts");
+  EXPECT_TRUE(pick_.log.started.empty());
+}
+
+TEST_F(TreesOfTasks, ABrokenFolderOfTreesIsRefusedWhole) {
+  std::ofstream(folder_ / "trees/zzz.xml") << "<root BTCPP_format=\"4\"><BehaviorTree ID=\"sort\"/></root>";
+  const auto loaded = bridge_->load_trees(folder_ / "trees");
+  ASSERT_FALSE(loaded);
+  EXPECT_THAT(loaded.error().line(), HasSubstr("zzz.xml:1: a <BehaviorTree> has exactly one node in it"));
+}
+
+TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {
+  Actor swift("swift", {{.ticks = 3}});
+  skills_.add(swift.type());
+  reopen();
+  ASSERT_TRUE(submit_sort("T1"));
+  tick(2);
+  ASSERT_TRUE(bridge_->submit(R"({"id":"U1","priority":99,"steps":[{"skill":"swift"}]})", now_));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2u);
+  EXPECT_EQ(reports[0].id, "U1");
+  EXPECT_EQ(reports[1].outcome, Outcome::kSucceeded);
+  EXPECT_EQ(pick_.log.pauses, std::vector{task::Pause::kHandOver});
+  EXPECT_EQ(pick_.log.started.size(), 1u) << "it went on, it did not begin anew";
+}
+
+// ---- after a crash ----
+
+TEST_F(TreesOfTasks, AfterACrashItGoesOnAtTheLastCompletedNode) {
+  ASSERT_TRUE(submit_sort("T1"));
+  tick(10);  // picked; it sleeps
+  ASSERT_EQ(pick_.log.started.size(), 1u);
+  bool asked = false;
+  recover([&](const task::Task&, std::size_t) {
+    asked = true;
+    return Resumption{};
+  });
+  EXPECT_FALSE(asked) << "no skill was under way";
+  const auto reports = run();
+  EXPECT_EQ(reports.at(0).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(pick_.log.started.size(), 1u);
+  EXPECT_EQ(place_.log.started.size(), 1u);
+  EXPECT_EQ(reports[0].detail.at("blackboard").at("mass"), 1.5);
+  EXPECT_THAT(audit(*journal_), testing::IsEmpty());
+}
+
+TEST_F(TreesOfTasks, AfterACrashASkillThatNobodySawEndIsLookedAt) {
+  struct Case {
+    Resumption seen;
+    std::size_t places, asides;
+    Outcome outcome;
+  };
+  const std::vector<Case> cases{
+      {{.done = 0}, 2, 0, Outcome::kSucceeded},                                              // begun anew
+      {{.done = 1}, 1, 0, Outcome::kSucceeded},                                              // done all the same
+      {{.outcome = Outcome::kFailed, .reason = "lost"}, 1, 1, Outcome::kSucceeded},          // the Fallback's second
+      {{.outcome = Outcome::kException, .reason = "set aside"}, 1, 0, Outcome::kException},  // ends it
+  };
+  int number = 0;
+  for (const Case& each : cases) {
+    place_.log.started.clear();
+    aside_.log.started.clear();
+    const std::string id = fmt::format("T{}", number++);
+    ASSERT_TRUE(submit_sort(id));
+    while (place_.log.started.empty()) tick();
+    std::string asked;
+    recover([&](const task::Task& task, std::size_t done) {
+      EXPECT_EQ(done, 0u);
+      EXPECT_EQ(task.steps.size(), 1u);
+      asked = task.steps[0].skill + task.steps[0].arguments.dump();
+      return each.seen;
+    });
+    EXPECT_EQ(asked, R"(place{"object":"P1"})");
+    const auto reports = run();
+    EXPECT_EQ(reports.at(0).outcome, each.outcome) << id;
+    EXPECT_EQ(place_.log.started.size(), each.places) << id;
+    EXPECT_EQ(aside_.log.started.size(), each.asides) << id;
+  }
+  EXPECT_THAT(audit(*journal_), testing::IsEmpty());
+}
+
+// At each tick of its course in turn, and at each twice over.
+TEST_F(TreesOfTasks, WheneverTheBridgeDiesEachSkillIsDoneOnce) {
+  for (int moment = 1; moment < 70; moment += 3) {
+    pick_.log.started.clear();
+    place_.log.started.clear();
+    const std::string id = fmt::format("M{}", moment);
+    ASSERT_TRUE(submit_sort(id));
+    tick(moment);
+    std::size_t under_way = 0;
+    const auto look = [&](const task::Task&, std::size_t) {
+      ++under_way;
+      return Resumption{.done = 1};
+    };
+    recover(look);
+    recover(look);
+    if (!bridge_->idle()) (void)run();
+    EXPECT_EQ(recorded(id)->outcome, Outcome::kSucceeded) << id;
+    EXPECT_EQ(pick_.log.started.size(), 1u) << id;
+    EXPECT_EQ(place_.log.started.size() + (place_.log.started.empty() ? under_way : 0), 1u) << id;
+  }
+}
+
+TEST_F(TreesOfTasks, PreemptedAtACrashItWaitsAgainWithWhatItHadDone) {
+  ASSERT_TRUE(submit_sort("T1"));
+  while (place_.log.started.empty()) tick();
+  ASSERT_TRUE(bridge_->submit(R"({"id":"U1","priority":99,"steps":[{"skill":"slow"}]})", now_));
+  tick(3);
+  ASSERT_EQ(bridge_->state("T1"), "preempted");
+  recover([](const task::Task& task, std::size_t done) {
+    EXPECT_EQ(task.id, "U1");
+    return Resumption{.done = done, .outcome = Outcome::kFailed, .reason = "gone"};
+  });
+  EXPECT_EQ(run().at(1).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(pick_.log.started.size(), 1u);
+  EXPECT_EQ(place_.log.started.size(), 2u);
+}
+
+TEST_F(TreesOfTasks, ATreeThatHasChangedSinceIsNotGoneOnWith) {
+  ASSERT_TRUE(submit_sort("T1"));
+  tick(10);
+  std::string other = kSort;
+  other.replace(other.find("500"), 3, "400");
+  std::ofstream(folder_ / "trees/sort.xml") << other;
+  recover(goes_on);
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_EQ(recorded("T1")->outcome, Outcome::kFailed);
+  EXPECT_THAT(recorded("T1")->reason, HasSubstr("the tree has changed since it was begun"));
+}
+
+}  // namespace
+}  // namespace pons::bridge
