@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/policies.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -163,7 +164,7 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
   const bool taken_up = options.body && *earlier == body;
   if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
-    return fail(options.body ? "holds a run of another body" : "holds an earlier run", options.journal.string(),
+    return fail(options.body ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
                 "name another file for --journal, or move this one away");
   }
   journal = std::move(*opened);

@@ -76,7 +76,7 @@ _pons() {
     completion) COMPREPLY=($(compgen -W "bash zsh" -- "$current")); return ;;
   esac
   case $command in
-    task|robot|journal) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
+    task|robot|journal|book) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
     *) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 2 ? 0 : 1))}") ;;
   esac
   COMPREPLY=($(compgen -W "$(_pons_words "${asked[@]}")" -- "$current"))

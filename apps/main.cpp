@@ -32,6 +32,7 @@ int run_command_line(int argc, char** argv) {
   add_skills(app, chosen);
   add_task(app, chosen);
   add_journal(app, chosen);
+  add_book(app, chosen);
   add_robot(app, chosen);
   add_doctor(app, chosen);
   add_completion(app, chosen);
