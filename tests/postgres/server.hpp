@@ -1,6 +1,6 @@
-// Debian's PostgreSQL for a test program: a cluster of its own in a folder that goes away, reached by a socket in there
-// and by no network. Run by root it is another user's, since PostgreSQL refuses root. No cluster of the system's is
-// touched.
+// Debian's PostgreSQL for a test program or a benchmark: a cluster of its own in a folder that goes away, reached by a
+// socket in there and by no network. Run by root it is another user's, since PostgreSQL refuses root. No cluster of the
+// system's is touched.
 #pragma once
 
 #include <sys/types.h>
@@ -12,8 +12,9 @@ namespace pons::tests {
 
 class PostgresServer {
  public:
-  // Made and started; throws std::runtime_error with the server's own words where that fails.
-  PostgresServer();
+  // Made in a folder of its own below `in`, and started. This and all below throws std::runtime_error with the server's
+  // own words where it fails.
+  explicit PostgresServer(const std::filesystem::path& in);
   // Ends it, and all that it left.
   ~PostgresServer();
   PostgresServer(const PostgresServer&) = delete;
@@ -30,7 +31,7 @@ class PostgresServer {
   [[nodiscard]] std::string make_database();
   // As libpq and Pons take it; `name`, if any, is a bridge's.
   [[nodiscard]] std::string place(const std::string& database, const std::string& name = "") const;
-  // Runs it there, in the schema `schema`. False: a constraint refuses it. Anything else that is wrong fails the test.
+  // Runs it there, in the schema `schema`. False: a constraint refuses it.
   [[nodiscard]] bool execute(const std::string& database, const std::string& schema, const std::string& sql) const;
   // The first column of the first row.
   [[nodiscard]] std::string ask(const std::string& database, const std::string& sql) const;
