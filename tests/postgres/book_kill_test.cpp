@@ -62,7 +62,8 @@ class Work final : public task::Skill {
   int ticks_ = 0;
 };
 
-// A bridge in a process of its own, which says a byte each tick.
+// A bridge in a process of its own, which says a byte each tick, and where a skill begins, so that it may be killed
+// there.
 class Process {
  public:
   explicit Process(const std::function<void(const std::function<void()>& ticked)>& work) {
@@ -127,8 +128,10 @@ class BookKillTest : public testing::Test {
                   .schema = Json::parse(R"({"type":"object"})"),
                   .resources = {"arm"},
                   .timeout = std::chrono::seconds(10),
-                  .start = [this](const Json& arguments, Time) {
-                    return std::make_unique<Work>(ground_, arguments.at("object").get<std::string>());
+                  .start = [&](const Json& arguments, Time) {
+                    auto skill = std::make_unique<Work>(ground_, arguments.at("object").get<std::string>());
+                    ticked();
+                    return skill;
                   }});
       Bridge bridge(**journal, skills, world);
       const auto look = [this](const task::Task& task, std::size_t done) {

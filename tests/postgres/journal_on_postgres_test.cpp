@@ -89,6 +89,7 @@ TEST_F(OnPostgres, RefusesAServerThatLosesWhatItCommits) {
   EXPECT_NE(refusal(place()).find("the server's full_page_writes is off"), std::string::npos);
   server_.stop();
   server_.start();
+  EXPECT_EQ(server_.ask(database_, "SELECT count(*) FROM pg_namespace WHERE nspname LIKE 'pons%'"), "0");
   EXPECT_EQ(open()->run(), 1);
 }
 

@@ -27,7 +27,6 @@ Expected<std::unique_ptr<Database>> connect(const std::string& place, Mode mode)
 Expected<std::unique_ptr<OrderBook>> OrderBook::open(const std::string& place) {
   auto database = connect(place, Mode::kTurn);
   if (!database) return std::unexpected(database.error());
-  if (auto promised = (*database)->promise_durability(); !promised) return std::unexpected(promised.error());
   if (auto there = ensure_book(**database); !there) return std::unexpected(there.error());
   return std::unique_ptr<OrderBook>(new OrderBook(std::make_unique<Impl>(std::move(*database))));
 }

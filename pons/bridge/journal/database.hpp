@@ -107,8 +107,7 @@ class Database {
 
   [[nodiscard]] virtual bool in_transaction() const = 0;
   [[nodiscard]] virtual std::int64_t changes() const = 0;  // rows of the last statement
-  // Of the owner, once the tables are there: from now on what a commit has returned from is durable. Error: this
-  // database cannot promise that.
+  // Of the owner, once the tables are there: from now on what was committed is durable. Error: it would not be.
   [[nodiscard]] virtual Expected<void> promise_durability() = 0;
   // Before a commit. Error: what it would write nobody would find again.
   [[nodiscard]] virtual Expected<void> still_there() = 0;

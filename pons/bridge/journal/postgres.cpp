@@ -213,6 +213,7 @@ class PostgresDatabase final : public Database {
     if (auto set = execute(kSession); !set) return set;
     if (auto set = execute(fmt::format("SET search_path TO \"{}\"", schema_)); !set) return set;
     if (mode == Mode::kRead) return execute("SET default_transaction_read_only = on");
+    if (auto durable = check_durability(); !durable) return durable;
     if (mode == Mode::kTurn) return {};
     auto locked = execute(fmt::format("SELECT pg_advisory_lock(hashtextextended('{}', {}))", schema_, kLockOf));
     if (locked || connection_.lost()) return locked;
@@ -244,8 +245,24 @@ class PostgresDatabase final : public Database {
   }
   [[nodiscard]] std::int64_t changes() const override { return connection_.changes; }
 
-  // The session's own setting is made; these are the server's.
-  Expected<void> promise_durability() override {
+  Expected<void> promise_durability() override { return {}; }  // it would not be open
+  Expected<void> still_there() override { return {}; }         // it answers, or it does not
+
+ private:
+  Expected<void> check_server() {
+    if (PQserverVersion(connection_.get()) < kOldestServer)
+      return fail(fmt::format("the server is of version {}", PQserverVersion(connection_.get()) / 10000), shown_,
+                  fmt::format("use version {} or later", kOldestServer / 10000));
+    const char* encoding = PQparameterStatus(connection_.get(), "server_encoding");
+    if (encoding == nullptr || std::string_view(encoding) != "UTF8")
+      return fail(fmt::format("the database keeps text as {}", encoding == nullptr ? "nobody knows what" : encoding),
+                  shown_, "make one with ENCODING 'UTF8'");
+    return {};
+  }
+
+  // The session's own setting is made; these are the server's. There is no way round them: nobody could be told
+  // anything.
+  Expected<void> check_durability() {
     for (const char* setting : {"fsync", "full_page_writes"}) {
       const auto value = text(fmt::format("SELECT current_setting('{}')", setting));
       if (!value) return std::unexpected(value.error());
@@ -254,18 +271,6 @@ class PostgresDatabase final : public Database {
                   fmt::format("set {} = on in its postgresql.conf", setting));
     }
     return {};
-  }
-  Expected<void> still_there() override { return {}; }  // it answers, or it does not
-
- private:
-  Expected<void> check_server() {
-    if (PQserverVersion(connection_.get()) < kOldestServer)
-      return fail(fmt::format("the server is of version {}", PQserverVersion(connection_.get()) / 10000), shown_,
-                  fmt::format("use version {} or later", kOldestServer / 10000));
-    const char* encoding = PQparameterStatus(connection_.get(), "server_encoding");
-    if (encoding != nullptr && std::string_view(encoding) == "UTF8") return {};
-    return fail(fmt::format("the database keeps text as {}", encoding == nullptr ? "nobody knows what" : encoding),
-                shown_, "make one with ENCODING 'UTF8'");
   }
 
   Connection connection_;
