@@ -107,6 +107,8 @@ class Database {
 
   [[nodiscard]] virtual bool in_transaction() const = 0;
   [[nodiscard]] virtual std::int64_t changes() const = 0;  // rows of the last statement
+  // The number of the row that the last INSERT has added, which PostgreSQL wants to be asked for by RETURNING; 0: none.
+  [[nodiscard]] virtual std::int64_t inserted() const = 0;
   // Of the owner, once the tables are there: from now on what was committed is durable. Error: it would not be.
   [[nodiscard]] virtual Expected<void> promise_durability() = 0;
   // Before a commit. Error: what it would write nobody would find again.

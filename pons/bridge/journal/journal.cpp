@@ -134,17 +134,19 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
       {&count, "SELECT count(*) FILTER (WHERE kind = 'accepted'), count(*) FROM event"},
       {&endings, "SELECT detail FROM event WHERE kind = 'ended'"},
   }};
+  const std::string returning = database->dialect() == Dialect::kSqlite ? "" : " RETURNING sequence";
   const std::array<std::pair<Statement*, std::string>, 5> writes{{
       {&add_first,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, ?3, ?4, 'accepted', ?5) "
-       "ON CONFLICT DO NOTHING RETURNING sequence"},
+       "ON CONFLICT DO NOTHING" +
+           returning},
       {&add_event,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) "
        "SELECT ?1, ?2, ?5, '', ?3, ?4 WHERE EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'accepted') "
-       "AND NOT EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'ended') RETURNING sequence"},
+       "AND NOT EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'ended')" +
+           returning},
       {&add_note,
-       "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, '', ?3, ?4, ?5) "
-       "RETURNING sequence"},
+       "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, '', ?3, ?4, ?5)" + returning},
       {&begin, database->dialect() == Dialect::kSqlite ? "BEGIN IMMEDIATE" : "BEGIN"},
       {&commit, "COMMIT"},
   }};
@@ -236,12 +238,12 @@ void Journal::Impl::give_up(const Error& error) {
 }
 
 Expected<std::int64_t> Journal::Impl::write(Statement& statement) {
-  auto sequence = statement.run_for_integer();
-  if (!sequence) {
-    give_up(sequence.error());
-  } else if (*sequence > 0) {
-    last_written = *sequence;
+  if (auto done = statement.run(); !done) {
+    give_up(done.error());
+    return std::unexpected(done.error());
   }
+  const std::int64_t sequence = database->inserted();
+  if (sequence > 0) last_written = sequence;
   return sequence;
 }
 

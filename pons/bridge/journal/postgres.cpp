@@ -115,7 +115,7 @@ class Connection {
   [[nodiscard]] PGconn* get() const { return connection_; }
   // Nothing can be asked of one that is lost: what was sent last may or may not have happened.
   [[nodiscard]] const std::optional<Error>& lost() const { return lost_; }
-  std::int64_t changes = 0;
+  std::int64_t changes = 0, inserted = 0;
 
  private:
   std::unexpected<Error> lose(const std::string& why) {
@@ -162,12 +162,7 @@ class PostgresStatement final : public Statement::Driver {
     values_.clear();
     row_ = -1;
   }
-  [[nodiscard]] std::int64_t integer(int column) const override {
-    std::int64_t value = 0;
-    const char* text = PQgetvalue(rows_.get(), row_, column);
-    std::from_chars(text, text + PQgetlength(rows_.get(), row_, column), value);
-    return value;
-  }
+  [[nodiscard]] std::int64_t integer(int column) const override { return number(row_, column); }
   [[nodiscard]] std::string text(int column) const override {
     return {PQgetvalue(rows_.get(), row_, column), static_cast<std::size_t>(PQgetlength(rows_.get(), row_, column))};
   }
@@ -188,7 +183,15 @@ class PostgresStatement final : public Statement::Driver {
     const std::string_view changed = PQcmdTuples(rows_.get());
     connection_.changes = 0;
     std::from_chars(changed.data(), changed.data() + changed.size(), connection_.changes);
+    connection_.inserted = PQntuples(rows_.get()) == 1 ? number(0, 0) : 0;
     return {};
+  }
+
+  [[nodiscard]] std::int64_t number(int row, int column) const {
+    std::int64_t value = 0;
+    const char* text = PQgetvalue(rows_.get(), row, column);
+    std::from_chars(text, text + PQgetlength(rows_.get(), row, column), value);
+    return value;
   }
 
   Connection& connection_;
@@ -244,6 +247,7 @@ class PostgresDatabase final : public Database {
     return !connection_.lost() && (status == PQTRANS_INTRANS || status == PQTRANS_INERROR);
   }
   [[nodiscard]] std::int64_t changes() const override { return connection_.changes; }
+  [[nodiscard]] std::int64_t inserted() const override { return connection_.inserted; }
 
   Expected<void> promise_durability() override { return {}; }  // it would not be open
   Expected<void> still_there() override { return {}; }         // it answers, or it does not

@@ -156,6 +156,9 @@ class SqliteDatabase final : public Database {
 
   [[nodiscard]] bool in_transaction() const override { return sqlite3_get_autocommit(database_) == 0; }
   [[nodiscard]] std::int64_t changes() const override { return sqlite3_changes64(database_); }
+  [[nodiscard]] std::int64_t inserted() const override {
+    return changes() == 1 ? sqlite3_last_insert_rowid(database_) : 0;
+  }
 
   // A new file is created in rollback mode, so that its identity stands in the file itself and not only in the log.
   Expected<void> promise_durability() override {
