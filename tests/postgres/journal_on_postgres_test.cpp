@@ -26,8 +26,11 @@ class DatabaseStore final : public Store {
   [[nodiscard]] std::string unguarded() const override { return "DROP TRIGGER event_stays ON event"; }
 
  private:
-  static inline int stores_ = 0;
-  std::string name_ = fmt::format("cell_{}", ++stores_);
+  static std::string next() {
+    static int stores = 0;
+    return fmt::format("cell_{}", ++stores);
+  }
+  std::string name_ = next();
 };
 
 INSTANTIATE_TEST_SUITE_P(Postgres, AnyJournal, testing::Values(&DatabaseStore::make));

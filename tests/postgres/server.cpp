@@ -13,6 +13,7 @@
 #include <csignal>
 #include <fstream>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace pons::tests {
@@ -35,12 +36,13 @@ struct Child {
 };
 
 // In `folder`, as the other user; it ends with this program, however that ends.
-Child run_in(const fs::path& folder, const std::vector<std::string>& command) {
+Child run_in(const fs::path& folder, std::vector<std::string> command) {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
   const passwd* user = other_user();
   std::vector<char*> arguments;
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  command.front() = fs::path(PONS_POSTGRES_BIN) / command.front();
+  for (std::string& word : command) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   const pid_t child = ::fork();
   if (child < 0) throw std::runtime_error("no process");
@@ -111,9 +113,8 @@ void PostgresServer::initialise() {
   if (const passwd* user = other_user(); user != nullptr) {
     if (::chown(folder_.c_str(), user->pw_uid, user->pw_gid) != 0) throw std::runtime_error("cannot hand it over");
   }
-  const Child made =
-      run_in(folder_, {PONS_POSTGRES_BIN "/initdb", "-D", "data", "-U", "pons", "-E", "UTF8", "--locale=C",
-                       "--auth=scram-sha-256", "--pwfile=password", "--no-sync", "--no-instructions"});
+  const Child made = run_in(folder_, {"initdb", "-D", "data", "-U", "pons", "-E", "UTF8", "--locale=C",
+                                      "--auth=scram-sha-256", "--pwfile=password", "--no-sync", "--no-instructions"});
   const std::string said = listen(made.words, "\x01");
   ::close(made.words);
   int status = 0;
@@ -122,7 +123,7 @@ void PostgresServer::initialise() {
 }
 
 void PostgresServer::start(const std::string& settings) {
-  std::vector<std::string> command{PONS_POSTGRES_BIN "/postgres",
+  std::vector<std::string> command{"postgres",
                                    "-D",
                                    "data",
                                    "-k",
@@ -138,7 +139,7 @@ void PostgresServer::start(const std::string& settings) {
                                    "-c",
                                    "shared_buffers=16MB"};
   if (!settings.empty()) command.insert(command.end(), {"-c", settings});
-  const Child child = run_in(folder_, command);
+  const Child child = run_in(folder_, std::move(command));
   server_ = child.process;
   const std::string ready = "ready to accept connections";
   const std::string said = listen(child.words, ready);
