@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/policies.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -121,6 +122,8 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   skills::add_skills(self->registry, *self->cell, policy_names());
   if (auto good = check_resources(self->registry, world); !good) return std::unexpected(good.error());
 
+  bridge::tree::Library trees(self->registry);
+  if (auto loaded = trees.load(world.folder / "trees"); !loaded) return std::unexpected(loaded.error());
   // Before the journal: a run that is refused leaves none behind.
   std::unique_ptr<gate::LocalSocket> socket;
   if (options.socket) {
@@ -130,6 +133,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
+  self->bridge->use_trees(std::move(trees));
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
 
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
@@ -163,7 +167,7 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
   const bool taken_up = options.body && *earlier == body;
   if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
-    return fail(options.body ? "holds a run of another body" : "holds an earlier run", options.journal.string(),
+    return fail(options.body ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
                 "name another file for --journal, or move this one away");
   }
   journal = std::move(*opened);

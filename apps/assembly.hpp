@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "apps/desk.hpp"
@@ -70,7 +71,7 @@ class BodyHalf {
 };
 
 struct BridgeOptions {
-  std::filesystem::path journal;                // ":memory:" for none on disk
+  std::string journal;                          // a place as in journal/place.hpp; ":memory:" for none on disk
   std::optional<std::filesystem::path> socket;  // where visitors may ask
   // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
   // holds something is refused. Without: each such.
@@ -109,7 +110,7 @@ class BridgeHalf {
 };
 
 struct AssemblyOptions {
-  std::filesystem::path journal;                // as in BridgeOptions
+  std::string journal;                          // as in BridgeOptions
   std::optional<std::filesystem::path> socket;  // likewise
   BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;

@@ -9,6 +9,7 @@
 #include "apps/commands.hpp"
 #include "apps/meeting.hpp"
 #include "apps/run_kit.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
 
 namespace pons::apps {
@@ -30,13 +31,13 @@ constexpr Duration kBridgeLeaves = std::chrono::seconds(20);  // after it has cl
 int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& body, const MeetingPlace& place,
               const runner::RunResult& result, double wall_s) {
   const link::Border& border = place.border();
-  const fs::path file = journal_of(border);
+  const std::string file = journal_of(border);
   if (file.empty()) {
     say(stdout, "no bridge has come: there is nothing to report\n");
     return kExitInterrupted;
   }
   if (!runner::await_departure(place.crossing({}), kBridgeLeaves))
-    return bad_run({"the bridge does not leave the journal", file.string(), "end it; the journal is whole"});
+    return bad_run({"the bridge does not leave the journal", bridge::shown(file), "end it; the journal is whole"});
   const auto journal = bridge::Journal::open_to_read(file);
   if (!journal) return bad_run(journal.error());
   const auto reckoning = reckon(
@@ -46,7 +47,7 @@ int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& b
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
   if (!options.log.empty()) say(stdout, fmt::format("log: {}\n", options.log.string()));
-  say(stdout, fmt::format("journal: {}\n", file.string()));
+  say(stdout, fmt::format("journal: {}\n", bridge::shown(file)));
   if (interrupted()) return kExitInterrupted;
   return result.complete && reckoning->good() ? kExitGood : kExitBadRun;
 }

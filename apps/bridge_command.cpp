@@ -12,6 +12,7 @@
 #include "apps/paths.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_kit.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
 
 namespace pons::apps {
@@ -22,7 +23,8 @@ namespace fs = std::filesystem;
 struct BridgeCommandOptions {
   std::string world, link;
   ParcelOptions parcels;
-  fs::path journal, socket;
+  std::string journal;
+  fs::path socket;
   double wait_s = 10;
   bool quiet = false, recover = false;
 };
@@ -69,10 +71,11 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   half->reset();  // the journal is closed: the body may read it
   if (!result) return code;
   const bool asked = border.now_at() == link::Stage::kEnding;
-  say(stdout, fmt::format("{}: {} of {} parcels settled, {} sorted; a tick takes {:.2f} ms, {:.1f} ms at worst; "
-                          "journal: {}\n",
-                          result->complete ? "complete" : "broken off", std::min(tally.settled, total), total,
-                          tally.sorted, result->bridge->p50_ms, result->bridge->max_ms, options.journal.string()));
+  say(stdout,
+      fmt::format("{}: {} of {} parcels settled, {} sorted; a tick takes {:.2f} ms, {:.1f} ms at worst; "
+                  "journal: {}\n",
+                  result->complete ? "complete" : "broken off", std::min(tally.settled, total), total, tally.sorted,
+                  result->bridge->p50_ms, result->bridge->max_ms, bridge::shown(options.journal)));
   if (!result->degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->degraded));
   // A bridge that a person ends leaves its body to the next one.
   if (interrupted() && !asked) return kExitInterrupted;
@@ -85,8 +88,9 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
 
 int bridge(const BridgeCommandOptions& options) {
   watch_interrupts();
-  const std::array<FileOption, 3> files{
-      {{"--manifest", options.parcels.manifest}, {"--journal", options.journal}, {"--socket", options.socket}}};
+  const std::array<FileOption, 3> files{{{"--manifest", options.parcels.manifest},
+                                         {"--journal", file_of(options.journal)},
+                                         {"--socket", options.socket}}};
   if (auto possible = check_files(files, {}); !possible) return bad_input(possible.error());
   if (options.journal.empty())
     return bad_input(
@@ -107,7 +111,9 @@ int bridge(const BridgeCommandOptions& options) {
   if (interrupted()) return kExitInterrupted;
   const auto place = MeetingPlace::join(name, *world, *identity);
   if (!place) return bad_input(place.error());
-  return run_bridge(options, *world, *manifest, *place);
+  auto named = options;
+  named.journal = bridge::named(options.journal, world->name);
+  return run_bridge(named, *world, *manifest, *place);
 }
 
 }  // namespace
@@ -120,9 +126,10 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
   add_parcel_options(*command, options->parcels);
   command->add_option("--link", options->link,
                       "Where bridge and body meet: a name (the world's, and the user's number)");
-  command->add_option(
-      "--journal", options->journal,
-      "SQLite file that keeps tasks and outcomes; that of an earlier bridge of the same body is taken up");
+  command->add_option("--journal", options->journal,
+                      "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes; that of an earlier bridge "
+                      "of the same body is "
+                      "taken up");
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
   command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
       ->check(CLI::Range(0.0, 86400.0));

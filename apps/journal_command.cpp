@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "apps/commands.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/bridge/journal/story.hpp"
 
 namespace pons::apps {
@@ -13,7 +14,7 @@ namespace fs = std::filesystem;
 using bridge::Journal;
 
 struct JournalOptions {
-  fs::path file;
+  std::string file;
   std::int64_t keep = 0;
 };
 
@@ -22,7 +23,7 @@ int check(const JournalOptions& options) {
   if (!journal) return bad_input(journal.error());
   const auto wrong = bridge::audit(**journal);
   if (!wrong.empty()) {
-    for (const std::string& line : wrong) say(stderr, fmt::format("pons: {}: {}\n", options.file.string(), line));
+    for (const std::string& line : wrong) say(stderr, fmt::format("pons: {}: {}\n", bridge::shown(options.file), line));
     return kExitBadRun;
   }
   const auto counts = (*journal)->counts();
@@ -35,10 +36,14 @@ int check(const JournalOptions& options) {
 }
 
 // Opening for writing would create one.
-Expected<void> existing(const fs::path& file) {
+Expected<void> existing(const std::string& file) {
   std::error_code ignored;
+  if (bridge::in_database(file)) {
+    const auto there = Journal::open_to_read(file);
+    return there ? Expected<void>{} : std::unexpected(there.error());
+  }
   if (fs::exists(file, ignored)) return {};
-  return fail("there is no such journal", file.string(), "name the file that a run was given with --journal");
+  return fail("there is no such journal", file, "name the file that a run was given with --journal");
 }
 
 int compact(const JournalOptions& options) {
@@ -66,7 +71,8 @@ void add_journal(CLI::App& app, Chosen& chosen) {
   journal->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, int (*run)(const JournalOptions&)) {
     CLI::App* command = journal->add_subcommand(name, what);
-    command->add_option("file", options->file, "The file that a run was given with --journal")->required();
+    command->add_option("file", options->file, "What a run was given with --journal: a file, or postgresql://…#NAME")
+        ->required();
     command->callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
     return command;
   };

@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/cell_skills.hpp"
 #include "apps/commands.hpp"
 #include "apps/paths.hpp"
-#include "apps/policies.hpp"
-#include "pons/link/link.hpp"
-#include "pons/model/robot_model.hpp"
-#include "pons/skills/skills.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::apps {
@@ -33,20 +30,10 @@ int worlds() {
   return code;
 }
 
-// Skills are made for a cell: the places that one may name are those of a world.
 int skills(const std::string& name, const std::string& world_name) {
-  const auto folder = worlds_folder();
-  const std::vector<std::string> names = world::list(folder);
-  if (names.empty()) return bad_input({"no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds"});
-  const auto world = world::load(folder, world_name.empty() ? names.front() : world_name);
-  if (!world) return bad_input(world.error());
-  auto model = model::RobotModel::load(world->robot);
-  if (!model) return bad_input(model.error());
-  const auto link = std::make_unique<link::Link>();
-  link::BridgeEnd end(*link);
-  skills::Cell cell(end, *world, std::move(*model));
-  task::SkillRegistry registry;
-  skills::add_skills(registry, cell, policy_names());
+  const auto cell = CellSkills::make(world_name);
+  if (!cell) return bad_input(cell.error());
+  const task::SkillRegistry& registry = (*cell)->registry;
   if (name.empty()) {
     for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<13} {}\n", skill_name, type.summary);
     return kExitGood;
@@ -54,10 +41,13 @@ int skills(const std::string& name, const std::string& world_name) {
   const task::SkillType* type = registry.find(name);
   if (type == nullptr)
     return bad_input({"no skill '" + name + "'", "pons skills", "pons skills lists those there are"});
-  fmt::print("{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\npauses: {}\narguments in {}:\n{}\n", type->name,
-             type->summary, type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")),
-             to_s(type->timeout), type->attempts, fmt::join(type->safe_points, "; or "), world->name,
-             type->schema.dump(2));
+  fmt::print(
+      "{}: {}\nholds: {}\ntimeout: {:.0f} s, attempts: {}\npauses: {}\noutputs for trees: {}\narguments in {}:\n{}\n",
+      type->name, type->summary,
+      type->resources.empty() ? "nothing" : fmt::format("{}", fmt::join(type->resources, ", ")), to_s(type->timeout),
+      type->attempts, fmt::join(type->safe_points, "; or "),
+      type->outputs.empty() ? "none" : fmt::format("{}", fmt::join(type->outputs, ", ")), (*cell)->world.name,
+      type->schema.dump(2));
   return kExitGood;
 }
 
@@ -76,7 +66,7 @@ _pons() {
     completion) COMPREPLY=($(compgen -W "bash zsh" -- "$current")); return ;;
   esac
   case $command in
-    task|robot|journal) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
+    task|robot|journal|book) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 3 ? COMP_CWORD - 1 : 2))}") ;;
     *) asked=("${COMP_WORDS[@]:1:$((COMP_CWORD < 2 ? 0 : 1))}") ;;
   esac
   COMPREPLY=($(compgen -W "$(_pons_words "${asked[@]}")" -- "$current"))

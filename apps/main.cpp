@@ -30,8 +30,10 @@ int run_command_line(int argc, char** argv) {
   add_bridge(app, chosen);
   add_worlds(app, chosen);
   add_skills(app, chosen);
+  add_trees(app, chosen);
   add_task(app, chosen);
   add_journal(app, chosen);
+  add_book(app, chosen);
   add_robot(app, chosen);
   add_doctor(app, chosen);
   add_completion(app, chosen);

@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "pons/bridge/journal/place.hpp"
 #include "pons/core/digest.hpp"
 
 namespace pons::apps {
@@ -86,12 +87,12 @@ Expected<MeetingPlace> MeetingPlace::join(const std::string& name, const world::
   return place;
 }
 
-fs::path journal_of(const link::Border& border) { return border.journal(); }
+std::string journal_of(const link::Border& border) { return border.journal(); }
 
-Expected<void> name_journal(link::Border& border, const fs::path& journal) {
+Expected<void> name_journal(link::Border& border, const std::string& journal) {
   std::error_code ignored;
-  if (!border.name_journal(fs::absolute(journal, ignored).string()))
-    return fail("the path is too long", "--journal", "choose a shorter one");
+  if (!border.name_journal(bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string()))
+    return fail("it is too long", "--journal", "choose a shorter one");
   return {};
 }
 

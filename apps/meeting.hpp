@@ -49,8 +49,8 @@ class MeetingPlace {
 };
 
 // The journal of the body's last bridge, as that one named it.
-[[nodiscard]] std::filesystem::path journal_of(const link::Border& border);
+[[nodiscard]] std::string journal_of(const link::Border& border);
 // Error: its absolute path is too long.
-[[nodiscard]] Expected<void> name_journal(link::Border& border, const std::filesystem::path& journal);
+[[nodiscard]] Expected<void> name_journal(link::Border& border, const std::string& journal);
 
 }  // namespace pons::apps

@@ -13,6 +13,7 @@
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
 #include "apps/run_kit.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/runner/realtime.hpp"
 
 namespace pons::apps {
@@ -24,7 +25,8 @@ struct RunOptions {
   std::string world;
   ParcelOptions parcels;
   BodySetupOptions body;
-  fs::path journal, report, log, picture, socket;
+  std::string journal;
+  fs::path report, log, picture, socket;
   bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
 
@@ -32,7 +34,7 @@ constexpr int kPictureWidth = 1280, kPictureHeight = 800;
 
 Expected<void> check_files_of(const RunOptions& options) {
   const std::array<FileOption, 6> files{{{"--manifest", options.parcels.manifest},
-                                         {"--journal", options.journal},
+                                         {"--journal", file_of(options.journal)},
                                          {"--report", options.report},
                                          {"--log", options.log},
                                          {"--picture", options.picture},
@@ -55,9 +57,9 @@ class TemporaryJournal {
   }
   TemporaryJournal(const TemporaryJournal&) = delete;
   TemporaryJournal& operator=(const TemporaryJournal&) = delete;
-  [[nodiscard]] Expected<fs::path> file() const {
+  [[nodiscard]] Expected<std::string> file() const {
     if (folder_.empty()) return fail("no temporary folder for the journal", "TMPDIR", "set it, or use --journal");
-    return folder_ / "journal.db";
+    return (folder_ / "journal.db").string();
   }
 
  private:
@@ -116,7 +118,8 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
     say(stdout, fmt::format("picture: {}\n", options.picture.string()));
   }
   if (!options.log.empty()) say(stdout, fmt::format("log: {}\n", options.log.string()));
-  if (!options.journal.empty()) say(stdout, fmt::format("journal: {}\n", options.journal.string()));
+  if (!options.journal.empty())
+    say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options.journal, cell.world.name))));
   if (interrupted()) return kExitInterrupted;
   if (!result->complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
   return result->complete && reckoning->good() ? kExitGood : kExitBadRun;
@@ -133,7 +136,7 @@ int run(const RunOptions& options) {
   if (!manifest) return bad_input(manifest.error());
 
   std::optional<TemporaryJournal> temporary;
-  Expected<fs::path> journal = options.journal;
+  Expected<std::string> journal = bridge::named(options.journal, world->name);
   if (options.journal.empty()) journal = temporary.emplace().file();
   if (!journal) return bad_input(journal.error());
   auto setup = body_setup(options.body, options.parcels.seed, *world);
@@ -163,7 +166,8 @@ void add_run(CLI::App& app, Chosen& chosen) {
       command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
   command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")
       ->excludes(lockstep);
-  command->add_option("--journal", options->journal, "SQLite file that keeps tasks and outcomes (a temporary one)");
+  command->add_option("--journal", options->journal,
+                      "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes (a temporary file)");
   command->add_option("--report", options->report, "JSON file for the figures of the run");
   command->add_option("--log", options->log,
                       "Text file for what the control loop did: stops, arming, refused commands");

@@ -12,6 +12,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/paths.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/core/digest.hpp"
 #include "pons/record/file.hpp"
 #include "pons/sim/truth.hpp"
@@ -112,6 +113,8 @@ void refuse_empty(CLI::App& command) {
     if (option->get_items_expected_max() > 0) option->check(not_empty);
   }
 }
+
+fs::path file_of(const std::string& journal) { return bridge::in_database(journal) ? fs::path() : fs::path(journal); }
 
 Expected<void> check_files(std::span<const FileOption> files, std::span<const fs::path> written) {
   for (std::size_t i = 0; i < files.size(); ++i) {

@@ -53,6 +53,9 @@ void refuse_empty(CLI::App& command);
 
 // ---- files ----
 
+// A journal's; empty where it lies in a database.
+[[nodiscard]] std::filesystem::path file_of(const std::string& journal);
+
 // A command's files by option. Refused now rather than after the work: one file for two things, and among `written`
 // those that cannot be.
 using FileOption = std::pair<const char*, std::filesystem::path>;

@@ -44,6 +44,12 @@ std::string seen(const Json& d) {
 
 std::string accepted(const Json& d) {
   std::string line = fmt::format("priority {}:", text(d, "priority"));
+  const auto tree = d.is_object() ? d.find("tree") : d.end();
+  if (tree != d.end() && tree->is_object()) {
+    const std::string name = text(*tree, "name");
+    return fmt::format("{} tree {} {}", line, name.empty() ? "that was sent along" : name,
+                       tree->value("inputs", Json::object()).dump());
+  }
   const auto steps = d.is_object() ? d.find("steps") : d.end();
   if (steps == d.end() || !steps->is_array()) return line;
   for (const Json& step : *steps) {
@@ -109,18 +115,37 @@ std::string ended(const Json& d) {
   return fmt::format("{}{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why, stopped);
 }
 
+// What it holds is for machines; --json shows it.
+std::string checkpoint(const Json& d) {
+  const auto clock = d.is_object() ? d.find("clock_ns") : d.end();
+  const bool known = clock != d.end() && clock->is_number();
+  return known ? fmt::format("of the tree, {:.3f} s on its way", 1e-9 * clock->get<double>()) : "of the tree";
+}
+
 std::string preempting(const Json& d) { return "for " + text(d, "by"); }
 
 std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
 
-const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
-    {"seen", seen},       {"accepted", accepted}, {"started", started},
-    {"attempt", attempt}, {"plan", plan},         {"motion", motion},
-    {"carries", carries}, {"ride", reason},       {"attempt_ended", attempt_ended},
-    {"resumed", step},    {"found_done", step},   {"cancelling", reason},
-    {"halting", reason},  {"pausing", reason},    {"paused", stop},
-    {"preempted", stop},  {"held", held},         {"preempting", preempting},
-    {"ended", ended}};
+const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {{"seen", seen},
+                                                                           {"accepted", accepted},
+                                                                           {"started", started},
+                                                                           {"attempt", attempt},
+                                                                           {"plan", plan},
+                                                                           {"motion", motion},
+                                                                           {"carries", carries},
+                                                                           {"ride", reason},
+                                                                           {"attempt_ended", attempt_ended},
+                                                                           {"resumed", step},
+                                                                           {"found_done", step},
+                                                                           {"cancelling", reason},
+                                                                           {"halting", reason},
+                                                                           {"pausing", reason},
+                                                                           {"paused", stop},
+                                                                           {"preempted", stop},
+                                                                           {"held", held},
+                                                                           {"preempting", preempting},
+                                                                           {"ended", ended},
+                                                                           {"checkpoint", checkpoint}};
 
 }  // namespace
 

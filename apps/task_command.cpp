@@ -5,9 +5,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iostream>
-#include <iterator>
 #include <set>
 #include <string>
 #include <string_view>
@@ -16,9 +13,10 @@
 #include "apps/journal_json.hpp"
 #include "apps/paths.hpp"
 #include "apps/story_text.hpp"
+#include "apps/task_file.hpp"
 #include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/journal/place.hpp"
 #include "pons/gate/local_socket.hpp"
-#include "pons/task/json_text.hpp"
 
 namespace pons::apps {
 namespace {
@@ -26,10 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 using bridge::Json;
 
-constexpr std::streamsize kLargestTask = 64 * 1024;
-
 struct TaskOptions {
-  fs::path socket, journal;
+  fs::path socket;
+  std::string journal;
   std::string file, id, reason;
   bool json = false, at_once = false;
 };
@@ -45,31 +42,9 @@ Expected<Json> ask(const TaskOptions& options, const Json& request, std::chrono:
   return answer;
 }
 
-Expected<std::string> read_task(const std::string& file) {
-  std::string text;
-  std::ifstream opened;
-  if (file != "-") {
-    std::error_code ignored;
-    if (fs::is_directory(file, ignored)) return fail("is a folder", file, "name a JSON file, or - for standard input");
-    opened.open(file, std::ios::binary);
-    if (!opened) return fail("cannot be read", file, "name a JSON file, or - for standard input");
-  }
-  std::istream& in = file == "-" ? std::cin : opened;
-  text.resize(static_cast<std::size_t>(kLargestTask) + 1);
-  in.read(text.data(), kLargestTask + 1);
-  if (in.gcount() > kLargestTask) return fail("larger than 64 KiB", file, "a task is a short JSON object");
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
-}
-
 int submit(const TaskOptions& options) {
-  const auto text = read_task(options.file);
-  if (!text) return bad_input(text.error());
-  const auto task = task::parse_json(*text);
-  if (!task) {
-    return bad_input(
-        {task.error().line(), options.file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}"});
-  }
+  const auto task = read_task(options.file);
+  if (!task) return bad_input(task.error());
   const auto answer = ask(options, {{"op", "submit"}, {"task", *task}});
   if (!answer) return bad_input(answer.error());
   fmt::print("{}: {}\n", answer->value("id", std::string{}),
@@ -84,7 +59,7 @@ void print_row(const Json& task) {
              outcome.empty() ? open : outcome, task.value("reason", std::string{}));
 }
 
-Expected<Json> from_journal(const fs::path& file, const std::string& id) {
+Expected<Json> from_journal(const std::string& file, const std::string& id) {
   const auto journal = bridge::Journal::open_to_read(file);
   if (!journal) return std::unexpected(journal.error());
   Json answer;
@@ -97,17 +72,17 @@ Expected<Json> from_journal(const fs::path& file, const std::string& id) {
   }
   const auto history = (*journal)->task(id);
   if (!history) return std::unexpected(history.error());
-  if (!*history) return fail("no task '" + id + "'", file.string(), "pons task list shows those there are");
+  if (!*history) return fail("no task '" + id + "'", bridge::shown(file), "pons task list shows those there are");
   return Json{{"task", to_json((*history)->record)}, {"events", to_json((*history)->events)}};
 }
 
-Expected<Json> story_from_journal(const fs::path& file, const std::string& order) {
+Expected<Json> story_from_journal(const std::string& file, const std::string& order) {
   const auto journal = bridge::Journal::open_to_read(file);
   if (!journal) return std::unexpected(journal.error());
   const auto events = (*journal)->history(order);
   if (!events) return std::unexpected(events.error());
   if (events->empty())
-    return fail("nothing is known of '" + order + "'", file.string(), "pons task list shows the tasks");
+    return fail("nothing is known of '" + order + "'", bridge::shown(file), "pons task list shows the tasks");
   return Json{{"events", to_json(*events)}};
 }
 

@@ -52,6 +52,8 @@ pkg_check_modules(zxing REQUIRED IMPORTED_TARGET GLOBAL zxing)
 add_library(ext::zxing ALIAS PkgConfig::zxing)
 pkg_check_modules(sqlite REQUIRED IMPORTED_TARGET GLOBAL sqlite3)
 add_library(ext::sqlite ALIAS PkgConfig::sqlite)
+pkg_check_modules(postgres REQUIRED IMPORTED_TARGET GLOBAL libpq)
+add_library(ext::postgres ALIAS PkgConfig::postgres)
 
 find_library(PONS_QRCODEGEN qrcodegencpp REQUIRED)
 add_library(pons_qrcodegen INTERFACE)

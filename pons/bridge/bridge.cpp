@@ -232,6 +232,7 @@ void Bridge::tick(Time now) {
   // Who ends frees resources for who starts in the same tick.
   tick_trees(running(), now);
   expire(now);
+  take_orders(now);
   tick_trees(start_granted(now), now);
   preempt(now);
   if (unkept_ || now - last_commit_ >= kCommitPeriod) keep(commit(now));

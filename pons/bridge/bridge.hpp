@@ -1,6 +1,8 @@
 // The bridge: admits tasks, journals them, waits for their resources, runs their trees, and writes exactly one outcome
 // for each. It knows skills only by their contract.
 //
+// Where its journal lies in a database with an order book, it takes orders from there while it has little to do.
+//
 // One thread. Call tick() every 10 ms. Nobody hears of an outcome before the journal holds it for good, and no skill
 // starts before the journal holds that it does, and all that happened until then.
 #pragma once
@@ -61,8 +63,8 @@ class Bridge {
   ~Bridge();
 
   void add_reviewer(Reviewer reviewer);
-  // The trees that tasks may name, from the XML files of a folder. Errors name file and line; nothing is taken up then.
-  [[nodiscard]] Expected<void> load_trees(const std::filesystem::path& folder) { return review_.load_trees(folder); }
+  // The trees that tasks may name; before the first task.
+  void use_trees(tree::Library trees) { review_.use_trees(std::move(trees)); }
 
   // The task is for good in the journal after the next commit(), which tick() calls: tell a sender who may not hear it
   // otherwise then. Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge
@@ -142,6 +144,8 @@ class Bridge {
   [[nodiscard]] Expected<void> go_on_in_tree(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
                                              const Story& story, const Resume& resume, Time now);
   void expire(Time now);
+  void take_orders(Time now);
+  void take_order(const Order& order, Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
   void start(Open& open, Time now);
   void regain(Open& open, Time now);
@@ -174,8 +178,8 @@ class Bridge {
   std::set<std::string> parked_;
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
-  Time last_commit_, last_tick_;
-  Duration held_for_{0};  // since the first tick
+  Time last_commit_, last_tick_, look_at_;  // the last: into the order book again
+  Duration held_for_{0};                    // since the first tick
   std::int64_t retries_ = 0, refused_ = 0;
   Hold hold_ = Hold::kOff;
   bool unkept_ = false;  // an acceptance or an outcome waits for commit()

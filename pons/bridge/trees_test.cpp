@@ -39,8 +39,10 @@ class TreesOfTasks : public BridgeTest {
   }
   void reopen() {
     BridgeTest::reopen();
-    const auto loaded = bridge_->load_trees(folder_ / "trees");
+    tree::Library trees(skills_);
+    const auto loaded = trees.load(folder_ / "trees");
     ASSERT_TRUE(loaded) << loaded.error().line();
+    bridge_->use_trees(std::move(trees));
   }
   Expected<Admission> submit_tree(const std::string& id, const Json& tree, int priority = 50) {
     return bridge_->submit(Json{{"id", id}, {"priority", priority}, {"tree", tree}}.dump(), now_);
@@ -112,8 +114,10 @@ TEST_F(TreesOfTasks, AnArgumentThatIsNotSetFailsTheLeafAndTheTreeDealsWithIt) {
 
 TEST_F(TreesOfTasks, ABrokenFolderOfTreesIsRefusedWhole) {
   std::ofstream(folder_ / "trees/zzz.xml") << "<root BTCPP_format=\"4\"><BehaviorTree ID=\"sort\"/></root>";
-  const auto loaded = bridge_->load_trees(folder_ / "trees");
+  tree::Library trees(skills_);
+  const auto loaded = trees.load(folder_ / "trees");
   ASSERT_FALSE(loaded);
+  EXPECT_TRUE(trees.names().empty());
   EXPECT_THAT(loaded.error().line(), HasSubstr("zzz.xml:1: a <BehaviorTree> has exactly one node in it"));
 }
 

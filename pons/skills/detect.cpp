@@ -71,6 +71,7 @@ task::SkillType detect(Cell& cell) {
           .resources = {},
           .timeout = std::chrono::seconds(70),
           .attempts = 1,
+          .outputs = {"position_m", "yaw_rad", "size_m", "confidence"},
           .safe_points = {"at once; with something on the cups nobody else gets the arm"},
           .start = [&cell](const task::Json& arguments, Time now) {
             return std::make_unique<Detect>(cell, arguments.at("object").get<std::string>(),

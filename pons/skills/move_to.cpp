@@ -126,6 +126,7 @@ task::SkillType move_to(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
+          .outputs = {"way_s"},
           .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
           .start = [&cell](const task::Json& arguments, Time) {
             return conduct(cell, std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),

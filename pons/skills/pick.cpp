@@ -483,6 +483,7 @@ task::SkillType pick(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(20),
           .attempts = 4,
+          .outputs = {"mass_kg", "sealed"},
           .safe_points = {"before the last of the way down", "with the parcel weighed, which its task keeps"},
           .start = [&cell](const task::Json& arguments, Time now) {
             return conduct(cell, std::make_unique<Pick>(cell, arguments.at("object").get<std::string>(), now));

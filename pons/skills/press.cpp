@@ -208,6 +208,7 @@ task::SkillType press(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(30),
           .attempts = 2,
+          .outputs = {"least_n", "most_n"},
           .safe_points = {"on the way there", "risen again"},
           .start = [&cell](const task::Json& arguments, Time) {
             return conduct(cell, std::make_unique<Press>(cell, arguments.at("place").get<std::string>(),

@@ -141,6 +141,7 @@ task::SkillType yield(Cell& cell) {
           .resources = {"arm"},
           .timeout = std::chrono::seconds(70),
           .attempts = 2,
+          .outputs = {"most_m", "moved_m"},
           .safe_points = {"anywhere, stiff"},
           .start = [&cell](const task::Json& arguments, Time) {
             return conduct(cell, std::make_unique<Yield>(cell, from_s(arguments.at("seconds").get<double>()),

@@ -200,25 +200,5 @@ TEST_F(JournalTest, AFileThatIsGoneTakesNothingMore) {
   EXPECT_EQ(tasks[0].task.id, "a");
 }
 
-// Stories stay possible, and the jump is on record.
-TEST_F(JournalTest, AClockThatRunsBackStandsUntilItHasCaughtUp) {
-  const auto journal = open();
-  ASSERT_TRUE(journal->accept(sample("a"), at(10)));
-  ASSERT_TRUE(journal->event("a", at(4), kStartedEvent));
-  ASSERT_TRUE(journal->event("a", at(5), kAttemptEvent, {{"step", 0}}));
-  ASSERT_TRUE(journal->event("a", at(11), "odd"));
-  ASSERT_TRUE(journal->outcome("a", task::Outcome::kFailed, "no", at(9)));
-  std::vector<Time> stamps;
-  const auto story = journal->history("a").value();
-  for (const Event& event : story) stamps.push_back(event.stamp);
-  EXPECT_EQ(stamps, (std::vector<Time>{at(10), at(10), at(10), at(11), at(11)}));
-  const auto notes = journal->notes().value();
-  ASSERT_EQ(notes.size(), 2u);
-  EXPECT_EQ(notes[0].kind, kClockBackEvent);
-  EXPECT_EQ(notes[0].detail, (Json{{"by_s", 6.0}}));
-  EXPECT_EQ(notes[1].detail, (Json{{"by_s", 2.0}}));
-  EXPECT_EQ(audit(*journal), std::vector<std::string>{});
-}
-
 }  // namespace
 }  // namespace pons::bridge

@@ -7,7 +7,10 @@
 #include <cassert>
 #include <utility>
 
+#include "pons/bridge/journal/book_end.hpp"
 #include "pons/bridge/journal/layout.hpp"
+#include "pons/bridge/journal/place.hpp"
+#include "pons/bridge/journal/postgres.hpp"
 #include "pons/bridge/journal/sqlite.hpp"
 #include "pons/task/json_text.hpp"
 
@@ -16,9 +19,8 @@ namespace {
 
 constexpr std::string_view kTaskColumns =
     "SELECT a.task, a.run, a.stamp_ns, a.detail, e.run, e.stamp_ns, e.detail, "
-    "EXISTS(SELECT 1 FROM event s WHERE s.task = a.task AND s.kind = 'started') "
-    "FROM event a INDEXED BY one_acceptance LEFT JOIN event e ON e.task = a.task AND e.kind = 'ended' "
-    "WHERE a.kind = 'accepted' ";
+    "CASE WHEN EXISTS(SELECT 1 FROM event s WHERE s.task = a.task AND s.kind = 'started') THEN 1 ELSE 0 END "
+    "FROM {} LEFT JOIN event e ON e.task = a.task AND e.kind = 'ended' WHERE a.kind = 'accepted' ";
 constexpr std::string_view kEventColumns = "SELECT sequence, run, stamp_ns, task, order_id, kind, detail FROM event ";
 
 // Labels are read from pictures: a code need not be UTF-8.
@@ -45,8 +47,9 @@ std::unexpected<Error> reserved(std::string_view kind) {
 }  // namespace
 
 struct Journal::Impl {
-  std::string file;
-  Database database;
+  std::string file;  // or database, for people
+  std::unique_ptr<Database> database;
+  std::optional<BookEnd> book;  // of a journal in a database, opened for writing
   std::int64_t run = 0;
   Time last;            // stamp that was written in this run
   bool behind = false;  // the clock is, since it ran back
@@ -54,16 +57,19 @@ struct Journal::Impl {
   // what was to become durable together must not become so in part.
   std::optional<Error> failed;
   // Only open_to_read() leaves those that write unprepared.
-  mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count, newest;
-  std::int64_t durable = 0;
+  mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count, endings,
+      newest;
+  std::int64_t last_written = 0, durable = 0;  // sequences
   Statement add_first, add_event, add_note, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();
-  [[nodiscard]] Expected<void> prepare(Database::Mode mode);
+  [[nodiscard]] Expected<void> prepare(Mode mode);
   [[nodiscard]] Expected<void> ensure_transaction();
   [[nodiscard]] Expected<void> make_durable();
   [[nodiscard]] Expected<void> look_up_durable();
-  [[nodiscard]] Expected<void> write(Statement& statement);
+  // The sequence of what was inserted; 0 when nothing was.
+  [[nodiscard]] Expected<std::int64_t> write(Statement& statement);
+  void give_up(const Error& error);
   // A transaction, and the stamp for what is written now: a clock that runs back is told of, and waited for.
   [[nodiscard]] Expected<std::int64_t> begin_at(Time now);
   // To an open task.
@@ -82,17 +88,11 @@ struct Journal::Impl {
 
 namespace {
 
-Expected<void> check_place(const std::filesystem::path& file) {
-  std::error_code ignored;
-  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-  if (!std::filesystem::is_directory(folder, ignored)) {
-    return fail(fmt::format("the folder '{}' does not exist", folder.string()), file.string(),
-                "create it, or name another file for the journal");
-  }
-  if (std::filesystem::is_directory(file, ignored)) {
-    return fail("this is a folder", file.string(), "name a file for the journal");
-  }
-  return {};
+Expected<std::unique_ptr<Database>> connect(const std::string& place, Mode mode, const char* vfs) {
+  if (!in_database(place)) return open_sqlite(place, mode, vfs);
+  const std::string name = split(place).name;
+  if (auto good = check_name(name); !good) return std::unexpected(good.error());
+  return open_postgres(place, journal_schema(name), mode);
 }
 
 std::unexpected<Error> older(const std::string& file) {
@@ -102,22 +102,23 @@ std::unexpected<Error> older(const std::string& file) {
 }  // namespace
 
 Expected<void> Journal::Impl::begin_run() {
-  if (auto done = database.execute("BEGIN IMMEDIATE;INSERT INTO run DEFAULT VALUES;COMMIT;"); !done) return done;
-  const auto id = database.integer("SELECT max(id) FROM run");
+  auto insert = database->prepare("INSERT INTO run DEFAULT VALUES RETURNING id");
+  if (!insert) return std::unexpected(insert.error());
+  const auto id = insert->run_for_integer();
   if (!id) return std::unexpected(id.error());
   run = *id;
   return {};
 }
 
-Expected<void> Journal::Impl::prepare(Database::Mode mode) {
+Expected<void> Journal::Impl::prepare(Mode mode) {
   const auto make = [this](Statement& statement, std::string_view sql) -> Expected<void> {
-    auto prepared = database.prepare(sql);
+    auto prepared = database->prepare(sql);
     if (!prepared) return std::unexpected(prepared.error());
     statement = std::move(*prepared);
     return {};
   };
-  const std::string tasks(kTaskColumns), events(kEventColumns);
-  const std::array<std::pair<Statement*, std::string>, 9> reads{{
+  const std::string tasks = fmt::format(kTaskColumns, acceptances(database->dialect())), events(kEventColumns);
+  const std::array<std::pair<Statement*, std::string>, 10> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
       {&all_tasks, tasks + "ORDER BY a.sequence"},
       {&one_task, tasks + "AND a.task = ?1"},
@@ -130,97 +131,84 @@ Expected<void> Journal::Impl::prepare(Database::Mode mode) {
                                   "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
       {&every_event, events + "ORDER BY task, sequence"},
       {&newest, "SELECT coalesce(max(sequence), 0) FROM event"},
-      {&count,
-       "SELECT (SELECT count(*) FROM event WHERE kind = 'accepted'), (SELECT count(*) FROM event), "
-       "coalesce(sum(o = 'SUCCEEDED'), 0), coalesce(sum(o = 'FAILED'), 0), coalesce(sum(o = 'CANCELLED'), 0), "
-       "coalesce(sum(o = 'EXCEPTION'), 0) "
-       "FROM (SELECT json_extract(detail, '$.outcome') AS o FROM event WHERE kind = 'ended')"},
+      {&count, "SELECT count(*) FILTER (WHERE kind = 'accepted'), count(*) FROM event"},
+      {&endings, "SELECT detail FROM event WHERE kind = 'ended'"},
   }};
+  const std::string returning = database->dialect() == Dialect::kSqlite ? "" : " RETURNING sequence";
   const std::array<std::pair<Statement*, std::string>, 5> writes{{
       {&add_first,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, ?3, ?4, 'accepted', ?5) "
-       "ON CONFLICT DO NOTHING"},
+       "ON CONFLICT DO NOTHING" +
+           returning},
       {&add_event,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) "
        "SELECT ?1, ?2, ?5, '', ?3, ?4 WHERE EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'accepted') "
-       "AND NOT EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'ended')"},
-      {&add_note, "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, '', ?3, ?4, ?5)"},
-      {&begin, "BEGIN IMMEDIATE"},
+       "AND NOT EXISTS(SELECT 1 FROM event WHERE task = ?5 AND kind = 'ended')" +
+           returning},
+      {&add_note,
+       "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, '', ?3, ?4, ?5)" + returning},
+      {&begin, database->dialect() == Dialect::kSqlite ? "BEGIN IMMEDIATE" : "BEGIN"},
       {&commit, "COMMIT"},
   }};
   for (const auto& [statement, sql] : reads) {
     if (auto made = make(*statement, sql); !made) return made;
   }
-  if (mode == Database::Mode::kRead) return {};
+  if (mode == Mode::kRead) return {};
   for (const auto& [statement, sql] : writes) {
     if (auto made = make(*statement, sql); !made) return made;
   }
   return {};
 }
 
-Expected<std::unique_ptr<Journal>> Journal::open(const std::filesystem::path& file, const char* vfs) {
+Expected<std::unique_ptr<Journal>> Journal::open(const std::string& place, const char* vfs) {
+  auto database = connect(place, Mode::kOwn, vfs);
+  if (!database) return std::unexpected(database.error());
   auto impl = std::make_unique<Impl>();
-  impl->file = file.string();
-  const bool in_memory = impl->file == ":memory:";
+  impl->file = (*database)->shown();
+  impl->database = std::move(*database);
   const auto steps = [&]() -> Expected<void> {
-    if (!in_memory) {
-      if (auto place = check_place(file); !place) return place;
-    }
-    if (auto opened = impl->database.open(impl->file, Database::Mode::kCreate, vfs); !opened) return opened;
-    // The lock is kept from the first access to the end: one owner, and no index in shared memory.
-    if (auto locked = impl->database.execute("PRAGMA locking_mode=EXCLUSIVE"); !locked) return locked;
-    const auto layout = layout_of(impl->database, impl->file);
+    const auto layout = layout_of(*impl->database);
     if (!layout) return std::unexpected(layout.error());
     if (*layout == Layout::kOlder) return older(impl->file);
-    if (impl->database.read_only()) {
-      return fail("the journal cannot be written", impl->file, "check the permissions of file and folder");
-    }
-    // A new file is created in rollback mode, so that its identity stands in the file itself and not only in the log.
     if (*layout == Layout::kNone) {
-      if (auto created = create_layout(impl->database); !created) return created;
+      if (auto created = create_layout(*impl->database); !created) return created;
     }
-    const auto log = impl->database.text("PRAGMA journal_mode=WAL");
-    if (!log) return std::unexpected(log.error());
-    if (*log != (in_memory ? "memory" : "wal")) {
-      return fail("this disk takes no write-ahead log", impl->file, "name a file on a local disk");
-    }
-    if (auto set = impl->database.execute("PRAGMA synchronous=FULL;PRAGMA foreign_keys=ON"); !set) return set;
+    if (auto promised = impl->database->promise_durability(); !promised) return promised;
     if (auto begun = impl->begin_run(); !begun) return begun;
-    if (auto prepared = impl->prepare(Database::Mode::kCreate); !prepared) return prepared;
+    if (auto prepared = impl->prepare(Mode::kOwn); !prepared) return prepared;
     (void)impl->look_up_durable();  // of a damaged file `check` tells more
+    if (impl->database->dialect() == Dialect::kSqlite) return {};
+    auto book = BookEnd::open(*impl->database);
+    if (!book) return std::unexpected(book.error());
+    impl->book = std::move(*book);
     return {};
   };
   if (auto done = steps(); !done) return std::unexpected(done.error());
   return std::unique_ptr<Journal>(new Journal(std::move(impl)));
 }
 
-Expected<void> Journal::upgrade(const std::filesystem::path& file) {
-  Database database;
-  if (auto place = check_place(file); !place) return place;
-  if (auto opened = database.open(file.string(), Database::Mode::kCreate); !opened) return opened;
-  if (auto locked = database.execute("PRAGMA locking_mode=EXCLUSIVE;PRAGMA synchronous=FULL"); !locked) return locked;
-  const auto layout = layout_of(database, file.string());
+Expected<void> Journal::upgrade(const std::string& place) {
+  auto database = connect(place, Mode::kOwn, nullptr);
+  if (!database) return std::unexpected(database.error());
+  const auto layout = layout_of(**database);
   if (!layout) return std::unexpected(layout.error());
-  return *layout == Layout::kOlder ? upgrade_layout(database) : Expected<void>{};
+  return *layout == Layout::kOlder ? upgrade_layout(**database) : Expected<void>{};
 }
 
-Expected<std::unique_ptr<Journal>> Journal::open_to_read(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    return fail("there is no such journal", file.string(), "name the file that a run was given with --journal");
-  }
+Expected<std::unique_ptr<Journal>> Journal::open_to_read(const std::string& place) {
+  auto database = connect(place, Mode::kRead, nullptr);
+  if (!database) return std::unexpected(database.error());
   auto impl = std::make_unique<Impl>();
-  impl->file = file.string();
+  impl->file = (*database)->shown();
+  impl->database = std::move(*database);
   const auto steps = [&]() -> Expected<void> {
-    if (auto place = check_place(file); !place) return place;
-    if (auto opened = impl->database.open(impl->file, Database::Mode::kRead); !opened) return opened;
-    const auto layout = layout_of(impl->database, impl->file);
+    const auto layout = layout_of(*impl->database);
     if (!layout) return std::unexpected(layout.error());
-    if (*layout == Layout::kNone) {
-      return fail("this database is not a journal", impl->file, "name another file, or move this one away");
-    }
     if (*layout == Layout::kOlder) return older(impl->file);
-    return impl->prepare(Database::Mode::kRead);
+    if (*layout == Layout::kThis) return impl->prepare(Mode::kRead);
+    if (impl->database->dialect() == Dialect::kSqlite)
+      return fail("this database is not a journal", impl->file, "name another file, or move this one away");
+    return fail("there is no such journal", impl->file, "name the bridge that writes it");
   };
   if (auto done = steps(); !done) return std::unexpected(done.error());
   return std::unique_ptr<Journal>(new Journal(std::move(impl)));
@@ -238,35 +226,43 @@ Journal::~Journal() {
 Expected<void> Journal::Impl::ensure_transaction() {
   if (run == 0) return fail("the journal is open for reading only", file, "");
   if (failed) return std::unexpected(*failed);
-  return database.in_transaction() ? Expected<void>{} : begin.run();
+  if (database->in_transaction()) return {};
+  auto begun = begin.run();
+  if (!begun) give_up(begun.error());
+  return begun;
 }
 
-Expected<void> Journal::Impl::write(Statement& statement) {
-  auto done = statement.run();
-  if (done) return done;
-  failed = done.error();
-  if (database.in_transaction()) (void)database.execute("ROLLBACK");
-  return done;
+void Journal::Impl::give_up(const Error& error) {
+  if (database->in_transaction()) (void)database->execute("ROLLBACK");
+  failed = error;
+}
+
+Expected<std::int64_t> Journal::Impl::write(Statement& statement) {
+  if (auto done = statement.run(); !done) {
+    give_up(done.error());
+    return std::unexpected(done.error());
+  }
+  const std::int64_t sequence = database->inserted();
+  if (sequence > 0) last_written = sequence;
+  return sequence;
 }
 
 Expected<void> Journal::Impl::make_durable() {
   if (failed) return std::unexpected(*failed);
-  if (!database.in_transaction()) return {};
-  // The log would go on into a file that no name leads to any more.
-  if (database.moved()) {
-    (void)database.execute("ROLLBACK");
-    failed = Error{"the journal's file is gone", file, "put it back where it was, and start again"};
-    return std::unexpected(*failed);
+  if (!database->in_transaction()) return {};
+  if (auto there = database->still_there(); !there) {
+    give_up(there.error());
+    return there;
   }
-  if (auto done = write(commit); !done) return done;
-  return look_up_durable();
+  if (auto done = write(commit); !done) return std::unexpected(done.error());
+  durable = std::max(durable, last_written);
+  return {};
 }
 
 Expected<void> Journal::Impl::look_up_durable() {
-  Reading reading(newest);
-  const auto row = newest.step();
-  if (!row) return std::unexpected(row.error());
-  durable = newest.integer(0);
+  const auto last_one = newest.run_for_integer();
+  if (!last_one) return std::unexpected(last_one.error());
+  durable = *last_one;
   return {};
 }
 
@@ -285,8 +281,9 @@ Expected<void> Journal::Impl::add(std::string_view id, Time now, std::string_vie
   const auto stamp = begin_at(now);
   if (!stamp) return std::unexpected(stamp.error());
   add_event.bind(run).bind(*stamp).bind(kind).bind(written(detail)).bind(id);
-  if (auto added = write(add_event); !added) return added;
-  if (database.changes() == 1) return {};
+  const auto added = write(add_event);
+  if (!added) return std::unexpected(added.error());
+  if (*added > 0) return {};
   return fail(fmt::format("there is no open task '{}'", task::excerpt(id)), file, "");
 }
 
@@ -304,8 +301,9 @@ Expected<Accepted> Journal::accept(const task::Task& task, Time now) {
   if (!stamp) return std::unexpected(stamp.error());
   impl_->add_first.bind(impl_->run).bind(*stamp).bind(task.id).bind(order_of(task));
   impl_->add_first.bind(written(task::to_json(task)));
-  if (auto added = impl_->write(impl_->add_first); !added) return std::unexpected(added.error());
-  if (impl_->database.changes() == 1) return Accepted::kNew;
+  const auto added = impl_->write(impl_->add_first);
+  if (!added) return std::unexpected(added.error());
+  if (*added > 0) return Accepted::kNew;
   if (auto held = holds(task); !held) return std::unexpected(held.error());
   return Accepted::kAlready;
 }
@@ -319,27 +317,54 @@ Expected<void> Journal::note(Time now, std::string_view kind, const Json& detail
   if (kind == kAcceptedEvent || kind == kStartedEvent || kind == kEndedEvent) return reserved(kind);
   const auto stamp = impl_->begin_at(now);
   if (!stamp) return std::unexpected(stamp.error());
-  return impl_->write(impl_->add_note.bind(impl_->run).bind(*stamp).bind(order).bind(kind).bind(written(detail)));
+  const auto noted =
+      impl_->write(impl_->add_note.bind(impl_->run).bind(*stamp).bind(order).bind(kind).bind(written(detail)));
+  return noted ? Expected<void>{} : std::unexpected(noted.error());
 }
 
 Expected<void> Journal::outcome(std::string_view id, task::Outcome outcome, std::string_view reason, Time now,
                                 const Json& detail) {
-  return impl_->add(id, now, kEndedEvent, ending(outcome, reason, detail));
+  if (auto added = impl_->add(id, now, kEndedEvent, ending(outcome, reason, detail)); !added) return added;
+  return close_order(id, outcome, reason);
 }
 
 Expected<void> Journal::commit() { return impl_->make_durable(); }
+
+// ---- the order book beside it ----
+
+Expected<std::vector<Order>> Journal::claim(std::size_t most) {
+  std::vector<Order> none;
+  if (!impl_->book || most == 0) return none;
+  if (impl_->failed) return std::unexpected(*impl_->failed);
+  const auto waits = impl_->book->waits();
+  if (waits && !*waits) return none;
+  if (waits) {
+    if (auto begun = impl_->ensure_transaction(); !begun) return std::unexpected(begun.error());
+  }
+  auto orders = waits ? impl_->book->claim(most) : std::unexpected(waits.error());
+  if (!orders) impl_->give_up(orders.error());
+  return orders;
+}
+
+Expected<void> Journal::close_order(std::string_view id, task::Outcome outcome, std::string_view reason) {
+  if (!impl_->book) return {};
+  if (auto begun = impl_->ensure_transaction(); !begun) return begun;
+  auto closed = impl_->book->close(id, outcome, reason);
+  if (!closed) impl_->give_up(closed.error());
+  return closed;
+}
 
 Expected<std::int64_t> Journal::compact(std::int64_t keep) {
   assert(keep >= 0);
   if (auto durable = commit(); !durable) return std::unexpected(durable.error());
   const auto drop = [&]() -> Expected<std::int64_t> {
-    auto dropped = impl_->database.prepare(
+    auto dropped = impl_->database->prepare(
         "DELETE FROM event WHERE kind NOT IN ('accepted', 'ended') AND task IN (SELECT task FROM event WHERE kind = "
         "'ended' AND sequence <= (SELECT sequence FROM event WHERE kind = 'ended' ORDER BY sequence DESC LIMIT 1 "
         "OFFSET ?1))");
     if (!dropped) return std::unexpected(dropped.error());
     if (auto done = impl_->write(dropped->bind(keep)); !done) return std::unexpected(done.error());
-    return impl_->database.changes();
+    return impl_->database->changes();
   };
   if (auto begun = impl_->ensure_transaction(); !begun) return std::unexpected(begun.error());
   const auto dropped = drop();
@@ -349,7 +374,7 @@ Expected<std::int64_t> Journal::compact(std::int64_t keep) {
       return std::unexpected(noted.error());
   }
   if (auto durable = commit(); !durable) return std::unexpected(durable.error());
-  if (auto freed = impl_->database.execute("VACUUM"); !freed) return std::unexpected(freed.error());
+  if (auto freed = give_back_space(*impl_->database); !freed) return std::unexpected(freed.error());
   return dropped;
 }
 
@@ -439,21 +464,29 @@ Expected<void> Journal::each_event(const std::function<Expected<void>(const Even
 }
 
 Expected<Counts> Journal::counts() const {
-  Reading reading(impl_->count);
-  const auto row = impl_->count.step();
-  if (!row) return std::unexpected(row.error());
-  const Statement& r = impl_->count;
-  Counts counts{r.integer(0), 0, r.integer(2), r.integer(3), r.integer(4), r.integer(5), r.integer(1)};
+  Counts counts;
+  {
+    Reading reading(impl_->count);
+    const auto row = impl_->count.step();
+    if (!row) return std::unexpected(row.error());
+    counts.accepted = impl_->count.integer(0);
+    counts.events = impl_->count.integer(1);
+  }
+  Reading reading(impl_->endings);
+  for (;;) {
+    const auto row = impl_->endings.step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) break;
+    const auto end = outcome_from(Json::parse(impl_->endings.text(0), nullptr, false));
+    if (!end) return impl_->broken(end.error().line());
+    std::array<std::int64_t*, 4> of{&counts.succeeded, &counts.failed, &counts.cancelled, &counts.exception};
+    ++*of.at(static_cast<std::size_t>(end->outcome));
+  }
   counts.open = counts.accepted - counts.succeeded - counts.failed - counts.cancelled - counts.exception;
   return counts;
 }
 
-Expected<void> Journal::check_storage() const {
-  const auto found = impl_->database.text("PRAGMA integrity_check");
-  if (!found) return std::unexpected(found.error());
-  if (*found != "ok") return fail("the journal is damaged: " + *found, impl_->file, "restore a copy");
-  return {};
-}
+Expected<void> Journal::check_storage() const { return check_layout(*impl_->database); }
 
 std::int64_t Journal::run() const { return impl_->run; }
 

@@ -1,6 +1,7 @@
-// The only truth about tasks: what happened, event by event, in one SQLite file (WAL, synchronous=FULL). Nothing in it
-// is ever changed; what a task's state is, its events say. A task's first event is its acceptance, its last its
-// outcome, and the file's own indexes refuse a second of either.
+// The only truth about tasks: what happened, event by event, in one SQLite file (WAL, synchronous=FULL), or in a schema
+// of a PostgreSQL database (synchronous_commit=on) that holds several bridges' journals and their order book; "file"
+// below means either. Nothing in it is ever changed; what a task's state is, its events say. A task's first event is
+// its acceptance, its last its outcome, and the file's own indexes refuse a second of either.
 //
 // Writing makes an event part of the journal at once, and durable with the next commit(): it then survives a killed
 // process and a lost power supply. Tell nobody before. One commit costs one wait for the disk, whatever it holds.
@@ -10,7 +11,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -63,6 +63,11 @@ struct TaskHistory {
   std::vector<Event> events;  // as written, acceptance and outcome apart
 };
 
+// What a sender has put into the order book: the text of a task.
+struct Order {
+  std::string id, body;
+};
+
 struct Counts {
   std::int64_t accepted = 0, open = 0, succeeded = 0, failed = 0, cancelled = 0, exception = 0, events = 0;
 };
@@ -79,16 +84,17 @@ class Journal {
   static constexpr int kVersion = 2;
   static constexpr std::int32_t kApplicationId = 0x506f6e73;  // "Pons"
 
-  // Opens `file` or creates it, and begins a new run. ":memory:" keeps everything in memory, for runs that need no
-  // file. Errors: missing directory, not writable, not a database, another program's database, another version, in use
-  // by another process. A refused file is left as it was. `vfs` names the SQLite VFS that holds the file; none is the
-  // operating system's.
-  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open(const std::filesystem::path& file,
-                                                               const char* vfs = nullptr);
-  // For looking only: the file must exist, be of this version, and nobody may own it now. What writes then fails.
-  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open_to_read(const std::filesystem::path& file);
-  // Brings a file of an older version to this one, wholly or, after an error, not at all.
-  [[nodiscard]] static Expected<void> upgrade(const std::filesystem::path& file);
+  // Opens what lies at `place` (place.hpp), or creates it, and begins a new run. ":memory:" keeps everything in memory,
+  // for runs that need no file. Errors: missing directory, not writable, not a database, another program's database,
+  // another version, in use by another process; of PostgreSQL also: not reached, or so set up that no commit is
+  // durable. What is refused is left as it was. `vfs` names the SQLite VFS that holds a file; none is the operating
+  // system's.
+  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open(const std::string& place, const char* vfs = nullptr);
+  // For looking only: it must exist and be of this version; a file nobody may own now, one in a database is read
+  // beside its owner, as of the last commit. What writes then fails.
+  [[nodiscard]] static Expected<std::unique_ptr<Journal>> open_to_read(const std::string& place);
+  // Brings one of an older version to this one, wholly or, after an error, not at all.
+  [[nodiscard]] static Expected<void> upgrade(const std::string& place);
   // Commits what is pending.
   ~Journal();
 
@@ -109,6 +115,14 @@ class Journal {
   // whatever was written since the last commit is not part of the journal, and nothing is written any more: open it
   // anew. (What a disk had taken of a commit that failed may come to light there: send the same again.)
   [[nodiscard]] Expected<void> commit();
+
+  // Takes up to `most` orders out of the order book of the journal's database, as this bridge's: the most important and
+  // then the oldest first, none that another bridge has, and for good only with the next commit(), so that it becomes
+  // durable together with their acceptance. None from a file. Error: as a write's.
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most);
+  // How an order that was claimed has ended; outcome() says it by itself. Nothing happens where it is no such order, or
+  // has ended before. Error: as a write's.
+  [[nodiscard]] Expected<void> close_order(std::string_view id, task::Outcome outcome, std::string_view reason);
 
   // In the order of acceptance.
   [[nodiscard]] Expected<std::vector<TaskRecord>> tasks() const;
@@ -131,7 +145,7 @@ class Journal {
   // ids stay taken and outcomes known. Then gives the freed space back to the disk. Returns how many events were
   // dropped; a note says so, too. Error: the file cannot be written, it holds what it held; or no space was freed.
   [[nodiscard]] Expected<std::int64_t> compact(std::int64_t keep);
-  // Whether the file itself is whole, as far as SQLite can tell. Error: what is not.
+  // Whether the file itself is whole, as far as its database can tell. Error: what is not.
   [[nodiscard]] Expected<void> check_storage() const;
 
  private:

@@ -71,126 +71,130 @@ std::string reading_uri(const std::string& file) {
   return uri + (at_rest ? "?immutable=1" : "?mode=ro");
 }
 
+Expected<void> check_place(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    return fail(fmt::format("the folder '{}' does not exist", folder.string()), file.string(),
+                "create it, or name another file for the journal");
+  }
+  if (std::filesystem::is_directory(file, ignored)) {
+    return fail("this is a folder", file.string(), "name a file for the journal");
+  }
+  return {};
+}
+
+class SqliteStatement final : public Statement::Driver {
+ public:
+  SqliteStatement(sqlite3_stmt* statement, const std::string& file) : statement_(statement), file_(file) {}
+  ~SqliteStatement() override { sqlite3_finalize(statement_); }
+
+  void bind(int parameter, std::int64_t value) override {
+    [[maybe_unused]] const int code = sqlite3_bind_int64(statement_, parameter, value);
+    assert(code == SQLITE_OK);
+  }
+  void bind(int parameter, std::string_view value) override {
+    // A null pointer would bind NULL.
+    const char* data = value.empty() ? "" : value.data();
+    [[maybe_unused]] const int code =
+        sqlite3_bind_text64(statement_, parameter, data, value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+    assert(code == SQLITE_OK);
+  }
+  Expected<bool> step() override {
+    const int code = sqlite3_step(statement_);
+    if (code == SQLITE_ROW) return true;
+    if (code == SQLITE_DONE) return false;
+    return failure(sqlite3_db_handle(statement_), file_);
+  }
+  void reset() override {
+    sqlite3_reset(statement_);
+    sqlite3_clear_bindings(statement_);
+  }
+  [[nodiscard]] std::int64_t integer(int column) const override { return sqlite3_column_int64(statement_, column); }
+  [[nodiscard]] std::string text(int column) const override {
+    const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+    return data == nullptr ? std::string()
+                           : std::string(data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)));
+  }
+  [[nodiscard]] bool is_null(int column) const override {
+    return sqlite3_column_type(statement_, column) == SQLITE_NULL;
+  }
+
+ private:
+  sqlite3_stmt* statement_;
+  const std::string& file_;  // the database's
+};
+
+class SqliteDatabase final : public Database {
+ public:
+  ~SqliteDatabase() override { sqlite3_close(database_); }
+
+  Expected<void> open(const std::string& file, Mode mode, const char* vfs) {
+    shown_ = file;
+    const bool create = mode == Mode::kOwn;
+    const int flags = SQLITE_OPEN_NOMUTEX |
+                      (create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+    const std::string name = create ? file : reading_uri(file);
+    if (sqlite3_open_v2(name.c_str(), &database_, flags, vfs) != SQLITE_OK) return failure(database_, shown_);
+    // The lock is kept from the first access to the end: one owner, and no index in shared memory.
+    return create ? execute("PRAGMA locking_mode=EXCLUSIVE;PRAGMA synchronous=FULL") : Expected<void>{};
+  }
+
+  [[nodiscard]] Dialect dialect() const override { return Dialect::kSqlite; }
+
+  Expected<Statement> prepare(std::string_view sql) override {
+    sqlite3_stmt* statement = nullptr;
+    const int code = sqlite3_prepare_v2(database_, sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+    if (code != SQLITE_OK) return failure(database_, shown_);
+    return Statement(std::make_unique<SqliteStatement>(statement, shown_));
+  }
+
+  Expected<void> execute(const std::string& sql) override {
+    if (sqlite3_exec(database_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) return failure(database_, shown_);
+    return {};
+  }
+
+  [[nodiscard]] bool in_transaction() const override { return sqlite3_get_autocommit(database_) == 0; }
+  [[nodiscard]] std::int64_t changes() const override { return sqlite3_changes64(database_); }
+  [[nodiscard]] std::int64_t inserted() const override {
+    return changes() == 1 ? sqlite3_last_insert_rowid(database_) : 0;
+  }
+
+  // A new file is created in rollback mode, so that its identity stands in the file itself and not only in the log.
+  Expected<void> promise_durability() override {
+    const auto log = text("PRAGMA journal_mode=WAL");
+    if (!log) return std::unexpected(log.error());
+    if (*log != (shown_ == ":memory:" ? "memory" : "wal"))
+      return fail("this disk takes no write-ahead log", shown_, "name a file on a local disk");
+    return execute("PRAGMA synchronous=FULL;PRAGMA foreign_keys=ON");
+  }
+
+  // The log would go on into a file that no name leads to any more.
+  Expected<void> still_there() override {
+    int moved = 0;
+    const int code = sqlite3_file_control(database_, "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+    if (code != SQLITE_OK || moved == 0) return {};
+    return fail("the journal's file is gone", shown_, "put it back where it was, and start again");
+  }
+
+  [[nodiscard]] bool read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
+
+ private:
+  sqlite3* database_ = nullptr;
+};
+
 }  // namespace
 
-Statement::Statement(Statement&& other) noexcept
-    : statement_(std::exchange(other.statement_, nullptr)), file_(std::move(other.file_)), bound_(other.bound_) {}
-
-Statement& Statement::operator=(Statement&& other) noexcept {
-  std::swap(statement_, other.statement_);
-  std::swap(file_, other.file_);
-  std::swap(bound_, other.bound_);
-  return *this;
-}
-
-Statement::~Statement() { sqlite3_finalize(statement_); }
-
-Statement& Statement::bind(std::int64_t value) {
-  [[maybe_unused]] const int code = sqlite3_bind_int64(statement_, ++bound_, value);
-  assert(code == SQLITE_OK);
-  return *this;
-}
-
-Statement& Statement::bind(std::string_view value) {
-  // A null pointer would bind NULL.
-  const char* data = value.empty() ? "" : value.data();
-  [[maybe_unused]] const int code =
-      sqlite3_bind_text64(statement_, ++bound_, data, value.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
-  assert(code == SQLITE_OK);
-  return *this;
-}
-
-Statement& Statement::bind_null() {
-  [[maybe_unused]] const int code = sqlite3_bind_null(statement_, ++bound_);
-  assert(code == SQLITE_OK);
-  return *this;
-}
-
-Expected<bool> Statement::step() {
-  const int code = sqlite3_step(statement_);
-  if (code == SQLITE_ROW) return true;
-  if (code == SQLITE_DONE) return false;
-  return failure(sqlite3_db_handle(statement_), file_);
-}
-
-Expected<void> Statement::run() {
-  Reading reading(*this);
-  for (;;) {
-    const auto row = step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return {};
+Expected<std::unique_ptr<Database>> open_sqlite(const std::string& file, Mode mode, const char* vfs) {
+  std::error_code ignored;
+  if (mode == Mode::kRead && !std::filesystem::exists(file, ignored))
+    return fail("there is no such journal", file, "name the file that a run was given with --journal");
+  if (file != ":memory:") {
+    if (auto place = check_place(file); !place) return std::unexpected(place.error());
   }
+  auto database = std::make_unique<SqliteDatabase>();
+  if (auto opened = database->open(file, mode, vfs); !opened) return std::unexpected(opened.error());
+  return database;
 }
-
-void Statement::reset() {
-  sqlite3_reset(statement_);
-  sqlite3_clear_bindings(statement_);
-  bound_ = 0;
-}
-
-std::int64_t Statement::integer(int column) const { return sqlite3_column_int64(statement_, column); }
-
-std::string Statement::text(int column) const {
-  const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
-  return data == nullptr ? std::string()
-                         : std::string(data, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column)));
-}
-
-bool Statement::is_null(int column) const { return sqlite3_column_type(statement_, column) == SQLITE_NULL; }
-
-Database::~Database() { sqlite3_close(database_); }
-
-Expected<void> Database::open(const std::string& file, Mode mode, const char* vfs) {
-  file_ = file;
-  const bool create = mode == Mode::kCreate;
-  const int flags = SQLITE_OPEN_NOMUTEX |
-                    (create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
-  const std::string name = create ? file : reading_uri(file);
-  if (sqlite3_open_v2(name.c_str(), &database_, flags, vfs) != SQLITE_OK) {
-    return failure(database_, file_);
-  }
-  return {};
-}
-
-Expected<Statement> Database::prepare(std::string_view sql) const {
-  Statement statement;
-  statement.file_ = file_;
-  const int code =
-      sqlite3_prepare_v2(database_, sql.data(), static_cast<int>(sql.size()), &statement.statement_, nullptr);
-  if (code != SQLITE_OK) return failure(database_, file_);
-  return statement;
-}
-
-Expected<void> Database::execute(const char* sql) const {
-  if (sqlite3_exec(database_, sql, nullptr, nullptr, nullptr) != SQLITE_OK) return failure(database_, file_);
-  return {};
-}
-
-Expected<std::int64_t> Database::integer(std::string_view sql) const {
-  auto statement = prepare(sql);
-  if (!statement) return std::unexpected(statement.error());
-  const auto row = statement->step();
-  if (!row) return std::unexpected(row.error());
-  return *row ? statement->integer(0) : 0;
-}
-
-Expected<std::string> Database::text(std::string_view sql) const {
-  auto statement = prepare(sql);
-  if (!statement) return std::unexpected(statement.error());
-  const auto row = statement->step();
-  if (!row) return std::unexpected(row.error());
-  return *row ? statement->text(0) : std::string();
-}
-
-bool Database::read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
-
-bool Database::in_transaction() const { return sqlite3_get_autocommit(database_) == 0; }
-
-bool Database::moved() const {
-  int moved = 0;
-  return sqlite3_file_control(database_, "main", SQLITE_FCNTL_HAS_MOVED, &moved) == SQLITE_OK && moved != 0;
-}
-
-std::int64_t Database::changes() const { return sqlite3_changes64(database_); }
 
 }  // namespace pons::bridge

@@ -119,42 +119,7 @@ TEST_F(StoryTest, TimeDoesNotRunBack) {
   EXPECT_EQ(event(kStartedEvent), "");
 }
 
-class AuditTest : public JournalTest {
- protected:
-  [[nodiscard]] std::vector<std::string> found() const { return audit(*open()); }
-};
-
-TEST_F(AuditTest, FindsAWholeJournalWhole) {
-  {
-    const auto journal = open();
-    for (const char* id : {"a", "b"}) {
-      ASSERT_TRUE(journal->accept(sample(id), at(1)));
-      ASSERT_TRUE(journal->event(id, at(1), kStartedEvent));
-      ASSERT_TRUE(journal->event(id, at(1), kAttemptEvent, {{"step", 0}}));
-      ASSERT_TRUE(journal->event(id, at(2), kAttemptEndedEvent, {{"step", 0}, {"status", "succeeded"}}));
-    }
-    ASSERT_TRUE(journal->outcome("a", task::Outcome::kSucceeded, "", at(2)));
-  }
-  EXPECT_EQ(found(), std::vector<std::string>{});
-  EXPECT_EQ(open()->compact(0), 3);
-  EXPECT_EQ(found(), std::vector<std::string>{}) << "compacted";
-}
-
-TEST_F(AuditTest, NamesEachImpossibleEvent) {
-  {
-    const auto journal = open();
-    for (const char* id : {"a", "b"}) ASSERT_TRUE(journal->accept(sample(id), at(1)));
-    ASSERT_TRUE(journal->event("a", at(1), kAttemptEvent, {{"step", 0}}));
-    ASSERT_TRUE(journal->event("b", at(1), kCancellingEvent));
-    ASSERT_TRUE(journal->event("b", at(1), kStartedEvent));
-    ASSERT_TRUE(journal->event("b", at(1), kFoundDoneEvent, {{"step", 1}}));
-  }
-  EXPECT_EQ(found(), (std::vector<std::string>{"event 3 (attempt) of task 'a' comes before it was started",
-                                               "event 4 (cancelling) of task 'b' comes before it was started",
-                                               "event 6 (found_done) of task 'b' is of a step that was never begun"}));
-}
-
-TEST_F(AuditTest, FindsAFileThatSqliteFindsDamaged) {
+TEST_F(JournalTest, AuditFindsAFileThatSqliteFindsDamaged) {
   {
     const auto journal = open();
     for (int i = 0; i < 300; ++i) ASSERT_TRUE(journal->accept(sample(fmt::format("t{}", i)), at(i)));

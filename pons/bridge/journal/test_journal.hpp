@@ -61,6 +61,59 @@ inline void in_a_process_that_is_killed(const std::function<bool()>& work) {
   ::waitpid(child, nullptr, 0);
 }
 
+// Where the tests of any journal have theirs: a new one each time.
+class Store {
+ public:
+  Store() = default;
+  virtual ~Store() = default;
+  Store(const Store&) = delete;
+  Store& operator=(const Store&) = delete;
+  [[nodiscard]] virtual std::string place() const = 0;  // for Journal::open()
+  // As somebody who goes round the journal. False: the tables themselves refuse it.
+  [[nodiscard]] virtual bool execute(const std::string& sql) = 0;
+  // SQL that makes it one of another version, and one whose event table may be changed.
+  [[nodiscard]] virtual std::string another_version() const = 0;
+  [[nodiscard]] virtual std::string unguarded() const = 0;
+};
+using MakeStore = std::unique_ptr<Store> (*)();
+
+class FileStore final : public Store {
+ public:
+  [[nodiscard]] static std::unique_ptr<Store> make() { return std::make_unique<FileStore>(); }
+  [[nodiscard]] std::string place() const override { return folder_ / "day.db"; }
+  [[nodiscard]] bool execute(const std::string& sql) override {
+    sqlite3* database = nullptr;
+    EXPECT_EQ(sqlite3_open(place().c_str(), &database), SQLITE_OK);
+    const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr);
+    EXPECT_TRUE(code == SQLITE_OK || (code & 0xff) == SQLITE_CONSTRAINT) << sqlite3_errmsg(database);
+    sqlite3_close(database);
+    return code == SQLITE_OK;
+  }
+  [[nodiscard]] std::string another_version() const override { return "PRAGMA user_version = 99"; }
+  [[nodiscard]] std::string unguarded() const override { return "DROP TRIGGER event_stays"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+// What every journal does, wherever it lies. Instantiated where its stores are.
+class AnyJournal : public testing::TestWithParam<MakeStore> {
+ protected:
+  [[nodiscard]] std::unique_ptr<Journal> open() const {
+    auto journal = Journal::open(place());
+    EXPECT_TRUE(journal) << journal.error().line();
+    return std::move(*journal);
+  }
+  [[nodiscard]] std::string refusal() const {
+    const auto journal = Journal::open(place());
+    EXPECT_FALSE(journal);
+    return journal ? "" : journal.error().line();
+  }
+  [[nodiscard]] std::string place() const { return store_->place(); }
+
+  std::unique_ptr<Store> store_ = GetParam()();
+};
+
 class JournalTest : public testing::Test {
  protected:
   [[nodiscard]] std::unique_ptr<Journal> open() const {

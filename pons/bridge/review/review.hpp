@@ -25,8 +25,8 @@ class Review {
   // `skills` must outlive it and must not change. `resources` are those of the world.
   Review(const task::SkillRegistry& skills, std::vector<std::string> resources);
 
-  // The trees of the world, from the XML files of a folder. Errors: as of Library::load().
-  [[nodiscard]] Expected<void> load_trees(const std::filesystem::path& folder) { return trees_.load(folder); }
+  // The trees that tasks may name.
+  void use_trees(tree::Library trees) { trees_ = std::move(trees); }
 
   // Asked in the order of their adding, after the built-in checks.
   void add(Reviewer reviewer);

@@ -54,6 +54,12 @@ std::optional<Value> status_of(std::string_view text) {
   return std::int64_t{std::to_underlying(found->second)};
 }
 
+// Its children, while they run.
+bool may_halt(Kind kind) {
+  return kind == Kind::kReactiveSequence || kind == Kind::kReactiveFallback || kind == Kind::kParallel ||
+         kind == Kind::kParallelAll || kind == Kind::kWhileDoElse || kind == Kind::kSwitch || kind == Kind::kTimeout;
+}
+
 class Compiler {
  public:
   Compiler(const Document& document, const task::SkillRegistry& skills) : document_(document), skills_(skills) {}
@@ -70,6 +76,7 @@ class Compiler {
     std::map<std::string, std::int32_t, std::less<>> own;
   };
 
+  void tell_differences(const Element& element, const Node& node);
   Expected<void> tree(std::string_view id, std::int32_t scope, const std::string& where);
   Expected<void> node(const Element& element, std::int32_t scope);
   Expected<void> subtree(const Element& element, std::int32_t scope);
@@ -93,6 +100,9 @@ class Compiler {
   std::vector<Scope> scopes_;
   std::vector<std::string> within_;  // the trees that this one stands in
   std::size_t depth_ = 0;
+  int halting_ = 0;  // so many of the nodes above may halt this one
+  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8 };
+  int told_ = 0;
 };
 
 Expected<std::shared_ptr<const Program>> Compiler::compile(std::string_view main) {
@@ -151,6 +161,9 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
   program_.nodes.push_back({.kind = info != nullptr ? info->kind : Kind::kSkill});
   Node made = program_.nodes.back();
   made.children = static_cast<std::int32_t>(element.children.size());
+  tell_differences(element, made);
+  const bool halts = may_halt(made.kind) || element.attribute("_while") != nullptr;
+  halting_ += halts ? 1 : 0;
   if (auto done = conditions(element, scope, made); !done) return done;
   const auto fewest = info != nullptr ? info->fewest_children : 0, most = info != nullptr ? info->most_children : 0;
   if (made.children < fewest || made.children > most) {
@@ -173,10 +186,30 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
     }
   }
   --depth_;
+  halting_ -= halts ? 1 : 0;
   made.end = static_cast<std::int32_t>(program_.nodes.size());
   stir(program_.fingerprint, "end");
   program_.nodes[index] = made;
   return done;
+}
+
+// Each the first time.
+void Compiler::tell_differences(const Element& element, const Node& node) {
+  const auto tell = [&](Told what, std::string_view text) {
+    if ((std::exchange(told_, told_ | what) & what) == 0)
+      program_.differences.push_back(fmt::format("{}: {}", element.where, text));
+  };
+  if (node.kind == Kind::kSkill && halting_ > 0)
+    tell(kSkill,
+         "a skill that a node above halts leaves the world safe first, while the tree goes on; what needs the same "
+         "waits");
+  if (node.kind == Kind::kTimeout || node.kind == Kind::kDelay || node.kind == Kind::kSleep)
+    tell(kTime, "time stands while the task is paused, and while the robot is stopped");
+  if (node.kind == Kind::kPrecondition && halting_ > 0)
+    tell(kPrecondition, "a Precondition that was halted asks its condition anew; there it goes on as if that held");
+  const auto asynchronous = std::ranges::count(element.children, "AsyncSequence", &Element::tag);
+  if (node.kind == Kind::kReactiveSequence && asynchronous > 1)
+    tell(kReactive, "more than one AsyncSequence in a ReactiveSequence; BehaviorTree.CPP refuses that");
 }
 
 // ---- blackboards ----

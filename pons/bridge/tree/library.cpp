@@ -26,9 +26,8 @@ Expected<void> Library::load(const fs::path& folder) {
       // What another file includes is that file's as well.
       const auto [known, added] = files_of.emplace(name, root.where);
       if (!added && known->second == root.where) continue;
-      if (!added)
-        return fail(fmt::format("there are two trees '{}'", task::excerpt(name)), root.where, "rename one");
-      auto program = compile(*document, name, skills_);
+      if (!added) return fail(fmt::format("there are two trees '{}'", task::excerpt(name)), root.where, "rename one");
+      auto program = compile(*document, name, *skills_);
       if (!program) return std::unexpected(program.error());
       programs.emplace(name, *std::move(program));
     }
@@ -60,7 +59,7 @@ Expected<std::shared_ptr<const Program>> Library::program(const task::TreeReques
   } else {
     const auto document = read_document(request.xml, "/tree/xml");
     if (!document) return std::unexpected(document.error());
-    auto compiled = compile(*document, request.name, skills_);
+    auto compiled = compile(*document, request.name, *skills_);
     if (!compiled) return compiled;
     program = *std::move(compiled);
   }

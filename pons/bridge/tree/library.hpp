@@ -17,7 +17,7 @@ namespace pons::bridge::tree {
 class Library {
  public:
   // `skills` must outlive it and must not change.
-  explicit Library(const task::SkillRegistry& skills) : skills_(skills) {}
+  explicit Library(const task::SkillRegistry& skills) : skills_(&skills) {}
 
   // Every *.xml in it; a folder that does not exist holds none. Errors: of a document, of a tree that cannot run, one
   // name twice; then it holds what it held. Else this takes the place of what was loaded before.
@@ -32,7 +32,7 @@ class Library {
   [[nodiscard]] Expected<std::shared_ptr<const Program>> program(const task::TreeRequest& request) const;
 
  private:
-  const task::SkillRegistry& skills_;
+  const task::SkillRegistry* skills_;
   std::map<std::string, std::shared_ptr<const Program>, std::less<>> programs_;
 };
 

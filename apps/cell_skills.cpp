@@ -1,0 +1,28 @@
+#include "apps/cell_skills.hpp"
+
+#include <utility>
+
+#include "apps/paths.hpp"
+#include "apps/policies.hpp"
+#include "pons/model/robot_model.hpp"
+
+namespace pons::apps {
+
+Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) {
+  const auto folder = worlds_folder();
+  const std::vector<std::string> names = world::list(folder);
+  if (names.empty()) return fail("no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds");
+  auto world = world::load(folder, name.empty() ? names.front() : name);
+  if (!world) return std::unexpected(world.error());
+  auto model = model::RobotModel::load(world->robot);
+  if (!model) return std::unexpected(model.error());
+  auto self = std::make_unique<CellSkills>();
+  self->world = *std::move(world);
+  self->link = std::make_unique<link::Link>();
+  self->end = std::make_unique<link::BridgeEnd>(*self->link);
+  self->cell = std::make_unique<skills::Cell>(*self->end, self->world, std::move(*model));
+  skills::add_skills(self->registry, *self->cell, policy_names());
+  return self;
+}
+
+}  // namespace pons::apps

@@ -1,0 +1,56 @@
+#include "pons/bridge/journal/book_end.hpp"
+
+#include <array>
+
+#include "pons/bridge/journal/layout.hpp"
+
+namespace pons::bridge {
+
+Expected<BookEnd> BookEnd::open(Database& database) {
+  if (auto there = ensure_book(database); !there) return std::unexpected(there.error());
+  BookEnd end(database.name());
+  // What another bridge is about to take is as good as taken: who waited for it would hold up its own robot. The locked
+  // rows come first, by themselves: no plan can lock more than it takes.
+  const std::array<std::pair<Statement*, std::string_view>, 3> statements{{
+      {&end.waits_, "SELECT 1 FROM pons.book WHERE claimed_by IS NULL LIMIT 1"},
+      {&end.claim_,
+       "WITH free AS MATERIALIZED (SELECT number FROM pons.book WHERE claimed_by IS NULL "
+       "ORDER BY priority DESC, number LIMIT ?2 FOR UPDATE SKIP LOCKED), "
+       "mine AS (UPDATE pons.book b SET claimed_by = ?1, claimed = clock_timestamp() FROM free "
+       "WHERE b.number = free.number RETURNING b.number, b.priority, b.id, b.body) "
+       "SELECT id, body FROM mine ORDER BY priority DESC, number"},
+      {&end.close_,
+       "UPDATE pons.book SET outcome = ?1, reason = ?2, ended = clock_timestamp() "
+       "WHERE id = ?3 AND claimed_by = ?4 AND outcome IS NULL"},
+  }};
+  for (const auto& [statement, sql] : statements) {
+    auto prepared = database.prepare(sql);
+    if (!prepared) return std::unexpected(prepared.error());
+    *statement = std::move(*prepared);
+  }
+  return end;
+}
+
+Expected<bool> BookEnd::waits() {
+  const auto found = waits_.run_for_integer();
+  if (!found) return std::unexpected(found.error());
+  return *found == 1;
+}
+
+Expected<std::vector<Order>> BookEnd::claim(std::size_t most) {
+  Reading reading(claim_);
+  claim_.bind(bridge_).bind(static_cast<std::int64_t>(most));
+  std::vector<Order> orders;
+  for (;;) {
+    const auto row = claim_.step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return orders;
+    orders.push_back({claim_.text(0), claim_.text(1)});
+  }
+}
+
+Expected<void> BookEnd::close(std::string_view id, task::Outcome outcome, std::string_view reason) {
+  return close_.bind(task::name(outcome)).bind(reason).bind(id).bind(bridge_).run();
+}
+
+}  // namespace pons::bridge

@@ -1,0 +1,51 @@
+// What a bridge does with the order book that it shares with others.
+#include "pons/bridge/bridge.hpp"
+
+namespace pons::bridge {
+namespace {
+
+constexpr Duration kLookPeriod = std::chrono::milliseconds(100);
+// What one bridge has claimed no other can run: it takes little more than it can begin.
+constexpr std::size_t kAhead = 4;
+
+constexpr std::string_view kOrderRefusedEvent = "order_refused";  // {"id","reason"}
+
+}  // namespace
+
+void Bridge::take_orders(Time now) {
+  const bool may = !fault_ && !stopping_ && !emergency_ && !held();
+  if (!may || now < look_at_) return;
+  look_at_ = now + kLookPeriod;
+  const std::size_t waiting = arbiter_.queue_length();
+  if (waiting >= kAhead || open_.size() + kAhead > kMaxOpen) return;
+  const auto orders = journal_.claim(kAhead - waiting);
+  if (!orders) {
+    set_fault(orders.error());
+    return;
+  }
+  for (const Order& order : *orders) take_order(order, now);
+}
+
+// Claimed, it is this bridge's whatever comes of it: the claim becomes durable with what is written here.
+void Bridge::take_order(const Order& order, Time now) {
+  unkept_ = true;
+  const auto admission = admit(order.body, now);
+  if (fault_) return;
+  if (!admission) {
+    const std::string why = admission.error().line();
+    keep(journal_.close_order(order.id, task::Outcome::kFailed, why));
+    note(kOrderRefusedEvent, {{"id", order.id}, {"reason", why}}, now, order.id);
+    return;
+  }
+  if (admission->accepted == Accepted::kNew) return;
+  // Somebody had sent the same to this bridge itself, where it may have ended.
+  const auto known = journal_.task(order.id);
+  if (!known) {
+    set_fault(known.error());
+  } else if (*known && (*known)->record.outcome) {
+    const OutcomeRecord& outcome = *(*known)->record.outcome;
+    keep(journal_.close_order(order.id, outcome.outcome, outcome.reason));
+  }
+}
+
+}  // namespace pons::bridge

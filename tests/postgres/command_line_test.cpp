@@ -1,0 +1,72 @@
+// What a person does with a journal and an order book in a database.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/run_pons.hpp"
+#include "tests/postgres/server.hpp"
+
+namespace pons::tests {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class CommandLine : public testing::Test {
+ protected:
+  // Whatever it prints, it prints no password.
+  static Finished pons(const std::vector<std::string>& arguments) {
+    const Finished finished = run_pons(arguments);
+    EXPECT_THAT(finished.out + finished.err, Not(HasSubstr(PostgresServer::kPassword)));
+    return finished;
+  }
+
+  PostgresServer& server_ = PostgresServer::instance();
+  std::string place_ = server_.place(server_.make_database());
+  Folder folder_;
+};
+
+TEST_F(CommandLine, ARunTakesOrdersAndItsJournalIsReadAsAFileIs) {
+  write_text(folder_ / "home.json", R"({"id":"home","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})");
+  write_text(folder_ / "fly.json", R"({"id":"odd","steps":[{"skill":"fly"}]})");
+  EXPECT_EQ(pons({"book", "submit", place_, folder_ / "home.json"}).out, "home: taken\n");
+  EXPECT_EQ(pons({"book", "submit", place_, folder_ / "home.json"}).out, "home: already taken\n");
+  EXPECT_EQ(pons({"book", "submit", place_, folder_ / "fly.json"}).code, 0) << "no sender knows every robot's skills";
+  EXPECT_THAT(pons({"book", "list", place_, "--open"}).out, HasSubstr("waiting"));
+
+  const std::vector<std::string> command{"run", "small_cell", "--parcels", "2", "--quiet", "--journal", place_};
+  const Finished run = pons(command);
+  EXPECT_EQ(run.code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("#small_cell\n")) << "named after its world";
+  const std::string orders = pons({"book", "list", place_}).out;
+  EXPECT_THAT(orders, testing::ContainsRegex("home +50 .* SUCCEEDED +small_cell"));
+  EXPECT_THAT(orders, testing::ContainsRegex("odd +50 .* FAILED +small_cell +/steps/0/skill: there is no skill 'fly'"));
+  EXPECT_EQ(pons({"book", "list", place_, "--open"}).out, "");
+  const Finished again = pons(command);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("holds an earlier run"));
+
+  const std::string journal = place_ + "#small_cell";
+  EXPECT_THAT(pons({"journal", "check", journal}).out, HasSubstr("whole: 3 tasks (3 succeeded"));
+  EXPECT_THAT(pons({"task", "list", "--journal", journal}).out, HasSubstr("home"));
+  EXPECT_THAT(pons({"task", "show", "home", "--journal", journal}).out, HasSubstr("attempt"));
+  EXPECT_THAT(pons({"task", "history", "odd", "--journal", journal}).out, HasSubstr("order_refused"));
+  EXPECT_THAT(pons({"journal", "compact", journal}).out, HasSubstr("events dropped"));
+  EXPECT_EQ(pons({"journal", "upgrade", journal}).code, 0);
+  EXPECT_EQ(pons({"journal", "check", journal}).code, 0);
+}
+
+TEST_F(CommandLine, WhatCannotBeIsSaid) {
+  EXPECT_THAT(pons({"journal", "check", place_ + "#nobody"}).err, HasSubstr("there is no such journal"));
+  EXPECT_THAT(pons({"journal", "compact", place_ + "#nobody"}).err, HasSubstr("there is no such journal"));
+  EXPECT_THAT(pons({"journal", "check", place_}).err, HasSubstr("no bridge is named"));
+  EXPECT_THAT(pons({"task", "list", "--journal", place_ + "x#cell"}).err, HasSubstr("does not exist"));
+  EXPECT_THAT(pons({"book", "list", place_}).err, HasSubstr("there is no order book"));
+  EXPECT_THAT(pons({"book", "list", folder_ / "day.db"}).err, HasSubstr("an order book lies in a PostgreSQL database"));
+  write_text(folder_ / "late.json", R"({"id":"a","deadline_s":9,"steps":[{"skill":"fly"}]})");
+  EXPECT_THAT(pons({"book", "submit", place_, folder_ / "late.json"}).err, HasSubstr("an order has no deadline"));
+  EXPECT_THAT(pons({"run", "small_cell", "--parcels", "1", "--journal", place_ + "#No"}).err,
+              HasSubstr("no name that a bridge can have"));
+}
+
+}  // namespace
+}  // namespace pons::tests
