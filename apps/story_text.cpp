@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "pons/bridge/journal/story.hpp"
+
 namespace pons::apps {
 namespace {
 
@@ -111,53 +113,37 @@ std::string stop(const Json& d) {
 std::string ended(const Json& d) {
   const std::string why = text(d, "reason");
   const auto detail = d.is_object() ? d.find("detail") : d.end();
+  const bool tree = detail != d.end() && detail->is_object() && detail->contains("blackboard");
+  const std::string left = tree ? "; blackboard " + detail->at("blackboard").dump() : "";
   const std::string stopped = detail != d.end() && detail->contains("stop") ? "; " + stop(*detail) : "";
-  return fmt::format("{}{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why, stopped);
-}
-
-// What it holds is for machines; --json shows it.
-std::string checkpoint(const Json& d) {
-  const auto clock = d.is_object() ? d.find("clock_ns") : d.end();
-  const bool known = clock != d.end() && clock->is_number();
-  return known ? fmt::format("of the tree, {:.3f} s on its way", 1e-9 * clock->get<double>()) : "of the tree";
+  return fmt::format("{}{}{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why, stopped, left);
 }
 
 std::string preempting(const Json& d) { return "for " + text(d, "by"); }
 
 std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
 
-const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {{"seen", seen},
-                                                                           {"accepted", accepted},
-                                                                           {"started", started},
-                                                                           {"attempt", attempt},
-                                                                           {"plan", plan},
-                                                                           {"motion", motion},
-                                                                           {"carries", carries},
-                                                                           {"ride", reason},
-                                                                           {"attempt_ended", attempt_ended},
-                                                                           {"resumed", step},
-                                                                           {"found_done", step},
-                                                                           {"cancelling", reason},
-                                                                           {"halting", reason},
-                                                                           {"pausing", reason},
-                                                                           {"paused", stop},
-                                                                           {"preempted", stop},
-                                                                           {"held", held},
-                                                                           {"preempting", preempting},
-                                                                           {"ended", ended},
-                                                                           {"checkpoint", checkpoint}};
+const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
+    {"seen", seen},       {"accepted", accepted}, {"started", started},
+    {"attempt", attempt}, {"plan", plan},         {"motion", motion},
+    {"carries", carries}, {"ride", reason},       {"attempt_ended", attempt_ended},
+    {"resumed", step},    {"found_done", step},   {"cancelling", reason},
+    {"halting", reason},  {"pausing", reason},    {"paused", stop},
+    {"preempted", stop},  {"held", held},         {"preempting", preempting},
+    {"ended", ended},     {"refused", reason}};
 
 }  // namespace
 
 std::string story_line(const Json& event) {
   const std::string kind = text(event, "kind");
+  if (kind == bridge::kCheckpointEvent) return {};
   const auto detail = event.is_object() ? event.find("detail") : event.end();
   const auto teller = kTellers.find(kind);
   std::string told;
   if (detail != event.end()) {
     told = teller != kTellers.end() ? teller->second(*detail) : (detail->empty() ? "" : detail->dump());
   }
-  return fmt::format("{:>10.3f} s  {:<14} {:<13} {}", number(event, "time_s"), text(event, "task"), kind, told);
+  return fmt::format("{:>10.3f} s  {:<14} {:<13} {}\n", number(event, "time_s"), text(event, "task"), kind, told);
 }
 
 }  // namespace pons::apps

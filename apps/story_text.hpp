@@ -7,7 +7,8 @@
 
 namespace pons::apps {
 
-// One line of `pons task history`, of an event as in journal_json.hpp.
+// One line of `pons task history` with its end, of an event as in journal_json.hpp; empty for what is only for
+// machines, as a tree's checkpoints are.
 [[nodiscard]] std::string story_line(const task::Json& event);
 
 }  // namespace pons::apps

@@ -99,6 +99,7 @@ int show(const TaskOptions& options) {
   if (!answer) return bad_input(answer.error());
   print_row(answer->at("task"));
   for (const Json& event : answer->at("events")) {
+    if (story_line(event).empty()) continue;
     fmt::print("  {:>10.3f} s  {:<12} {}\n", event.value("time_s", 0.0), event.value("kind", std::string{}),
                event.contains("detail") ? event.at("detail").dump() : "");
   }
@@ -113,7 +114,7 @@ int history(const TaskOptions& options) {
     fmt::print("{}\n", answer->at("events").dump(2));
     return kExitGood;
   }
-  for (const Json& event : answer->at("events")) fmt::print("{}\n", story_line(event));
+  for (const Json& event : answer->at("events")) fmt::print("{}", story_line(event));
   return kExitGood;
 }
 
@@ -125,7 +126,7 @@ Expected<std::string> follow(const TaskOptions& options, std::int64_t after, con
     if (!answer) return std::unexpected(answer.error());
     after = answer->at("after");
     for (const Json& event : answer->at("events")) {
-      fmt::print("{}\n", story_line(event));
+      fmt::print("{}", story_line(event));
       auto kind = event.value("kind", std::string{});
       if (event.value("task", std::string{}) == options.id && until.contains(kind)) return kind;
     }

@@ -18,8 +18,8 @@ using ::testing::Not;
 class Visitor : public ::testing::Test {
  protected:
   // While it sorts: the first line of progress comes as it begins.
-  void during_a_run(const std::function<void()>& visit) {
-    const Finished run = run_pons_and({"run", "small_cell", "--parcels", "8", "--seed", "3", "--lockstep", "--socket",
+  void during_a_run(const std::function<void()>& visit, const std::string& world = "small_cell") {
+    const Finished run = run_pons_and({"run", world, "--parcels", "8", "--seed", "3", "--lockstep", "--socket",
                                        folder_ / "s", "--journal", folder_ / "j.db", "--report", folder_ / "r.json"},
                                       1, [&](pid_t) { visit(); });
     EXPECT_EQ(run.code, 0) << run.err;
@@ -200,6 +200,40 @@ TEST_F(Visitor, HasTheToolGoAlongALine) {
   EXPECT_THAT(told, HasSubstr(R"("path":"line")"));
   EXPECT_THAT(show("far").out, HasSubstr("FAILED"));
   EXPECT_EQ(report_["limits"]["violations"], 0);
+}
+
+// Places one after the other, straight where that goes; what cannot be reached is told and passed over.
+TEST_F(Visitor, HasTheToolGoRoundAsATreeOfTheWorldSays) {
+  const auto patrol = [](const std::string& id, const std::string& places) {
+    return nlohmann::json{
+        {"id", id}, {"priority", 90}, {"tree", {{"name", "patrol"}, {"inputs", {{"places", places}}}}}}
+        .dump();
+  };
+  during_a_run(
+      [&] {
+        EXPECT_EQ(submit(patrol("round", "chute_1;chute_8")).out, "round: accepted\n");
+        EXPECT_EQ(submit(patrol("far", "chute_2;exception")).out, "far: accepted\n");
+        EXPECT_EQ(submit(patrol("lost", "atlantis")).out, "lost: accepted\n");
+        const Finished unknown = submit(R"({"id":"x","tree":{"name":"parade"}})");
+        EXPECT_THAT(unknown.err, HasSubstr("/tree/name: the world has no tree 'parade'; it has patrol, visit"));
+        const Finished sent = submit(nlohmann::json{
+            {"id", "x"},
+            {"tree",
+             {{"xml", R"(<root BTCPP_format="4"><BehaviorTree><move_to plaice="home"/></BehaviorTree></root>)"}}}}
+                                         .dump());
+        EXPECT_THAT(sent.err, HasSubstr("/tree/xml:1: the skill 'move_to' has no port 'plaice'"));
+      },
+      "parcel_cell");
+  const auto told = [&](const std::string& id) {
+    return run_pons({"task", "history", id, "--journal", folder_ / "j.db"}).out;
+  };
+  EXPECT_THAT(told("round"), AllOf(HasSubstr("SUCCEEDED; blackboard"), HasSubstr(R"("seen":2)"),
+                                   HasSubstr(R"("way_s")"), Not(HasSubstr("checkpoint"))));
+  EXPECT_THAT(told("far"), AllOf(HasSubstr("FAILED"), HasSubstr("the tree has failed at all reached"),
+                                 HasSubstr(R"("missed":" exception")"), HasSubstr(R"("seen":1)")));
+  EXPECT_THAT(told("lost"), AllOf(HasSubstr("refused"), HasSubstr("atlantis"), HasSubstr("FAILED")));
+  EXPECT_EQ(report_["parcels"]["lost"], 0);
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
 }
 
 // A stop that a person asked for lasts until that person resets and arms; meanwhile nothing rides by, for the belt

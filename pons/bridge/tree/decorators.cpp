@@ -53,7 +53,9 @@ NodeStatus Tree::forced(std::int32_t index, NodeStatus success, NodeStatus failu
   const NodeStatus status = tick_node(index + 1);
   if (!has_ended(status)) return status;
   reset_child(index);
-  return status == NodeStatus::kSuccess ? success : failure;
+  const NodeStatus forced = status == NodeStatus::kSuccess ? success : failure;
+  if (forced == NodeStatus::kFailure && status != forced) failed_ = index;
+  return forced;
 }
 
 NodeStatus Tree::passed_on(std::int32_t index) {
@@ -137,6 +139,7 @@ NodeStatus Tree::timeout(std::int32_t index) {
   } else if (*msec > 0 && elapsed(index, *msec) && this->state(index + 1).status == NodeStatus::kRunning) {
     state.on = false;
     reset_child(index);
+    failed_ = index;
     return NodeStatus::kFailure;
   }
   const NodeStatus status = tick_node(index + 1);
@@ -188,7 +191,10 @@ NodeStatus Tree::guarded(std::int32_t index) {
   if (!state.on) {
     const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
     if (!held) return broken(held.error());
-    if (!*held) return static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
+    if (!*held) {
+      failed_ = index;
+      return static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
+    }
     state.on = true;
   }
   const NodeStatus status = tick_node(index + 1);

@@ -114,6 +114,8 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   const auto what = this->step(step);
   if (!what) {
     failure_ = Progress{Status::kFailed, what.error().line(), Json::object()};
+    const task::Note note{"refused", {{"skill", use.type->name}, {"reason", failure_->reason}}};
+    (void)observer_({step, use.type->name, leaf.tries, nullptr, &note}, now_);
     return NodeStatus::kFailure;
   }
   ++leaf.tries;

@@ -85,7 +85,9 @@ Status Tree::ended(NodeStatus status) {
   if (status == NodeStatus::kBroken) {
     result_ = broken_.value_or(Progress{});
   } else if (status == NodeStatus::kFailure) {
-    result_ = failure_.value_or(Progress{Status::kFailed, "the tree has failed", Json::object()});
+    const bool by_skill = failure_ && failed_ >= 0 && node(failed_).kind == Kind::kSkill;
+    const std::string where = failed_ < 0 ? "" : " at " + program_->names[static_cast<std::size_t>(failed_)];
+    result_ = by_skill ? *failure_ : Progress{Status::kFailed, "the tree has failed" + where, Json::object()};
   } else {
     result_ = {Status::kSucceeded, status == NodeStatus::kSkipped ? "skipped" : "", Json::object()};
   }
@@ -115,6 +117,7 @@ NodeStatus Tree::tick_node(std::int32_t index) {
     if (!good) return NodeStatus::kBroken;
   }
   if (status != NodeStatus::kSkipped) state.status = status;
+  if (status == NodeStatus::kFailure && node.end == index + 1) failed_ = index;
   if (is_decorator(node.kind)) {
     NodeStatus& child = this->state(index + 1).status;
     if (child == NodeStatus::kSuccess || child == NodeStatus::kFailure) child = NodeStatus::kIdle;

@@ -180,6 +180,7 @@ class Tree {
   std::vector<std::vector<Value>> queues_;  // of the Loops that read one from the blackboard
   Progress result_;
   std::optional<Progress> broken_, failure_;  // why the tree was broken off; the last skill that failed
+  std::int32_t failed_ = -1;                  // the node that failed last by itself, not for its children
   std::optional<task::StopResult> stop_;      // of what was told to stop, the worst
   std::optional<NodeStatus> end_;             // the root's, while skills are left to end
   std::optional<Pause> pause_;

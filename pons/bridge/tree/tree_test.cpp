@@ -75,6 +75,23 @@ TEST_F(SkillsInATree, FallbackTellsWhyTheLastOneFailed) {
   EXPECT_EQ(saved->result().reason, "");
 }
 
+TEST_F(SkillsInATree, ItTellsWhichNodeHasFailedWhereNoSkillHas) {
+  for (const auto& [nodes, reason] :
+       {std::pair{
+            "<Sequence><ForceSuccess><bad/></ForceSuccess><ScriptCondition name=\"dry\" code=\"1 > 2\"/></Sequence>",
+            "the tree has failed at dry"},
+        std::pair{"<Inverter><good/></Inverter>", "the tree has failed at Inverter"},
+        std::pair{"<Timeout msec=\"50\"><Sleep msec=\"90\"/></Timeout>", "the tree has failed at Timeout"},
+        std::pair{"<Precondition if=\"false\"><good/></Precondition>", "the tree has failed at Precondition"},
+        std::pair{"<Sequence><Inverter><AlwaysSuccess/></Inverter><bad/></Sequence>",
+                  "the tree has failed at Inverter"},
+        std::pair{"<Fallback><AlwaysFailure/><bad/></Fallback>", "no"}}) {
+    const auto tree = tree_of(nodes);
+    EXPECT_EQ(run(*tree), Status::kFailed);
+    EXPECT_EQ(tree->result().reason, reason) << nodes;
+  }
+}
+
 TEST_F(SkillsInATree, OneIsTriedAgainWhenItSaysSoAndNothingElse) {
   Actor third("third", {{.end = ends(Status::kRetry, "a")}, {.end = ends(Status::kRetry, "b")}, {}});
   add(third, 3);
