@@ -186,7 +186,7 @@ NodeStatus Tree::run_once(std::int32_t index) {
 NodeStatus Tree::guarded(std::int32_t index) {
   State& state = this->state(index);
   if (!state.on) {
-    const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+    const auto held = script(node(index).index).holds(slots_);
     if (!held) return broken(held.error());
     if (!*held) return static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
     state.on = true;

@@ -36,7 +36,7 @@ NodeStatus Tree::leaf(std::int32_t index) {
 }
 
 NodeStatus Tree::script_condition(std::int32_t index) {
-  const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+  const auto held = script(node(index).index).holds(slots_);
   if (!held) return broken(held.error());
   return *held ? NodeStatus::kSuccess : NodeStatus::kFailure;
 }
@@ -71,7 +71,8 @@ NodeStatus Tree::skill(std::int32_t index) {
     waits_ = true;
     return NodeStatus::kRunning;
   }
-  if (state.status == NodeStatus::kIdle) leaf = {};
+  // Settled is also one whose start the checkpoint does not know yet.
+  if (state.status == NodeStatus::kIdle && !leaf.ended) leaf = {};
   state.status = NodeStatus::kRunning;
   if (!leaf.skill && !leaf.ended) {
     if (const auto instead = begin(step)) return *instead;

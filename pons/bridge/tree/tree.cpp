@@ -6,12 +6,16 @@
 #include <chrono>
 #include <utility>
 
+#include "pons/task/json_text.hpp"
+
 namespace pons::bridge::tree {
 namespace {
 
 // A node that yields is come back to in the same tick, as by tickOnce() there; so often, lest one that does nothing but
 // yield holds up the bridge.
 constexpr int kMostRounds = 100;
+// And not once more after so many nodes and operators, which take about 2 ms.
+constexpr std::size_t kMostWork = 20'000;
 
 }  // namespace
 
@@ -30,7 +34,7 @@ Tree::Tree(std::shared_ptr<const Program> program, Observer observer)
 Expected<void> Tree::set(std::string_view name, const Json& value) {
   const auto found = program_->root.find(name);
   if (found == program_->root.end())
-    return fail(fmt::format("the tree reads and writes no '{}'", name), {}, "leave it out");
+    return fail(fmt::format("the tree reads and writes no '{}'", task::excerpt(name)), {}, "leave it out");
   slot(found->second) = {value_of(value), 1, true};
   return {};
 }
@@ -58,10 +62,11 @@ Status Tree::tick(Time now) {
 
   auto status = NodeStatus::kRunning;
   waits_ = false;
+  work_ = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     wakes_ = false;
     status = tick_node(0);
-    if (status != NodeStatus::kRunning || !wakes_) break;
+    if (status != NodeStatus::kRunning || !wakes_ || work_ > kMostWork) break;
   }
   if (status == NodeStatus::kRunning && cancelled_ && active_.empty()) status = broken({"cancelled", {}, {}});
   if (status == NodeStatus::kRunning) return goes_on();
@@ -101,6 +106,7 @@ NodeStatus Tree::broken(Error error) {
 NodeStatus Tree::tick_node(std::int32_t index) {
   const Node& node = this->node(index);
   State& state = this->state(index);
+  ++work_;
   NodeStatus status;
   if (node.conditions < 0) [[likely]] {
     status = dispatch(index);
@@ -135,7 +141,7 @@ std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
   const Conditions& conditions = program_->conditions[static_cast<std::size_t>(node(index).conditions)];
   const NodeStatus status = state(index).status;
   const auto holds = [&](std::int32_t script) -> std::optional<bool> {
-    const auto result = program_->scripts[static_cast<std::size_t>(script)].holds(slots_);
+    const auto result = this->script(script).holds(slots_);
     if (result) return *result;
     (void)broken(result.error());
     return {};
@@ -158,9 +164,15 @@ std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
   return NodeStatus::kSkipped;
 }
 
+const Script& Tree::script(std::int32_t index) {
+  const Script& script = program_->scripts[static_cast<std::size_t>(index)];
+  work_ += script.size();
+  return script;
+}
+
 bool Tree::run_script(std::int32_t script) {
   if (script < 0) return true;
-  const auto result = program_->scripts[static_cast<std::size_t>(script)].run(slots_);
+  const auto result = this->script(script).run(slots_);
   if (!result) (void)broken(result.error());
   return result.has_value();
 }
@@ -254,7 +266,7 @@ const Value* Tree::value(const Port& port) {
 std::optional<std::int64_t> Tree::integer(std::int32_t index, std::int32_t which) {
   const Value* const given = value(port(node(index), which));
   const auto number = given != nullptr ? integer_of(*given) : std::nullopt;
-  if (!number || std::abs(*number) > INT32_MAX) {
+  if (!number || *number > INT32_MAX || *number < -INT32_MAX) {
     (void)broken(
         {fmt::format("{} is given {} where a whole number is needed", program_->names[static_cast<std::size_t>(index)],
                      given != nullptr ? kind_of(*given) : "nothing"),

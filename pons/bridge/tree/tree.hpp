@@ -109,12 +109,16 @@ class Tree {
   }
   [[nodiscard]] Slot& slot(std::int32_t index) { return slots_[static_cast<std::size_t>(index)]; }
 
-  [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;  // checkpoint.cpp
+  // checkpoint.cpp
+  [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;
+  [[nodiscard]] bool knows_end(std::int32_t index, const State& state) const;
+  [[nodiscard]] bool restore_end(const Json& checkpoint);
 
   // tree.cpp
   [[nodiscard]] NodeStatus tick_node(std::int32_t index);
   [[nodiscard]] NodeStatus dispatch(std::int32_t index);
   [[nodiscard]] std::optional<NodeStatus> precondition(std::int32_t index);
+  [[nodiscard]] const Script& script(std::int32_t index);
   [[nodiscard]] bool run_script(std::int32_t script);
   [[nodiscard]] NodeStatus broken(Error error);
   void halt_node(std::int32_t index);
@@ -183,7 +187,8 @@ class Tree {
   std::optional<NodeStatus> end_;             // the root's, while skills are left to end
   std::optional<Pause> pause_;
   Duration clock_{0};
-  Time now_;  // of the last tick
+  Time now_;              // of the last tick
+  std::size_t work_ = 0;  // of this tick, in nodes and operators
   bool ticked_ = false;
   bool wakes_ = false;   // a node wants another round in this tick
   bool waits_ = false;   // a leaf is to start a skill as soon as it can
