@@ -22,6 +22,7 @@ namespace pons::bridge::tree {
 
 inline constexpr std::size_t kMaxNodes = 20'000;  // SubTrees in full
 inline constexpr std::size_t kMaxSlots = 10'000;
+inline constexpr std::size_t kMaxTreeBytes = 2 * kMaxXmlBytes;  // of its attributes, SubTrees in full
 
 enum class NodeStatus : std::uint8_t {
   kIdle,
