@@ -77,6 +77,24 @@ TEST(TreeCheckpoint, TakenUpAgainEachTickItGoesOnAsIfNothingHadBeen) {
   }
 }
 
+TEST(TreeCheckpoint, HowOftenAnEntryWasWrittenAndWhatALoopHasLeftAreKept) {
+  for (const char* nodes : {
+           R"(<Sequence><SetBlackboard value="1" output_key="a"/><SetBlackboard value="1" output_key="a"/>
+              <Repeat num_cycles="2"><Sequence><Fallback><Sequence><WasEntryUpdated entry="a"/><Script code="n += 1"/>
+              </Sequence><AlwaysSuccess/></Fallback><LoopInt queue="1"><AlwaysSuccess/></LoopInt></Sequence>
+              </Repeat></Sequence>)",
+           R"(<Sequence><Script code="q := 'a;b;c'; log += ''"/><LoopString queue="{q}" value="{v}">
+              <Script code="log += v"/></LoopString></Sequence>)",
+       }) {
+    const Made program = compiled(in_document(nodes));
+    ASSERT_NE(program, nullptr);
+    const std::string whole = trace(program, Life::kOne);
+    EXPECT_EQ(trace(program, Life::kNewEachTick), whole);
+    const bool right = whole.find("\"n\":1") != whole.npos || whole.find("\"log\":\"abc\"") != whole.npos;
+    EXPECT_TRUE(right) << whole;
+  }
+}
+
 TEST(TreeCheckpoint, ItsTimeGoesOn) {
   const Made program =
       compiled(in_document("<Sequence><Sleep msec=\"100\"/><Timeout msec=\"50\"><Sleep msec=\"200\"/>"

@@ -232,6 +232,14 @@ TEST_F(Compiling, ATreeOfABillionNodesIsRefusedAtOnce) {
   EXPECT_TRUE(line.ends_with("the tree has more than 20000 nodes; divide it")) << line;
 }
 
+TEST_F(Compiling, TwentyThousandNodesAreATree) {
+  std::string children;
+  for (std::size_t i = 1; i < kMaxNodes; ++i) children += "<AlwaysSuccess/>";
+  const auto of = [](const std::string& nodes) { return in_document("<Sequence>" + nodes + "</Sequence>"); };
+  EXPECT_EQ(refusal(of(children)), "taken");
+  EXPECT_EQ(refusal(of(children + "<AlwaysSuccess/>")), "test:1: the tree has more than 20000 nodes; divide it");
+}
+
 TEST_F(Compiling, NodesAreInsideOneAnotherSoDeepOnly) {
   EXPECT_EQ(refusal(towering(255, 1, "", "<AlwaysSuccess/>")), "taken");
   const std::string line = refusal(towering(256, 1, "", "<AlwaysSuccess/>"));
