@@ -113,7 +113,7 @@ int model(const std::string& world) {
     fmt::print("    <Action ID=\"{}\">\n", name);
     const task::Json properties = type.schema.value("properties", task::Json::object());
     for (const auto& [port, schema] : properties.items()) {
-      const std::string about = schema.value("description", std::string{});
+      const std::string about = task::text_of(schema, "description");
       fmt::print("      <input_port name=\"{}\">{}</input_port>\n", port, escaped(about));
     }
     for (const std::string& port : type.outputs) fmt::print("      <output_port name=\"{}\"/>\n", port);

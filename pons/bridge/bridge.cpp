@@ -175,12 +175,13 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
     }
   }
   Json anew = Json::array();
-  for (const std::size_t leaf : story.trying()) {
-    if (leaf >= program->uses.size()) continue;
-    const auto step = tree->step(leaf);
-    if (!step) continue;  // the leaf itself will say so
+  for (const auto& [leaf, arguments] : story.trying()) {
+    if (!tree->under_way(leaf)) continue;
     Resumption what;
-    if (!story.handed_over()) what = resume({.id = task.id, .order = task.order, .steps = {*step}}, 0);
+    if (!story.handed_over()) {
+      const task::Step step{program->uses[leaf].type->name, arguments};
+      what = resume({.id = task.id, .order = task.order, .steps = {step}}, 0);
+    }
     if (what.outcome == task::Outcome::kException) {
       tree->settle(leaf, {task::Status::kException, what.reason, Json::object()});
     } else if (what.outcome && what.outcome != task::Outcome::kSucceeded) {
@@ -213,7 +214,7 @@ std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_
       std::move(program),
       [this, id = task.id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); });
   if (!task.tree) return tree;
-  // The review has seen that it knows them.
+  // The review has seen that the tree knows them.
   for (const auto& [name, value] : task.tree->inputs.items()) (void)tree->set(name, value);
   return tree;
 }
@@ -381,6 +382,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
   if (attempt.ended == nullptr) {
     if (fault_) return std::unexpected(*fault_);
     checkpoint(open, now);
+    if (open.program && attempt.arguments != nullptr) detail["arguments"] = *attempt.arguments;
     keep(journal_.event(id, now, kAttemptEvent, detail));
     // Before anything moves: whoever reads this after a crash must know what may have been moved, and what was done
     // before it.

@@ -191,9 +191,38 @@ TEST_F(TreesOfTasks, AfterACrashASkillThatNobodySawEndIsLookedAt) {
   EXPECT_THAT(audit(*journal_), testing::IsEmpty());
 }
 
+// The world is asked about what it was started with, whatever the blackboard holds now; what was halted is not asked
+// about at all.
+TEST_F(TreesOfTasks, AfterACrashItIsAskedWhatWasStartedNotWhatWouldBe) {
+  task::SkillType scan = aside_.type();
+  scan.name = "scan";
+  scan.resources = {};
+  skills_.add(scan);
+  reopen();
+  const std::string xml = R"(<root BTCPP_format="4"><BehaviorTree><Sequence>
+      <Parallel success_count="1"><Sequence><slow object="{code}"/></Sequence>
+        <Sequence><scan/><Script code="code := 'P2'"/><Sleep msec="200"/></Sequence></Parallel>
+      <scan/><place/></Sequence></BehaviorTree></root>)";
+  ASSERT_TRUE(submit_tree("T1", {{"xml", xml}, {"inputs", {{"code", "P1"}}}}));
+  tick(10);
+  std::vector<std::string> asked;
+  const auto look = [&](const task::Task& task, std::size_t done) {
+    asked.push_back(task.steps[0].skill + task.steps[0].arguments.dump());
+    return Resumption{.done = done};
+  };
+  recover(look);
+  EXPECT_THAT(asked, ElementsAre(R"(slow{"object":"P1"})"));
+  while (slow_.log.cancels == 0) tick();
+  asked.clear();
+  recover(look);  // it was leaving the world safe when the second scan began
+  EXPECT_THAT(asked, ElementsAre("scan{}"));
+  EXPECT_EQ(run().at(0).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(place_.log.started.size(), 1u);
+}
+
 // At each tick of its course in turn, and at each twice over.
 TEST_F(TreesOfTasks, WheneverTheBridgeDiesEachSkillIsDoneOnce) {
-  for (int moment = 1; moment < 70; moment += 3) {
+  for (int moment = 1; moment < 70; ++moment) {
     pick_.log.started.clear();
     place_.log.started.clear();
     const std::string id = fmt::format("M{}", moment);

@@ -76,12 +76,12 @@ class Skill {
 };
 
 struct SkillType {
-  std::string name;                      // "pick"
-  std::string summary;                   // one line for `pons skills`
-  Json schema;                           // JSON schema of the arguments
-  std::vector<std::string> resources;    // what it holds while it runs: "arm"
-  Duration timeout{0};                   // then it is cancelled and has failed
-  int attempts = 1;                      // how often it may be started when it says kRetry
+  std::string name;                       // "pick"
+  std::string summary;                    // one line for `pons skills`
+  Json schema;                            // JSON schema of the arguments
+  std::vector<std::string> resources;     // what it holds while it runs: "arm"
+  Duration timeout{0};                    // then it is cancelled and has failed
+  int attempts = 1;                       // how often it may be started when it says kRetry
   std::vector<std::string> outputs = {};  // what of the detail it succeeds with a tree may take up: "mass_kg"
   std::vector<std::string> safe_points;   // where a pause stops it, for a person to read
   std::function<std::unique_ptr<Skill>(const Json& arguments, Time now)> start;

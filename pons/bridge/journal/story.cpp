@@ -85,14 +85,16 @@ Expected<void> Story::take_attempt(const Event& event) {
   if (!started_) return impossible(event, "comes before it was started");
   if (is_tree_) {
     if (step == kNoStep) return impossible(event, "is of no leaf");
-    if (!trying_.insert(step).second) return impossible(event, fmt::format("comes while leaf {} goes on", step));
+    const auto arguments = event.detail.find("arguments");
+    if (!trying_.emplace(step, arguments != event.detail.end() ? *arguments : Json()).second)
+      return impossible(event, fmt::format("comes while leaf {} goes on", step));
     return {};
   }
   if (step >= steps_) return impossible(event, "is of a step that it does not have");
   if (step < done_) return impossible(event, fmt::format("starts step {} again, which has succeeded", step));
   if (step > done_) return impossible(event, fmt::format("starts step {} before step {} has succeeded", step, done_));
-  if (!trying_.empty()) return impossible(event, fmt::format("comes while step {} goes on", *trying_.begin()));
-  trying_.insert(step);
+  if (!trying_.empty()) return impossible(event, fmt::format("comes while step {} goes on", trying_.begin()->first));
+  trying_.emplace(step, Json());
   return {};
 }
 
@@ -121,6 +123,8 @@ Expected<void> Story::take_end(const Event& event) {
   if (*outcome == task::Outcome::kSucceeded && started_ && done_ < steps_) {
     return impossible(event, fmt::format("says SUCCEEDED after {} of {} steps", done_, steps_));
   }
+  if (*outcome == task::Outcome::kSucceeded && is_tree_ && !trying_.empty())
+    return impossible(event, fmt::format("says SUCCEEDED while leaf {} goes on", trying_.begin()->first));
   ended_ = true;
   return {};
 }

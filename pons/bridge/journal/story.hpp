@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 
@@ -50,8 +50,8 @@ class Story {
   [[nodiscard]] bool handed_over() const { return handed_over_; }
   // So many of its first steps have succeeded; of a tree, none.
   [[nodiscard]] std::size_t done() const { return done_; }
-  // The skills that run: a step, or leaves of a tree.
-  [[nodiscard]] const std::set<std::size_t>& trying() const { return trying_; }
+  // The skills that run, a step or leaves of a tree, with what they were started with; null where that was not told.
+  [[nodiscard]] const std::map<std::size_t, Json>& trying() const { return trying_; }
   // The last; null when there is none.
   [[nodiscard]] const Json& checkpoint() const { return checkpoint_; }
 
@@ -64,7 +64,7 @@ class Story {
 
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
-  std::set<std::size_t> trying_;
+  std::map<std::size_t, Json> trying_;
   Json checkpoint_;
   std::optional<std::string> ending_;
   std::int64_t sequence_ = 0, run_ = 0;

@@ -16,6 +16,7 @@ namespace {
 using task::excerpt;
 
 constexpr std::size_t kMostDepth = 256;  // nodes inside one another, through all SubTrees
+constexpr std::size_t kMostPath = 160;   // of a name for people: SubTrees are as deep as that
 
 constexpr std::array kConditionNames{
     std::pair{std::string_view("_failureIf"), &Conditions::failure_if},
@@ -54,10 +55,11 @@ std::optional<Value> status_of(std::string_view text) {
   return std::int64_t{std::to_underlying(found->second)};
 }
 
-// Its children, while they run.
-bool may_halt(Kind kind) {
-  return kind == Kind::kReactiveSequence || kind == Kind::kReactiveFallback || kind == Kind::kParallel ||
-         kind == Kind::kParallelAll || kind == Kind::kWhileDoElse || kind == Kind::kSwitch || kind == Kind::kTimeout;
+// Of "a/b/c/", only its end where it is long: each node has its own.
+std::string shortened(std::string path) {
+  if (path.size() <= kMostPath) return path;
+  const std::size_t cut = path.find('/', path.size() - kMostPath);
+  return "…" + path.substr(std::min(cut, path.size() - 1));
 }
 
 class Compiler {
@@ -90,6 +92,7 @@ class Compiler {
   Expected<std::int32_t> script(const std::string& text, std::int32_t scope, const std::string& where);
   Expected<std::int32_t> slot(std::int32_t scope, std::string_view name);
   Expected<std::int32_t> slot_of_port(std::int32_t scope, std::string_view name, const std::string& where);
+  Expected<void> charge(std::size_t bytes, const std::string& where);
   std::unexpected<Error> unknown(const Element& element) const;
 
   Scope& at(std::int32_t scope) { return scopes_[static_cast<std::size_t>(scope)]; }
@@ -103,6 +106,7 @@ class Compiler {
   int halting_ = 0;  // so many of the nodes above may halt this one
   enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8 };
   int told_ = 0;
+  std::size_t bytes_ = 0;
 };
 
 Expected<std::shared_ptr<const Program>> Compiler::compile(std::string_view main) {
@@ -132,6 +136,14 @@ Expected<void> Compiler::tree(std::string_view id, std::int32_t scope, const std
   return done;
 }
 
+// A long text in a tree that is there a thousand times is a thousand long texts.
+Expected<void> Compiler::charge(std::size_t bytes, const std::string& where) {
+  bytes_ += bytes;
+  if (bytes_ <= kMaxTreeBytes) return {};
+  return fail(fmt::format("the tree's attributes have more than {} bytes, SubTrees in full", kMaxTreeBytes), where,
+              "divide it");
+}
+
 std::unexpected<Error> Compiler::unknown(const Element& element) const {
   if (const auto why = why_not(element.tag); !why.empty())
     return fail(fmt::format("there is no node '{}' here", element.tag), element.where, std::string(why));
@@ -150,6 +162,7 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
   for (const auto& [name, value] : element.attributes) {
     stir(program_.fingerprint, name);
     stir(program_.fingerprint, value);
+    if (auto fits = charge(name.size() + value.size(), element.where); !fits) return fits;
   }
   const KindInfo* const info = find_kind(element.tag);
   const task::SkillType* const type = info == nullptr ? skills_.find(element.tag) : nullptr;
@@ -221,11 +234,16 @@ Expected<std::int32_t> Compiler::slot(std::int32_t scope, std::string_view name)
       return fail(fmt::format("'{}' is no name of an entry", excerpt(name)));
     return slot(0, name.substr(1));
   }
+  if (name.empty()) return fail("an entry has a name");
   Scope& here = at(scope);
   if (const auto own = here.own.find(name); own != here.own.end()) return own->second;
-  if (const auto remapped = here.remaps.find(name); remapped != here.remaps.end())
-    return slot(here.parent, remapped->second);
-  if (here.remaps_all && here.parent >= 0 && !name.starts_with('_')) return slot(here.parent, name);
+  const auto remapped = here.remaps.find(name);
+  const bool is_remapped = remapped != here.remaps.end();
+  if (is_remapped || (here.remaps_all && here.parent >= 0 && !name.starts_with('_'))) {
+    const auto found = slot(here.parent, is_remapped ? std::string_view(remapped->second) : name);
+    if (found) here.own.emplace(name, *found);  // the way is long where SubTrees are deep
+    return found;
+  }
   if (program_.entries.size() >= kMaxSlots)
     return fail(fmt::format("the blackboards have more than {} entries", kMaxSlots));
   const auto made = static_cast<std::int32_t>(program_.entries.size());
@@ -248,7 +266,7 @@ Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
   Scope inner;
   inner.parent = scope;
   const std::string* const name = element.attribute("name");
-  inner.path = fmt::format("{}{}/", at(scope).path, excerpt(name != nullptr ? *name : element.id));
+  inner.path = shortened(fmt::format("{}{}/", at(scope).path, excerpt(name != nullptr ? *name : element.id)));
   for (const auto& [key, value] : element.attributes) {
     if (key == "name" || key.starts_with('_')) continue;
     if (auto given = give(inner, key, value); !given) return given;
@@ -265,6 +283,7 @@ Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
         return fail(fmt::format("the port '{}' of '{}' is not given", excerpt(port.name), excerpt(element.id)),
                     element.where, "give it, or give it a default in <TreeNodesModel>");
       }
+      if (auto fits = charge(port.value->size(), element.where); !fits) return fits;
       if (auto given = give(inner, port.name, *port.value); !given) return given;
     }
   }
@@ -274,6 +293,8 @@ Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
 
 // A constant is the SubTree's own.
 Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::string& value) {
+  stir(program_.fingerprint, name);
+  stir(program_.fingerprint, value);
   if (const auto entry = entry_in(value, name); !entry.empty()) {
     inner.remaps.emplace(name, entry);
     return {};

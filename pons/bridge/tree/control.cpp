@@ -9,8 +9,6 @@
 namespace pons::bridge::tree {
 namespace {
 
-bool has_ended(NodeStatus status) { return status == NodeStatus::kSuccess || status == NodeStatus::kFailure; }
-
 // -1 is all of them, -2 all but one.
 std::int64_t threshold(std::int64_t given, std::int64_t children) {
   return given >= 0 ? given : std::max<std::int64_t>(children + given + 1, 0);

@@ -6,12 +6,6 @@
 #include "pons/bridge/tree/tree.hpp"
 
 namespace pons::bridge::tree {
-namespace {
-
-bool has_ended(NodeStatus status) { return status == NodeStatus::kSuccess || status == NodeStatus::kFailure; }
-
-}  // namespace
-
 NodeStatus Tree::decorator(std::int32_t index) {
   switch (node(index).kind) {
     case Kind::kInverter:
@@ -136,7 +130,8 @@ NodeStatus Tree::timeout(std::int32_t index) {
     state.on = true;
     state.stamp = clock_.count();
     state.status = NodeStatus::kRunning;
-  } else if (*msec > 0 && elapsed(index, *msec) && this->state(index + 1).status == NodeStatus::kRunning) {
+  } else if (*msec > 0 && elapsed(index, *msec) && this->state(index + 1).status == NodeStatus::kRunning &&
+             !skill_has_ended(index + 1)) {
     state.on = false;
     reset_child(index);
     failed_ = index;
@@ -189,11 +184,12 @@ NodeStatus Tree::run_once(std::int32_t index) {
 NodeStatus Tree::guarded(std::int32_t index) {
   State& state = this->state(index);
   if (!state.on) {
-    const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+    const auto held = script(node(index).index).holds(slots_);
     if (!held) return broken(held.error());
     if (!*held) {
-      failed_ = index;
-      return static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
+      const auto otherwise = static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
+      if (otherwise == NodeStatus::kFailure) failed_ = index;
+      return otherwise;
     }
     state.on = true;
   }

@@ -19,6 +19,37 @@ namespace fs = std::filesystem;
 // Tags that only say of what sort the node is that their ID names.
 constexpr std::array kSorts{"Action", "Condition", "Control", "Decorator"};
 
+// RFC 3629. Nor is a zero byte text: what comes behind it would not be read.
+bool is_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
+    const unsigned char lead = byte(i++);
+    if (lead == 0 || (lead >= 0x80 && lead < 0xC2) || lead > 0xF4) return false;
+    const std::size_t more = lead < 0x80 ? 0 : (lead < 0xE0 ? 1 : (lead < 0xF0 ? 2 : 3));
+    if (more > text.size() - i) return false;
+    if (more >= 2 && ((lead == 0xE0 && byte(i) < 0xA0) || (lead == 0xED && byte(i) > 0x9F) ||
+                      (lead == 0xF0 && byte(i) < 0x90) || (lead == 0xF4 && byte(i) > 0x8F)))
+      return false;
+    for (const std::size_t end = i + more; i < end; ++i) {
+      if ((byte(i) & 0xC0) != 0x80) return false;
+    }
+  }
+  return true;
+}
+
+// Finds an attribute that is no text once its references, like &#xD800;, are resolved.
+class NoText final : public tinyxml2::XMLVisitor {
+ public:
+  bool VisitEnter(const tinyxml2::XMLElement& element, const tinyxml2::XMLAttribute* attribute) override {
+    for (; attribute != nullptr; attribute = attribute->Next()) {
+      if (!is_utf8(attribute->Value())) line = element.GetLineNum();
+    }
+    return line == 0;
+  }
+
+  int line = 0;
+};
+
 class Reader {
  public:
   explicit Reader(fs::path folder) : folder_(std::move(folder)) {}
@@ -74,11 +105,16 @@ Expected<void> Reader::read_file(const fs::path& file) {
 Expected<void> Reader::read(std::string_view text, const std::string& where) {
   if (text.size() > kMaxXmlBytes)
     return fail(fmt::format("the text has {} bytes, {} are read", text.size(), kMaxXmlBytes), where, "divide it");
+  if (!is_utf8(text)) return fail("this is no UTF-8", where, "save it as UTF-8");
   tinyxml2::XMLDocument xml;
   if (xml.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     return fail(fmt::format("this is no XML: {}", task::excerpt(xml.ErrorStr(), 200)),
                 fmt::format("{}:{}", where, xml.ErrorLineNum()), "write it with Groot2, or look at that line");
   }
+  NoText no_text;
+  xml.Accept(&no_text);
+  if (no_text.line != 0)
+    return fail("a character that there is not", fmt::format("{}:{}", where, no_text.line), "look at its references");
   const tinyxml2::XMLElement* const root = xml.RootElement();
   if (root == nullptr || std::string_view(root->Name()) != "root")
     return fail("the outermost tag is not <root>", where, "write it as BehaviorTree.CPP 4 does");

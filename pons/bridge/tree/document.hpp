@@ -41,7 +41,7 @@ struct Document {
 };
 
 // `where` is what errors call the text. Errors: not XML, too long or too deep, another format than 4, a tag out of its
-// place, an attribute that is missing, a tree twice, an <include> (a text names no files).
+// place, an attribute that is missing, a tree twice, bytes that are no UTF-8, an <include> (a text names no files).
 [[nodiscard]] Expected<Document> read_document(std::string_view text, const std::string& where);
 // A file and what it includes, which must lie in the file's folder or below.
 [[nodiscard]] Expected<Document> read_document(const std::filesystem::path& file);

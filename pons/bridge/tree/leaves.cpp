@@ -8,6 +8,12 @@
 #include "pons/bridge/tree/tree.hpp"
 
 namespace pons::bridge::tree {
+namespace {
+
+// From one use of a leaf to its next: each start waits for the disk, and a skill may end as soon as it has begun.
+constexpr Duration kBetweenUses = std::chrono::milliseconds(100);
+
+}  // namespace
 
 NodeStatus Tree::leaf(std::int32_t index) {
   switch (node(index).kind) {
@@ -36,7 +42,7 @@ NodeStatus Tree::leaf(std::int32_t index) {
 }
 
 NodeStatus Tree::script_condition(std::int32_t index) {
-  const auto held = program_->scripts[static_cast<std::size_t>(node(index).index)].holds(slots_);
+  const auto held = script(node(index).index).holds(slots_);
   if (!held) return broken(held.error());
   return *held ? NodeStatus::kSuccess : NodeStatus::kFailure;
 }
@@ -67,12 +73,10 @@ NodeStatus Tree::skill(std::int32_t index) {
   const auto step = static_cast<std::size_t>(node(index).index);
   Leaf& leaf = leaves_[step];
   if (state.status != NodeStatus::kIdle && state.status != NodeStatus::kRunning) return state.status;
-  if (leaf.draining) {
-    waits_ = true;
-    return NodeStatus::kRunning;
-  }
-  if (state.status == NodeStatus::kIdle) leaf = {};
+  // Settled is also one whose start the checkpoint does not know yet.
+  if (state.status == NodeStatus::kIdle && !leaf.ended && !leaf.draining) leaf = {.began = leaf.began};
   state.status = NodeStatus::kRunning;
+  if (leaf.draining) return NodeStatus::kRunning;
   if (!leaf.skill && !leaf.ended) {
     if (const auto instead = begin(step)) return *instead;
   }
@@ -93,6 +97,10 @@ Expected<task::Step> Tree::step(std::size_t step) const {
   return task::Step{use.type->name, std::move(arguments)};
 }
 
+bool Tree::skill_has_ended(std::int32_t index) const {
+  return node(index).kind == Kind::kSkill && leaves_[static_cast<std::size_t>(node(index).index)].ended;
+}
+
 bool Tree::resources_free(std::size_t step) const {
   std::uint64_t used = 0;
   for (const std::size_t other : active_) used |= program_->uses[other].resources;
@@ -107,7 +115,9 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
     if (failure_ && !broken_) broken_ = failure_;
     return broken({"cancelled before it started", {}, {}});
   }
-  if (!resources_free(step)) {
+  if (broken_) return NodeStatus::kBroken;
+  if (!resources_free(step)) return NodeStatus::kRunning;
+  if (leaf.tries == 0 && leaf.began && clock_ - *leaf.began < kBetweenUses) {
     waits_ = true;
     return NodeStatus::kRunning;
   }
@@ -115,11 +125,12 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   if (!what) {
     failure_ = Progress{Status::kFailed, what.error().line(), Json::object()};
     const task::Note note{"refused", {{"skill", use.type->name}, {"reason", failure_->reason}}};
-    (void)observer_({step, use.type->name, leaf.tries, nullptr, &note}, now_);
+    (void)observer_({step, use.type->name, leaf.tries, nullptr, nullptr, &note}, now_);
     return NodeStatus::kFailure;
   }
-  ++leaf.tries;
-  if (auto told = observer_({step, use.type->name, leaf.tries}, now_); !told) return broken(told.error());
+  if (leaf.tries++ == 0) leaf.began = clock_;
+  if (auto told = observer_({step, use.type->name, leaf.tries, &what->arguments}, now_); !told)
+    return broken(told.error());
   stop_.reset();
   leaf.last = {};
   leaf.told_to_end = false;
@@ -180,7 +191,7 @@ void Tree::run_skill(std::size_t step, Duration passed) {
   if (leaf.told_to_end) leaf.ending += passed;
   Progress progress = leaf.skill->tick(now_);
   for (const task::Note& note : std::exchange(progress.notes, {}))
-    (void)observer_({step, use.type->name, leaf.tries, nullptr, &note}, now_);
+    (void)observer_({step, use.type->name, leaf.tries, nullptr, nullptr, &note}, now_);
   if (task::is_end(progress.status)) {
     end_skill(leaf, step, std::move(progress));
     return;
@@ -192,11 +203,19 @@ void Tree::run_skill(std::size_t step, Duration passed) {
 }
 
 void Tree::end_skill(Leaf& leaf, std::size_t step, Progress progress) {
-  (void)observer_({step, program_->uses[step].type->name, leaf.tries, &progress}, now_);
+  const std::string& name = program_->uses[step].type->name;
+  (void)observer_({step, name, leaf.tries, nullptr, &progress}, now_);
   if (progress.stop) stop_ = std::max(stop_.value_or(*progress.stop), *progress.stop);
-  leaf.skill.reset();
-  leaf.ended = !std::exchange(leaf.draining, false);
-  leaf.last = std::move(progress);
+  if (!leaf.draining) {
+    leaf.skill.reset();
+    leaf.ended = true;
+    leaf.last = std::move(progress);
+    return;
+  }
+  leaf = {.began = leaf.began};
+  // What it uses must not be given to the next.
+  if (progress.stop == task::StopResult::kFailed)
+    (void)broken({fmt::format("{} was told to stop, and moves", name), {}, {}});
 }
 
 // It goes on by itself until it has left the world safe.
@@ -208,6 +227,16 @@ void Tree::drain(std::size_t step) {
 }
 
 // ---- another process ----
+
+bool Tree::under_way(std::size_t step) const {
+  if (step >= leaves_.size() || leaves_[step].tries == 0) return false;
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    const Node& leaf = program_->nodes[i];
+    if (leaf.kind == Kind::kSkill && leaf.index == static_cast<std::int32_t>(step))
+      return states_[i].status == NodeStatus::kRunning && !leaves_[step].ended;
+  }
+  return false;
+}
 
 void Tree::settle(std::size_t step, Progress ended) {
   Leaf& leaf = leaves_[step];

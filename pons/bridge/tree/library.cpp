@@ -13,10 +13,14 @@ namespace fs = std::filesystem;
 
 Expected<void> Library::load(const fs::path& folder) {
   std::set<fs::path> files;
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(folder, none)) {
-    if (entry.path().extension() == ".xml") files.insert(entry.path());
+  std::error_code error;
+  if (fs::exists(folder, error)) {
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      if (entry->path().extension() == ".xml") files.insert(entry->path());
+    }
   }
+  // No answer is not "none": what is not there would end the tasks that name it.
+  if (error) return fail("the folder of trees cannot be read: " + error.message(), folder.string(), "mend its rights");
   decltype(programs_) programs;
   std::map<std::string, std::string> files_of;
   for (const fs::path& file : files) {

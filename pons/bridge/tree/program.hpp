@@ -22,6 +22,7 @@ namespace pons::bridge::tree {
 
 inline constexpr std::size_t kMaxNodes = 20'000;  // SubTrees in full
 inline constexpr std::size_t kMaxSlots = 10'000;
+inline constexpr std::size_t kMaxTreeBytes = 2 * kMaxXmlBytes;  // of its attributes, SubTrees in full
 
 enum class NodeStatus : std::uint8_t {
   kIdle,
@@ -31,6 +32,10 @@ enum class NodeStatus : std::uint8_t {
   kSkipped,
   kBroken,  // ends the whole tree, whatever is above: an exception, a script that went wrong, a task that is cancelled
 };
+
+[[nodiscard]] constexpr bool has_ended(NodeStatus status) {
+  return status == NodeStatus::kSuccess || status == NodeStatus::kFailure;
+}
 
 enum class Kind : std::uint8_t {
   // control
@@ -75,6 +80,11 @@ enum class Kind : std::uint8_t {
 };
 
 [[nodiscard]] constexpr bool is_decorator(Kind kind) { return kind >= Kind::kInverter && kind <= Kind::kSubTree; }
+// Its children, while they run.
+[[nodiscard]] constexpr bool may_halt(Kind kind) {
+  return kind == Kind::kReactiveSequence || kind == Kind::kReactiveFallback || kind == Kind::kParallel ||
+         kind == Kind::kParallelAll || kind == Kind::kWhileDoElse || kind == Kind::kSwitch || kind == Kind::kTimeout;
+}
 
 // What a node was given: a constant, or what a slot holds when it is read.
 struct Port {

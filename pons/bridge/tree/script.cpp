@@ -85,6 +85,12 @@ std::unexpected<Error> Script::wrong(std::string what) const {
   return fail(fmt::format("{} in the script '{}'", what, task::excerpt(text_, 120)));
 }
 
+Expected<Value> Script::joined(const std::string& left, const std::string& right) const {
+  if (left.size() + right.size() > kMaxTextBytes)
+    return wrong(fmt::format("a text would have more than {} bytes", kMaxTextBytes));
+  return left + right;
+}
+
 Expected<Value> Script::run(std::span<Slot> slots) const {
   Expected<Value> result{Value{}};
   for (const std::int32_t statement : statements_) {
@@ -170,7 +176,7 @@ Expected<Value> Script::binary(const Expression& expression, std::span<Slot> slo
   }
   const bool joins = expression.op == Operator::kJoin && (is_text(*left) || is_text(*right)) &&
                      (is_text(*left) || is_number(*left)) && (is_text(*right) || is_number(*right));
-  if (joins || (texts && expression.op == Operator::kPlus)) return to_text(*left) + to_text(*right);
+  if (joins || (texts && expression.op == Operator::kPlus)) return joined(to_text(*left), to_text(*right));
   return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(*left), kind_of(*right)));
 }
 
@@ -211,7 +217,8 @@ Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slo
     if (is_number(slot.value) && is_number(*given)) {
       given = calculate(op, number_of(slot.value), number_of(*given)).value_or(0);
     } else if (is_text(slot.value) && is_text(*given) && op == Operator::kAddTo) {
-      given = std::get<std::string>(slot.value) + std::get<std::string>(*given);
+      given = joined(std::get<std::string>(slot.value), std::get<std::string>(*given));
+      if (!given) return given;
     } else {
       return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(slot.value), kind_of(*given)));
     }

@@ -17,6 +17,9 @@
 
 namespace pons::bridge::tree {
 
+// Of a text that a script joins: one that doubles itself in a loop must not take all the memory there is.
+inline constexpr std::size_t kMaxTextBytes = 16 * 1024;
+
 enum class Operator : std::uint8_t {
   kLiteral,
   kVariable,
@@ -67,11 +70,13 @@ class Script {
   [[nodiscard]] static Expected<Script> parse(std::string_view text, const SlotOf& slot_of);
 
   // The value of its last statement. Error: a variable that does not exist or is not set, types that do not fit, a
-  // number that would lose digits in an entry that holds integers. What was assigned until then stays assigned.
-  // Allocates nothing but long texts.
+  // number that would lose digits in an entry that holds integers, a text that would be too long. What was assigned
+  // until then stays assigned. Allocates nothing but long texts.
   [[nodiscard]] Expected<Value> run(std::span<Slot> slots) const;
   // Likewise, as a truth value.
   [[nodiscard]] Expected<bool> holds(std::span<Slot> slots) const;
+  // How much there is to do.
+  [[nodiscard]] std::size_t size() const { return expressions_.size(); }
 
  private:
   class Parser;
@@ -80,6 +85,7 @@ class Script {
   [[nodiscard]] Expected<Value> unary(const Expression& expression, std::span<Slot> slots) const;
   [[nodiscard]] Expected<Value> compare(const Expression& expression, std::span<Slot> slots) const;
   [[nodiscard]] Expected<Value> assign(const Expression& expression, std::span<Slot> slots) const;
+  [[nodiscard]] Expected<Value> joined(const std::string& left, const std::string& right) const;
   [[nodiscard]] std::unexpected<Error> wrong(std::string what) const;
 
   std::vector<Expression> expressions_;

@@ -14,6 +14,8 @@ namespace pons::bridge::tree {
 namespace {
 
 constexpr int kMostNesting = 64;
+// 1 + 1 + 1 … is as deep as it is long to who evaluates it.
+constexpr int kMostOperators = 256;
 
 struct Token {
   enum class Kind : std::uint8_t { kEnd, kName, kNumber, kText, kSign };
@@ -153,6 +155,12 @@ class Script::Parser {
   }
 
   Index add(Expression made, std::string name = {}) {
+    int depth = 0;
+    for (const std::int32_t operand : {made.left, made.right, made.third}) {
+      if (operand >= 0) depth = std::max(depth, depths_[static_cast<std::size_t>(operand)] + 1);
+    }
+    if (depth > kMostOperators) return wrong(fmt::format("more than {} operators in one another", kMostOperators));
+    depths_.push_back(depth);
     script_.expressions_.push_back(std::move(made));
     script_.names_.push_back(std::move(name));
     return static_cast<std::int32_t>(script_.expressions_.size() - 1);
@@ -201,7 +209,7 @@ class Script::Parser {
     const auto slot = slot_of_(name);
     if (!slot) return std::unexpected(slot.error());
     if (auto next = advance(); !next) return std::unexpected(next.error());
-    return add({.op = Operator::kVariable, .slot = *slot}, std::string(name));
+    return add({.op = Operator::kVariable, .slot = *slot}, task::excerpt(name));
   }
   Index unary(Operator op, int depth) {
     if (auto next = advance(); !next) return std::unexpected(next.error());
@@ -232,12 +240,16 @@ class Script::Parser {
   // a < b <= c: each with its neighbour.
   Index comparison(std::int32_t first, int depth) {
     const Index chain = add({.op = Operator::kCompare, .left = first});
+    if (!chain) return chain;
     std::int32_t last = -1;
     for (const Infix* sign = infix(token_); sign != nullptr && sign->binds == kComparisons; sign = infix(token_)) {
       if (auto next = advance(); !next) return std::unexpected(next.error());
       const Index operand = expression(kComparisons + 1, depth + 1);
       if (!operand) return operand;
       const Index link = add({.op = sign->op, .left = *operand});
+      if (!link) return link;
+      int& deepest = depths_[static_cast<std::size_t>(*chain)];
+      deepest = std::max(deepest, depths_[static_cast<std::size_t>(*link)]);
       auto& before = script_.expressions_[static_cast<std::size_t>(last < 0 ? *chain : last)];
       (last < 0 ? before.right : before.third) = *link;
       last = *link;
@@ -248,6 +260,7 @@ class Script::Parser {
   std::string_view text_;
   const SlotOf& slot_of_;
   Script& script_;
+  std::vector<int> depths_;  // by expression
   Token token_;
   std::size_t next_ = 0;
 };

@@ -6,12 +6,16 @@
 #include <chrono>
 #include <utility>
 
+#include "pons/task/json_text.hpp"
+
 namespace pons::bridge::tree {
 namespace {
 
 // A node that yields is come back to in the same tick, as by tickOnce() there; so often, lest one that does nothing but
 // yield holds up the bridge.
 constexpr int kMostRounds = 100;
+// And not once more after so many nodes and operators, which take about 2 ms.
+constexpr std::size_t kMostWork = 20'000;
 
 }  // namespace
 
@@ -30,7 +34,7 @@ Tree::Tree(std::shared_ptr<const Program> program, Observer observer)
 Expected<void> Tree::set(std::string_view name, const Json& value) {
   const auto found = program_->root.find(name);
   if (found == program_->root.end())
-    return fail(fmt::format("the tree reads and writes no '{}'", name), {}, "leave it out");
+    return fail(fmt::format("the tree reads and writes no '{}'", task::excerpt(name)), {}, "leave it out");
   slot(found->second) = {value_of(value), 1, true};
   return {};
 }
@@ -54,25 +58,37 @@ Status Tree::tick(Time now) {
   clock_ += passed;
   run_skills(passed);
   if (end_) return active_.empty() ? ended(*end_) : Status::kRunning;
-  if (stands_ && active_.empty() && pause_ && !cancelled_) return Status::kPaused;
+  if (broken_) return broken_off();
+  // Nothing of it goes on until resume().
+  if (stands_ && pause_ && !cancelled_ && all_rest()) return Status::kPaused;
 
   auto status = NodeStatus::kRunning;
   waits_ = false;
+  work_ = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     wakes_ = false;
     status = tick_node(0);
-    if (status != NodeStatus::kRunning || !wakes_) break;
+    if (broken_ || status != NodeStatus::kRunning || !wakes_ || work_ > kMostWork) break;
   }
   if (status == NodeStatus::kRunning && cancelled_ && active_.empty()) status = broken({"cancelled", {}, {}});
+  if (broken_) return broken_off();
   if (status == NodeStatus::kRunning) return goes_on();
-  for (std::size_t step = 0; step < leaves_.size() && status == NodeStatus::kBroken; ++step) drain(step);
   end_ = status;
   return active_.empty() ? ended(status) : Status::kRunning;
 }
 
+Status Tree::broken_off() {
+  for (std::size_t step = 0; step < leaves_.size(); ++step) drain(step);
+  end_ = NodeStatus::kBroken;
+  return active_.empty() ? ended(*end_) : Status::kRunning;
+}
+
+bool Tree::all_rest() const {
+  return std::ranges::all_of(active_, [&](std::size_t step) { return leaves_[step].last.status == Status::kPaused; });
+}
+
 Status Tree::goes_on() {
-  const auto rests = [&](std::size_t step) { return leaves_[step].last.status == Status::kPaused; };
-  stands_ = pause_ && !waits_ && !wakes_ && std::ranges::all_of(active_, rests);
+  stands_ = pause_ && !cancelled_ && !waits_ && all_rest();
   if (!stands_) return Status::kRunning;
   result_ = {Status::kPaused, {}, Json::object()};
   result_.stop = task::StopResult::kConfirmed;
@@ -83,7 +99,7 @@ Status Tree::goes_on() {
 
 Status Tree::ended(NodeStatus status) {
   if (status == NodeStatus::kBroken) {
-    result_ = broken_.value_or(Progress{});
+    result_ = broken_.value_or(Progress{Status::kFailed, "broken off", Json::object()});
   } else if (status == NodeStatus::kFailure) {
     const bool by_skill = failure_ && failed_ >= 0 && node(failed_).kind == Kind::kSkill;
     const std::string where = failed_ < 0 ? "" : " at " + program_->names[static_cast<std::size_t>(failed_)];
@@ -103,6 +119,7 @@ NodeStatus Tree::broken(Error error) {
 NodeStatus Tree::tick_node(std::int32_t index) {
   const Node& node = this->node(index);
   State& state = this->state(index);
+  ++work_;
   NodeStatus status;
   if (node.conditions < 0) [[likely]] {
     status = dispatch(index);
@@ -138,7 +155,7 @@ std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
   const Conditions& conditions = program_->conditions[static_cast<std::size_t>(node(index).conditions)];
   const NodeStatus status = state(index).status;
   const auto holds = [&](std::int32_t script) -> std::optional<bool> {
-    const auto result = program_->scripts[static_cast<std::size_t>(script)].holds(slots_);
+    const auto result = this->script(script).holds(slots_);
     if (result) return *result;
     (void)broken(result.error());
     return {};
@@ -161,9 +178,15 @@ std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
   return NodeStatus::kSkipped;
 }
 
+const Script& Tree::script(std::int32_t index) {
+  const Script& script = program_->scripts[static_cast<std::size_t>(index)];
+  work_ += script.size();
+  return script;
+}
+
 bool Tree::run_script(std::int32_t script) {
   if (script < 0) return true;
-  const auto result = program_->scripts[static_cast<std::size_t>(script)].run(slots_);
+  const auto result = this->script(script).run(slots_);
   if (!result) (void)broken(result.error());
   return result.has_value();
 }
@@ -257,7 +280,7 @@ const Value* Tree::value(const Port& port) {
 std::optional<std::int64_t> Tree::integer(std::int32_t index, std::int32_t which) {
   const Value* const given = value(port(node(index), which));
   const auto number = given != nullptr ? integer_of(*given) : std::nullopt;
-  if (!number || std::abs(*number) > INT32_MAX) {
+  if (!number || *number > INT32_MAX || *number < -INT32_MAX) {
     (void)broken(
         {fmt::format("{} is given {} where a whole number is needed", program_->names[static_cast<std::size_t>(index)],
                      given != nullptr ? kind_of(*given) : "nothing"),

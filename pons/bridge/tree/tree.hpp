@@ -34,7 +34,8 @@ using task::Status;
 struct Attempt {
   std::size_t step = 0;  // which of the program's skill leaves, from 0
   std::string_view skill;
-  int number = 0;  // from 1
+  int number = 0;                   // from 1
+  const Json* arguments = nullptr;  // of one that starts
   const Progress* ended = nullptr;
   const task::Note* note = nullptr;
 };
@@ -74,7 +75,9 @@ class Tree {
   // Before the first tick. Leaves that were running start anew, but for those that settle() knows the end of. Error: it
   // is of another program, or damaged.
   [[nodiscard]] Expected<void> restore(const Json& checkpoint);
-  // What has become of the attempt that was under way at that leaf.
+  // Whether an attempt was under way at that leaf; one that had been halted is not.
+  [[nodiscard]] bool under_way(std::size_t step) const;
+  // What has become of it.
   void settle(std::size_t step, Progress ended);
   // What the leaf would start its skill with. Error: an argument is not set, or does not fit.
   [[nodiscard]] Expected<task::Step> step(std::size_t step) const;
@@ -96,8 +99,9 @@ class Tree {
     std::unique_ptr<task::Skill> skill;
     Progress last;
     int tries = 0;
-    Duration spent{0};   // since it began, pauses not counted
-    Duration ending{0};  // since it was told to end
+    std::optional<Duration> began;  // the last use, in the tree's time
+    Duration spent{0};              // since it began, pauses not counted
+    Duration ending{0};             // since it was told to end
     bool told_to_end = false, expired = false;
     bool draining = false;  // halted by a node above; what it comes to matters to nobody
     bool ended = false;     // `last` is its end, and waits for the tree to come by
@@ -110,12 +114,17 @@ class Tree {
   }
   [[nodiscard]] Slot& slot(std::int32_t index) { return slots_[static_cast<std::size_t>(index)]; }
 
-  [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;  // checkpoint.cpp
+  // checkpoint.cpp
+  [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;
+  [[nodiscard]] bool runs_skill(std::int32_t index) const;
+  [[nodiscard]] bool knows_end(std::int32_t index, const State& state) const;
+  [[nodiscard]] bool restore_end(const Json& checkpoint);
 
   // tree.cpp
   [[nodiscard]] NodeStatus tick_node(std::int32_t index);
   [[nodiscard]] NodeStatus dispatch(std::int32_t index);
   [[nodiscard]] std::optional<NodeStatus> precondition(std::int32_t index);
+  [[nodiscard]] const Script& script(std::int32_t index);
   [[nodiscard]] bool run_script(std::int32_t script);
   [[nodiscard]] NodeStatus broken(Error error);
   void halt_node(std::int32_t index);
@@ -124,6 +133,8 @@ class Tree {
   void reset_child(std::int32_t index) { halt_child(index + 1); }
   [[nodiscard]] Status ended(NodeStatus status);
   [[nodiscard]] Status goes_on();
+  [[nodiscard]] Status broken_off();
+  [[nodiscard]] bool all_rest() const;
   // Nothing: it could not be read, and the tree is broken.
   [[nodiscard]] std::optional<std::int64_t> integer(std::int32_t index, std::int32_t which);
   [[nodiscard]] const Value* value(const Port& port);
@@ -165,6 +176,8 @@ class Tree {
   [[nodiscard]] NodeStatus skill(std::int32_t index);
   [[nodiscard]] std::optional<NodeStatus> begin(std::size_t step);
   [[nodiscard]] NodeStatus skill_ended(std::size_t step);
+  // In this tick, and the tree has not come by yet.
+  [[nodiscard]] bool skill_has_ended(std::int32_t index) const;
   [[nodiscard]] bool resources_free(std::size_t step) const;
   void run_skills(Duration passed);
   void run_skill(std::size_t step, Duration passed);
@@ -185,7 +198,8 @@ class Tree {
   std::optional<NodeStatus> end_;             // the root's, while skills are left to end
   std::optional<Pause> pause_;
   Duration clock_{0};
-  Time now_;  // of the last tick
+  Time now_;              // of the last tick
+  std::size_t work_ = 0;  // of this tick, in nodes and operators
   bool ticked_ = false;
   bool wakes_ = false;   // a node wants another round in this tick
   bool waits_ = false;   // a leaf is to start a skill as soon as it can

@@ -210,6 +210,44 @@ TEST_F(SkillsInATree, ATreeHasNotEndedBeforeWhatItHaltedHas) {
   EXPECT_EQ(now_, at(0.10 + 0.07));
 }
 
+TEST_F(SkillsInATree, ALeafThatIsComeToAgainWhileItEndsBeginsAfresh) {
+  Actor late("late", {{.ticks = kForEver, .ticks_after_cancel = 5}, {.ticks = 30}});
+  add(late, 1, from_s(0.5));
+  const auto tree = tree_of(R"(<RetryUntilSuccessful num_attempts="2">
+      <Timeout msec="400"><late/></Timeout></RetryUntilSuccessful>)");
+  EXPECT_EQ(run(*tree), Status::kSucceeded) << tree->result().reason;
+  EXPECT_EQ(seen_, (Seen{"late1s", "late1e", "late1s", "late1e"}));
+}
+
+TEST_F(SkillsInATree, WhatHasEndedInTheTickInWhichItsTimeRunsOutIsDone) {
+  Actor close("close", {{.ticks = 11}});
+  add(close);
+  EXPECT_EQ(run(*tree_of(R"(<Timeout msec="100"><close/></Timeout>)")), Status::kSucceeded);
+}
+
+TEST_F(SkillsInATree, ASkillThatEndsAtOnceIsNotStartedInEveryTick) {
+  const auto tree = tree_of(R"(<RetryUntilSuccessful num_attempts="-1"><bad/></RetryUntilSuccessful>)");
+  EXPECT_EQ(run(*tree, 100), Status::kRunning);
+  EXPECT_EQ(bad_.log.started.size(), 10u) << "in a second";
+}
+
+TEST_F(SkillsInATree, NothingFollowsWhatWasToldToStopAndMoves) {
+  Actor loose("loose", {{.ticks = kForEver, .ticks_after_cancel = 3, .stop = task::StopResult::kFailed}});
+  add(loose);
+  const auto tree = tree_of(R"(<Fallback><Timeout msec="50"><loose/></Timeout><good/></Fallback>)");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "loose was told to stop, and moves");
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
+TEST_F(SkillsInATree, AScriptThatGoesWrongWhileItIsHaltedBreaksTheTree) {
+  const auto tree = tree_of(R"(<Fallback><Timeout msec="50"><Sleep msec="90" _onHalted="x = 1"/></Timeout>
+      <good/></Fallback>)");
+  EXPECT_EQ(run(*tree), Status::kFailed);
+  EXPECT_EQ(tree->result().reason, "there is no 'x' yet (':=' makes one) in the script 'x = 1'");
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
 // ---- cancel, halt ----
 
 TEST_F(SkillsInATree, CancelledItStartsNothingMore) {
@@ -301,6 +339,51 @@ TEST_F(SkillsInATree, APauseBetweenTwoIsTheNextOnes) {
   tree->pause(now_, Pause::kHandOver);
   EXPECT_EQ(tick(*tree), Status::kPaused);
   EXPECT_EQ(good_.log.pauses, std::vector{Pause::kHandOver});
+}
+
+TEST_F(SkillsInATree, PausedItStandsThoughALeafWaitsForWhatAnotherHolds) {
+  const auto tree = tree_of("<Parallel><slow/><good/></Parallel>");
+  (void)tick(*tree);
+  tree->pause(now_, Pause::kHandOver);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(tick(*tree), Status::kRunning);
+  EXPECT_EQ(tick(*tree), Status::kPaused);
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
+TEST_F(SkillsInATree, PausedItStandsThoughANodeAsksAllTheTime) {
+  const auto tree = tree_of(R"(<Sequence><Script code="n := 0"/><Parallel>
+      <RetryUntilSuccessful num_attempts="-1"><ScriptCondition code="(n += 1) &lt; 0"/></RetryUntilSuccessful>
+      <good/></Parallel></Sequence>)");
+  (void)tick(*tree);
+  tree->pause(now_, Pause::kHandOver);
+  EXPECT_EQ(tick(*tree), Status::kPaused);
+  const Json asked = tree->blackboard();
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(tick(*tree), Status::kPaused);
+  EXPECT_EQ(tree->blackboard(), asked) << "nothing of it goes on";
+  tree->resume(now_);
+  (void)tick(*tree);
+  EXPECT_NE(tree->blackboard(), asked);
+}
+
+TEST_F(SkillsInATree, OneThatStandsAndDoesNotEndWhenToldToIsOverdue) {
+  Actor deaf("deaf", {{.ticks = kForEver}});
+  task::SkillType type = deaf.type();
+  // Stands, whatever it is told.
+  class Stands final : public task::Skill {
+    Progress tick(Time) override { return {Status::kPaused}; }
+    void pause(Time, Pause) override {}
+    void resume(Time) override {}
+    void cancel(Time) override {}
+    void halt(Time) override {}
+  };
+  type.start = [](const Json&, Time) { return std::make_unique<Stands>(); };
+  skills_.add(type);
+  const auto tree = tree_of("<deaf/>");
+  tree->pause(now_, Pause::kStand);
+  EXPECT_EQ(tick(*tree), Status::kPaused);
+  tree->cancel(now_);
+  for (int i = 0; i < 500; ++i) EXPECT_EQ(tick(*tree), Status::kRunning);
+  EXPECT_TRUE(tree->overdue(from_s(4.9)));
 }
 
 TEST_F(SkillsInATree, PausedItsTimeStands) {

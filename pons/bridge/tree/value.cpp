@@ -50,7 +50,7 @@ std::string to_text(const Value& value) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return std::to_string(*integer);
   if (const auto* real = std::get_if<double>(&value)) return std::to_string(*real);
   if (const auto* text = std::get_if<std::string>(&value)) return *text;
-  if (const auto* json = std::get_if<Json>(&value)) return json->dump();
+  if (const auto* json = std::get_if<Json>(&value)) return json->dump(-1, ' ', false, Json::error_handler_t::replace);
   return {};
 }
 
