@@ -364,7 +364,8 @@ TEST(TreeTick, DoesNotAllocate) {
   const Made program = compiled(R"(<root BTCPP_format="4" main_tree_to_execute="Main"><BehaviorTree ID="Main">
     <Sequence><Script code="n := 0; m := 1.5; s := 'b'; many := 3"/>
     <KeepRunningUntilFailure><Parallel success_count="-1" failure_count="-1">
-      <Sequence><AlwaysSuccess/><SequenceWithMemory><Script code="n += 1"/><AlwaysSuccess/></SequenceWithMemory></Sequence>
+      <Sequence><AlwaysSuccess/><SequenceWithMemory><Script code="n += 1"/><AlwaysSuccess/></SequenceWithMemory>
+        </Sequence>
       <Fallback><AlwaysFailure/><ReactiveFallback><ScriptCondition code="n &lt; 0 || m == 0"/><AlwaysSuccess/>
         </ReactiveFallback></Fallback>
       <ReactiveSequence><ScriptCondition code="0 &lt;= n &lt; 1e9 &amp;&amp; s == 'b'"/><AlwaysSuccess

@@ -29,13 +29,13 @@ constexpr std::array kConditionNames{
     std::pair{std::string_view("_post"), &Conditions::post},
 };
 
-// The name in "{name}"; empty when it is none. "{=}" is the port's own.
+// The name in "{name}"; empty when it is none, but an object in JSON, say. "{=}" is the port's own.
 std::string_view entry_in(std::string_view text, std::string_view port) {
   const std::size_t first = text.find_first_not_of(' ');
   if (first == text.npos) return {};
   text = text.substr(first, text.find_last_not_of(' ') + 1 - first);
   if (text == "{=}" || text == "=") return port;
-  if (text.size() < 3 || text.front() != '{' || text.back() != '}') return {};
+  if (text.size() < 3 || text.front() != '{' || text.back() != '}' || text[1] == '"') return {};
   return text.substr(1, text.size() - 2);
 }
 

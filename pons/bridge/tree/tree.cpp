@@ -14,7 +14,7 @@ namespace {
 // A node that yields is come back to in the same tick, as by tickOnce() there; so often, lest one that does nothing but
 // yield holds up the bridge.
 constexpr int kMostRounds = 100;
-// And not once more after so many nodes and operators, which take about 2 ms.
+// And not once more after so many nodes and operators.
 constexpr std::size_t kMostWork = 20'000;
 
 }  // namespace
