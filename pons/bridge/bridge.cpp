@@ -76,7 +76,8 @@ Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Prog
     const auto& needs = skills_.find(step.skill)->resources;
     open->resources.insert(open->resources.end(), needs.begin(), needs.end());
   }
-  open->program = std::move(program);
+  // What thousands wait with need not be ready to run.
+  if (task.tree && task.tree->xml.empty()) open->program = std::move(program);
   open->accepted = accepted;
   open->waits_since = accepted - held_for_;
   open->priority = task.priority;
@@ -194,7 +195,8 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
     }
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", std::move(anew)}}));
-  Open& open = add_open(task, std::move(program), record.accepted);
+  Open& open = add_open(task, program, record.accepted);
+  open.program = std::move(program);
   open.tree = std::move(tree);
   open.begun = true;
   checkpoint(open, now);
@@ -291,6 +293,8 @@ void Bridge::start(Open& open, Time now) {
   if (!std::exchange(open.begun, true))
     keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
   if (!open.tree) {
+    // It was seen to be good when it was taken.
+    if (open.task.tree && !open.program) open.program = review_.program(open.task).value_or(nullptr);
     const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
                                        open.task.steps.end());
     open.tree = tree_of(open.task, open.program ? open.program : tree::program_of(left, skills_));

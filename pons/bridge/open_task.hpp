@@ -27,7 +27,7 @@ struct Bridge::Open {
   Time waits_since;      // it ages from then on, in the arbiter's time, which stands while nothing may start
   Time parked_at;        // in that time, too
   std::size_t done = 0;  // steps that an earlier bridge has seen succeed
-  std::shared_ptr<const tree::Program> program;  // of its tree; none of steps
+  std::shared_ptr<const tree::Program> program;  // of its tree, none of steps; of one sent along not before it starts
   std::vector<std::string> resources;
   std::unique_ptr<tree::Tree>
       tree;                // none before it was granted for the first time, but for one that was begun earlier

@@ -98,6 +98,10 @@ TEST_F(TreesOfTasks, WhatCannotRunIsRefusedWithALineThatHelps) {
   EXPECT_THAT(refusal({{"xml", R"(<root BTCPP_format="4"><include path="/etc/passwd"/></root>)"}}),
               HasSubstr("a tree that is sent names no files"));
   EXPECT_THAT(refusal(Json::object()), HasSubstr("neither a name nor its XML"));
+  std::string many = R"(<root BTCPP_format="4"><BehaviorTree><Sequence>)";
+  for (int i = 0; i < 2000; ++i) many += "<AlwaysSuccess/>";
+  EXPECT_EQ(refusal({{"xml", many + "</Sequence></BehaviorTree></root>"}}),
+            "/tree/xml: the tree has 2001 nodes, 2000 are taken; divide it, or give it to the world");
   world_.resources.clear();
   reopen();
   EXPECT_THAT(refusal({{"name", "sort"}}), HasSubstr("needs 'arm', which this world does not have"));

@@ -66,6 +66,10 @@ Expected<std::shared_ptr<const Program>> Library::program(const task::TreeReques
     auto compiled = compile(*document, request.name, *skills_);
     if (!compiled) return compiled;
     program = *std::move(compiled);
+    if (program->nodes.size() > kMaxSentNodes) {
+      return fail(fmt::format("the tree has {} nodes, {} are taken", program->nodes.size(), kMaxSentNodes), "/tree/xml",
+                  "divide it, or give it to the world");
+    }
   }
   for (const auto& [name, value] : request.inputs.items()) {
     if (!program->root.contains(name)) {

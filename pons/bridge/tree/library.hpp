@@ -14,6 +14,8 @@
 
 namespace pons::bridge::tree {
 
+inline constexpr std::size_t kMaxSentNodes = 2'000;  // of a tree that a task brings along, SubTrees in full
+
 class Library {
  public:
   // `skills` must outlive it and must not change.
@@ -27,8 +29,8 @@ class Library {
   // nullptr: there is none of that name.
   [[nodiscard]] std::shared_ptr<const Program> find(std::string_view name) const;
 
-  // The world's, or what is sent along. Errors: there is none of that name; of a document; of a tree that cannot run;
-  // an input that it does not know. They name the place in the task.
+  // The world's, or what is sent along. Errors: there is none of that name; of a document; of a tree that cannot run,
+  // or is too large; an input that it does not know. They name the place in the task.
   [[nodiscard]] Expected<std::shared_ptr<const Program>> program(const task::TreeRequest& request) const;
 
  private:
