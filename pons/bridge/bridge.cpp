@@ -16,6 +16,9 @@ namespace {
 // Events between the durable moments of a task may wait this long for the disk.
 constexpr Duration kCommitPeriod = std::chrono::seconds(5);
 
+// Of the skills that a task has used its outcome tells the last ones; a tree may go round for weeks.
+constexpr std::size_t kMostTold = 64;
+
 std::vector<std::string> names(const std::vector<world::Resource>& resources) {
   std::vector<std::string> result;
   for (const world::Resource& resource : resources) result.push_back(resource.name);
@@ -395,6 +398,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
     if (attempt.number > 1) ++retries_;
     return {};
   }
+  if (open.steps.size() >= kMostTold) open.steps.erase(0);
   open.steps.push_back(
       {{"skill", attempt.skill}, {"status", task::name(attempt.ended->status)}, {"detail", attempt.ended->detail}});
   detail["status"] = task::name(attempt.ended->status);

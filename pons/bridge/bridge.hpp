@@ -42,8 +42,9 @@ struct Admission {
 struct OutcomeReport {
   std::string id;
   task::Outcome outcome = task::Outcome::kFailed;
-  std::string reason;            // empty when it succeeded
-  Json detail = Json::object();  // {"attempts":…, "steps":[{"skill":…,"detail":…}]}
+  std::string reason;  // empty when it succeeded
+  // {"attempts":…, "steps":[{"skill":…,"status":…,"detail":…}] (the last 64), "stop":…, "blackboard":{…} (of a tree)}
+  Json detail = Json::object();
 };
 
 // What shall become of a task that a bridge which is no more had begun.

@@ -140,6 +140,19 @@ TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {
   EXPECT_EQ(pick_.log.started.size(), 1u) << "it went on, it did not begin anew";
 }
 
+TEST_F(TreesOfTasks, WhatGoesRoundForEverTellsTheLastOfIt) {
+  Actor swift("swift", {{.ticks = 1}});
+  skills_.add(swift.type());
+  reopen();
+  const std::string xml = R"(<root BTCPP_format="4"><BehaviorTree><Repeat num_cycles="100"><swift/></Repeat>
+      </BehaviorTree></root>)";
+  ASSERT_TRUE(submit_tree("T1", {{"xml", xml}}));
+  const auto reports = run();
+  EXPECT_EQ(reports.at(0).outcome, Outcome::kSucceeded);
+  EXPECT_EQ(reports[0].detail.at("attempts"), 100);
+  EXPECT_EQ(reports[0].detail.at("steps").size(), 64u);
+}
+
 // ---- after a crash ----
 
 TEST_F(TreesOfTasks, AfterACrashItGoesOnAtTheLastCompletedNode) {

@@ -86,10 +86,12 @@ std::optional<Value> number(std::string_view text) {
   }
   if (std::ranges::all_of(text, is_digit)) {
     std::int64_t integer = 0;
-    return std::from_chars(text.data(), end, integer).ec == std::errc() ? std::optional<Value>(integer) : std::nullopt;
+    return std::from_chars(text.data(), text.data() + text.size(), integer).ec == std::errc()
+               ? std::optional<Value>(integer)
+               : std::nullopt;
   }
   double real = 0;
-  const auto read = std::from_chars(text.data(), end, real);
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), real);
   const bool good = read.ec == std::errc() && read.ptr == end && text.back() != '.';
   return good ? std::optional<Value>(real) : std::nullopt;
 }

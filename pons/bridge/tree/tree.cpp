@@ -111,7 +111,7 @@ Status Tree::ended(NodeStatus status) {
   return result_.status;
 }
 
-NodeStatus Tree::broken(Error error) {
+NodeStatus Tree::broken(const Error& error) {
   if (!broken_) broken_ = Progress{Status::kFailed, error.line(), Json::object()};
   return NodeStatus::kBroken;
 }
@@ -120,7 +120,7 @@ NodeStatus Tree::tick_node(std::int32_t index) {
   const Node& node = this->node(index);
   State& state = this->state(index);
   ++work_;
-  NodeStatus status;
+  auto status = NodeStatus::kBroken;
   if (node.conditions < 0) [[likely]] {
     status = dispatch(index);
   } else {

@@ -126,7 +126,7 @@ class Tree {
   [[nodiscard]] std::optional<NodeStatus> precondition(std::int32_t index);
   [[nodiscard]] const Script& script(std::int32_t index);
   [[nodiscard]] bool run_script(std::int32_t script);
-  [[nodiscard]] NodeStatus broken(Error error);
+  [[nodiscard]] NodeStatus broken(const Error& error);
   void halt_node(std::int32_t index);
   void halt_child(std::int32_t index);
   void halt_children(std::int32_t index, std::int32_t but = -1);
