@@ -3,11 +3,12 @@
 // built against BehaviorTree.CPP, its figures for the same documents in turn with ours.
 
 #include <fmt/format.h>
-#include <stdio.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -24,6 +25,11 @@ constexpr double kBar_ns = 25;  // a node, in a Sequence of 30
 constexpr int kRuns = 7;
 constexpr int kNodesARun = 2'000'000;
 
+[[noreturn]] void die(const std::string& why) {
+  std::fprintf(stderr, "trees: error: %s\n", why.c_str());
+  std::exit(2);
+}
+
 double median(std::vector<double> values) {
   std::ranges::sort(values);
   return values[values.size() / 2];
@@ -38,8 +44,11 @@ std::string document(int nodes, const std::string& node) {
 
 double ns_a_node(const std::string& text, int nodes, int ticks) {
   const task::SkillRegistry none;
-  const auto program = tree::compile(tree::read_document(text, "bench").value(), "", none).value();
-  tree::Tree tree(program, [](const tree::Attempt&, Time) -> Expected<void> { return {}; });
+  const auto document = tree::read_document(text, "bench");
+  if (!document) die(document.error().line());
+  const auto program = tree::compile(*document, "", none);
+  if (!program) die(program.error().line());
+  tree::Tree tree(*program, [](const tree::Attempt&, Time) -> Expected<void> { return {}; });
   Time now;
   bool good = true;
   const auto begun = Clock::now();
@@ -48,7 +57,7 @@ double ns_a_node(const std::string& text, int nodes, int ticks) {
     good = tree.tick(now) == task::Status::kRunning && good;
   }
   const double ns = std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
-  if (!good) throw std::runtime_error("the tree has ended");
+  if (!good) die("the tree has ended");
   return ns / ticks / (nodes + 2);
 }
 
@@ -58,8 +67,7 @@ double peer_ns_a_node(const std::string& program, const std::string& node, int n
   FILE* const pipe = ::popen(command.c_str(), "r");
   double ns = 0;
   const bool read = pipe != nullptr && std::fscanf(pipe, "%lf", &ns) == 1;
-  if (pipe == nullptr || ::pclose(pipe) != 0 || !read)
-    throw std::runtime_error(command + " does not say what it takes");
+  if (pipe == nullptr || ::pclose(pipe) != 0 || !read) die(command + " does not say what it takes");
   return ns;
 }
 
@@ -87,34 +95,36 @@ void print(const Row& row) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"What a tick costs a node of a behaviour tree"};
-  std::string peer, csv;
-  bool gate = false;
-  app.add_option("--peer", peer, "bench/peers/trees_peer, built beside BehaviorTree.CPP");
-  app.add_option("--csv", csv, "Write the rows here as well");
-  app.add_flag("--gate", gate, fmt::format("Fail above {} ns a node in a Sequence of 30", kBar_ns));
-  CLI11_PARSE(app, argc, argv);
+  try {
+    CLI::App app{"What a tick costs a node of a behaviour tree"};
+    std::string peer, csv;
+    bool gate = false;
+    app.add_option("--peer", peer, "bench/peers/trees_peer, built beside BehaviorTree.CPP");
+    app.add_option("--csv", csv, "Write the rows here as well");
+    app.add_flag("--gate", gate, fmt::format("Fail above {} ns a node in a Sequence of 30", kBar_ns));
+    CLI11_PARSE(app, argc, argv);
 
-  const std::string succeed = "<AlwaysSuccess/>", condition = R"(<ScriptCondition code="1 &lt; 2"/>)";
-  const std::string head =
-      fmt::format("{:>7} {:>10}{}\n", "nodes", "ns a node", peer.empty() ? "" : "       peer    ratio");
-  fmt::print("A Sequence, median of {} runs\n{}", kRuns, head);
-  std::vector<Row> rows;
-  for (const int nodes : gate ? std::vector{30} : std::vector{10, 30, 100, 300, 1000, 3000, 10'000}) {
-    rows.push_back(measured(succeed, nodes, peer));
-    print(rows.back());
-  }
-  if (!csv.empty()) {
-    std::ofstream file(csv);
-    file << "nodes,ours_ns,peer_ns\n";
-    for (const Row& row : rows) file << fmt::format("{},{:.3f},{:.3f}\n", row.nodes, row.ours_ns, row.peer_ns);
-    if (!file.flush()) {
-      fmt::print(stderr, "trees: error: {} cannot be written\n", csv);
-      return 2;
+    const std::string succeed = "<AlwaysSuccess/>", condition = R"(<ScriptCondition code="1 &lt; 2"/>)";
+    const std::string head =
+        fmt::format("{:>7} {:>10}{}\n", "nodes", "ns a node", peer.empty() ? "" : "       peer    ratio");
+    fmt::print("A Sequence, median of {} runs\n{}", kRuns, head);
+    std::vector<Row> rows;
+    for (const int nodes : gate ? std::vector{30} : std::vector{10, 30, 100, 300, 1000, 3000, 10'000}) {
+      rows.push_back(measured(succeed, nodes, peer));
+      print(rows.back());
     }
+    if (!csv.empty()) {
+      std::ofstream file(csv);
+      file << "nodes,ours_ns,peer_ns\n";
+      for (const Row& row : rows) file << fmt::format("{},{:.3f},{:.3f}\n", row.nodes, row.ours_ns, row.peer_ns);
+      if (!file.flush()) die(csv + " cannot be written");
+    }
+    if (gate) return rows.front().ours_ns <= kBar_ns ? 0 : 1;
+    fmt::print("\nLikewise, of ScriptConditions\n{}", head);
+    print(measured(condition, 30, peer));
+    return 0;
+  } catch (const std::exception& failure) {
+    std::fprintf(stderr, "trees: error: %s\n", failure.what());
+    return 2;
   }
-  if (gate) return rows.front().ours_ns <= kBar_ns ? 0 : 1;
-  fmt::print("\nLikewise, of ScriptConditions\n{}", head);
-  print(measured(condition, 30, peer));
-  return 0;
 }
