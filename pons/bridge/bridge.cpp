@@ -56,8 +56,7 @@ Expected<Admission> Bridge::admit(std::string_view json, Time now) {
   if (!held) return std::unexpected(held.error());
   if (*held) return Admission{task->id, Accepted::kAlready};
   if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
-  if (auto good = review_.check(*task, now); !good) return std::unexpected(good.error());
-  auto program = review_.program(*task);
+  auto program = review_.check(*task, now);
   if (!program) return std::unexpected(program.error());
   if (open_.size() >= (task->priority < urgent_priority_ ? kMaxOpen : kMaxUrgent))
     return fail(fmt::format("{} tasks are open already", open_.size()), {}, "submit it again later");
@@ -102,9 +101,10 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
   for (const TaskRecord& record : *tasks) {
     if (record.outcome) continue;
     // Its skills and places are those of the program and the world that run now.
-    if (auto good = review_.check(record.task, record.accepted); !good) {
-      finish_unopened(record.task.id, task::Outcome::kFailed, good.error().line(), now);
-    } else if (auto taken = take_up(record, *review_.program(record.task), resume, now); !taken) {
+    auto program = review_.check(record.task, record.accepted);
+    if (!program) {
+      finish_unopened(record.task.id, task::Outcome::kFailed, program.error().line(), now);
+    } else if (auto taken = take_up(record, *std::move(program), resume, now); !taken) {
       return taken;
     }
   }

@@ -84,33 +84,35 @@ Expected<std::shared_ptr<const tree::Program>> Review::program(const task::Task&
   return trees_.program(*task.tree);
 }
 
-Expected<void> Review::check_tree(const task::Task& task) const {
-  const auto program = this->program(task);
-  if (!program) return std::unexpected(program.error());
-  task::Task constant = task;
-  for (const tree::SkillUse& use : (*program)->uses) {
-    if (auto good = check_resources(*use.type, "/tree/" + use.name); !good) return good;
-    if (use.bound.empty()) constant.steps.push_back({use.type->name, use.arguments});
-  }
+Expected<void> Review::ask_reviewers(const task::Task& task) const {
   for (const Reviewer& reviewer : reviewers_) {
-    if (auto good = reviewer(constant); !good) return good;
+    if (auto good = reviewer(task); !good) return good;
   }
   return {};
 }
 
-Expected<void> Review::check(const task::Task& task, Time now) const {
+Expected<void> Review::check_skills(const task::Task& task, const tree::Program& program) const {
+  task::Task constant = task;
+  for (const tree::SkillUse& use : program.uses) {
+    if (auto good = check_resources(*use.type, "/tree/" + use.name); !good) return good;
+    if (use.bound.empty()) constant.steps.push_back({use.type->name, use.arguments});
+  }
+  return ask_reviewers(constant);
+}
+
+Expected<std::shared_ptr<const tree::Program>> Review::check(const task::Task& task, Time now) const {
   for (std::size_t i = 0; i < task.steps.size(); ++i) {
-    if (auto good = check_step(task.steps[i], fmt::format("/steps/{}", i)); !good) return good;
+    if (auto good = check_step(task.steps[i], fmt::format("/steps/{}", i)); !good) return std::unexpected(good.error());
   }
   if (task.deadline && *task.deadline < now) {
     return fail(fmt::format("the deadline of {} s has passed, it is {} s now", task.deadline->s(), now.s()),
                 "/deadline_s", "name a later one, or none");
   }
-  if (task.tree) return check_tree(task);
-  for (const Reviewer& reviewer : reviewers_) {
-    if (auto good = reviewer(task); !good) return good;
-  }
-  return {};
+  auto program = this->program(task);
+  if (!program) return program;
+  const auto good = *program ? check_skills(task, **program) : ask_reviewers(task);
+  if (!good) return std::unexpected(good.error());
+  return program;
 }
 
 }  // namespace pons::bridge

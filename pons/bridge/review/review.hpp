@@ -35,13 +35,15 @@ class Review {
   [[nodiscard]] static Expected<task::Task> parse(std::string_view json);
   // Known skills (an unknown one is answered with the nearest name), each step's arguments against the skill's schema,
   // its resources against the world's, the deadline against `now`, then the reviewers. Of a tree: that it can be run.
-  [[nodiscard]] Expected<void> check(const task::Task& task, Time now) const;
-  // What the task's tree runs as; of steps nullptr. Error: the tree cannot be run.
+  // Returns what the tree runs as; of steps nullptr.
+  [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> check(const task::Task& task, Time now) const;
+  // Likewise, of a task that was checked before. Error: its tree cannot be run any more.
   [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> program(const task::Task& task) const;
 
  private:
   [[nodiscard]] Expected<void> check_resources(const task::SkillType& type, const std::string& where) const;
-  [[nodiscard]] Expected<void> check_tree(const task::Task& task) const;
+  [[nodiscard]] Expected<void> check_skills(const task::Task& task, const tree::Program& program) const;
+  [[nodiscard]] Expected<void> ask_reviewers(const task::Task& task) const;
   [[nodiscard]] Expected<void> check_step(const task::Step& step, const std::string& where) const;
 
   const task::SkillRegistry& skills_;

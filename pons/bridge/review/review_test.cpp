@@ -16,7 +16,8 @@ class ReviewTest : public testing::Test {
   [[nodiscard]] Expected<void> check(const std::string& steps, const std::string& rest = "") const {
     const auto task = Review::parse(R"({"id":"a","steps":)" + steps + rest + "}");
     if (!task) return std::unexpected(task.error());
-    return Review(skills_, {"arm"}).check(*task, at(5));
+    if (const auto good = Review(skills_, {"arm"}).check(*task, at(5)); !good) return std::unexpected(good.error());
+    return {};
   }
 
   Actor pick_{"pick", {{}}}, place_{"place", {{}}};

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cassert>
+#include <array>
 #include <utility>
 
 #include "pons/bridge/tree/node_kinds.hpp"

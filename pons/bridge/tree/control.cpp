@@ -16,11 +16,10 @@ std::int64_t threshold(std::int64_t given, std::int64_t children) {
 
 // As text, as integers, as numbers: whatever fits first.
 bool same(const Value& left, const Value& right) {
-  constexpr double kSame = std::numeric_limits<float>::epsilon();
   const std::string a = to_text(left), b = to_text(right);
   if (a == b) return true;
   const Value x = value_of_literal(a), y = value_of_literal(b);
-  return is_number(x) && is_number(y) && std::abs(number_of(x) - number_of(y)) <= kSame;
+  return is_number(x) && is_number(y) && same_number(number_of(x), number_of(y));
 }
 
 }  // namespace

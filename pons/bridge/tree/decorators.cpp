@@ -15,9 +15,9 @@ NodeStatus Tree::decorator(std::int32_t index) {
     case Kind::kForceFailure:
       return forced(index, NodeStatus::kFailure, NodeStatus::kFailure);
     case Kind::kRepeat:
-      return repeat(index);
+      return again(index, NodeStatus::kSuccess);
     case Kind::kRetry:
-      return retry(index);
+      return again(index, NodeStatus::kFailure);
     case Kind::kKeepRunning:
       return keep_running(index);
     case Kind::kTimeout:
@@ -60,57 +60,33 @@ NodeStatus Tree::passed_on(std::int32_t index) {
   return status;
 }
 
-NodeStatus Tree::repeat(std::int32_t index) {
+// Repeat, which goes on after SUCCESS, and RetryUntilSuccessful, after FAILURE. `count`: so often they did.
+NodeStatus Tree::again(std::int32_t index, NodeStatus goes_on) {
   State& state = this->state(index);
-  const auto cycles = integer(index, 0);
-  if (!cycles) return NodeStatus::kBroken;
+  auto times = integer(index, 0);
+  if (!times) return NodeStatus::kBroken;
   state.status = NodeStatus::kRunning;
-  while (state.count < *cycles || *cycles == -1) {
+  while (state.count < *times || *times == -1) {
     const bool fresh = this->state(index + 1).status == NodeStatus::kIdle;
     const NodeStatus status = tick_node(index + 1);
     if (status == NodeStatus::kRunning || status == NodeStatus::kBroken) return status;
     reset_child(index);
     if (status == NodeStatus::kSkipped) return status;
-    if (status == NodeStatus::kFailure) {
+    if (status != goes_on) {
       state.count = 0;
       return status;
     }
     if (state.count < INT32_MAX) ++state.count;
-    if (fresh && (state.count < *cycles || *cycles == -1)) {
+    // A child that failed may have changed how often it is tried; as there, one that succeeded may not.
+    if (goes_on == NodeStatus::kFailure) times = integer(index, 0);
+    if (!times) return NodeStatus::kBroken;
+    if (fresh && (state.count < *times || *times == -1)) {
       wakes_ = true;
       return NodeStatus::kRunning;
     }
   }
   state.count = 0;
-  return NodeStatus::kSuccess;
-}
-
-NodeStatus Tree::retry(std::int32_t index) {
-  State& state = this->state(index);
-  auto attempts = integer(index, 0);
-  if (!attempts) return NodeStatus::kBroken;
-  state.status = NodeStatus::kRunning;
-  while (state.count < *attempts || *attempts == -1) {
-    const bool fresh = this->state(index + 1).status == NodeStatus::kIdle;
-    const NodeStatus status = tick_node(index + 1);
-    if (status == NodeStatus::kRunning || status == NodeStatus::kBroken) return status;
-    reset_child(index);
-    if (status == NodeStatus::kSkipped) return status;
-    if (status == NodeStatus::kSuccess) {
-      state.count = 0;
-      return status;
-    }
-    if (state.count < INT32_MAX) ++state.count;
-    // The child may have changed it.
-    attempts = integer(index, 0);
-    if (!attempts) return NodeStatus::kBroken;
-    if (fresh && (state.count < *attempts || *attempts == -1)) {
-      wakes_ = true;
-      return NodeStatus::kRunning;
-    }
-  }
-  state.count = 0;
-  return NodeStatus::kFailure;
+  return goes_on;
 }
 
 NodeStatus Tree::keep_running(std::int32_t index) {

@@ -2,17 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <cassert>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge::tree {
 namespace {
-
-constexpr double kSame = std::numeric_limits<float>::epsilon();
 
 Value truth(bool holds) { return holds ? 1.0 : 0.0; }
 
@@ -194,7 +190,7 @@ Expected<Value> Script::compare(const Expression& expression, std::span<Slot> sl
     } else {
       const auto a = to_number(*left), b = to_number(*right);
       if (!a || !b) return wrong(fmt::format("{} cannot be compared with {}", kind_of(*left), kind_of(*right)));
-      holds = holds_of(link.op, *a, *b, std::abs(*a - *b) <= kSame);
+      holds = holds_of(link.op, *a, *b, same_number(*a, *b));
     }
     if (!holds) return truth(false);
     left = std::move(right);

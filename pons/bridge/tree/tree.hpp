@@ -155,8 +155,7 @@ class Tree {
   // decorators.cpp
   [[nodiscard]] NodeStatus decorator(std::int32_t index);
   [[nodiscard]] NodeStatus forced(std::int32_t index, NodeStatus success, NodeStatus failure);
-  [[nodiscard]] NodeStatus repeat(std::int32_t index);
-  [[nodiscard]] NodeStatus retry(std::int32_t index);
+  [[nodiscard]] NodeStatus again(std::int32_t index, NodeStatus goes_on);
   [[nodiscard]] NodeStatus keep_running(std::int32_t index);
   [[nodiscard]] NodeStatus timeout(std::int32_t index);
   [[nodiscard]] NodeStatus delay(std::int32_t index);

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 namespace pons::bridge::tree {
 namespace {
@@ -26,6 +27,8 @@ double number_of(const Value& value) {
   assert(real != nullptr);
   return real != nullptr ? *real : std::nan("");
 }
+
+bool same_number(double a, double b) { return std::abs(a - b) <= std::numeric_limits<float>::epsilon(); }
 
 std::optional<std::int64_t> integer_of(const Value& value) {
   if (const auto* integer = std::get_if<std::int64_t>(&value)) return *integer;

@@ -30,6 +30,8 @@ struct Slot {
 }
 // Of a number.
 [[nodiscard]] double number_of(const Value& value);
+// Within the epsilon of a float, as there.
+[[nodiscard]] bool same_number(double a, double b);
 // Of a number that is whole and fits, or of a text that is one from its first character to its last.
 [[nodiscard]] std::optional<std::int64_t> integer_of(const Value& value);
 // A number; or one that a text begins with, true and false being 1 and 0.
