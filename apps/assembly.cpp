@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/cell_facts.hpp"
 #include "apps/policies.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/thinker.hpp"
@@ -124,6 +125,8 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
 
   bridge::tree::Library trees(self->registry);
   if (auto loaded = trees.load(world.folder / "trees"); !loaded) return std::unexpected(loaded.error());
+  auto rules = bridge::Rules::compile(world.review, self->registry, facts_of(*self->cell, orders_of(manifest)));
+  if (!rules) return std::unexpected(rules.error());
   // Before the journal: a run that is refused leaves none behind.
   std::unique_ptr<gate::LocalSocket> socket;
   if (options.socket) {
@@ -134,6 +137,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
   self->bridge->use_trees(std::move(trees));
+  self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
 
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,

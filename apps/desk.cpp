@@ -29,7 +29,7 @@ Json to_json(const ObjectBelief& object) {
           {"size_m", list_of(object.size_m)}};
 }
 
-bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kHalt; }
+bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kApprove; }
 
 constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
 constexpr std::size_t kWatchersMost = 16;  // half of the socket's clients: the other half is for whoever else asks
@@ -122,6 +122,10 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kCancel:
     case gate::Operation::kHalt:
       return tell_task(asked, now);
+    case gate::Operation::kApprove:
+      if (auto allowed = bridge_.approve(asked.task, asked.tier, asked.by, now); !allowed)
+        return gate::refusal(allowed.error());
+      return {{"ok", true}, {"id", asked.task}};
     case gate::Operation::kWatch:  // one more than are answered when there is something to tell
       return gate::refusal({fmt::format("{} watch already", watchers_.size()), "watch", "ask history instead"});
     case gate::Operation::kObserve:
@@ -140,11 +144,14 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
 }
 
 Json Desk::submit(const std::string& task, Time now) {
-  const auto admitted = bridge_.submit(task, now);
+  const auto admitted = bridge_.submit_all(task, now);
   if (!admitted) return gate::refusal(admitted.error());
-  return {{"ok", true},
-          {"id", admitted->id},
-          {"accepted", admitted->accepted == bridge::Accepted::kNew ? "new" : "already"}};
+  Json tasks = Json::array();
+  for (const bridge::Admission& one : *admitted)
+    tasks.push_back({{"id", one.id}, {"accepted", one.accepted == bridge::Accepted::kNew ? "new" : "already"}});
+  Json told{{"ok", true}, {"tasks", std::move(tasks)}};
+  if (admitted->size() == 1) told.update(told.at("tasks").at(0));
+  return told;
 }
 
 Json Desk::with_state(const bridge::TaskRecord& record) const {

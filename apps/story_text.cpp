@@ -123,6 +123,19 @@ std::string preempting(const Json& d) { return "for " + text(d, "by"); }
 
 std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
 
+std::string asked(const Json& d) {
+  const auto wanted = d.is_object() ? d.find("wanted") : d.end();
+  if (wanted == d.end() || !wanted->is_array()) return {};
+  std::string line = "for leave:";
+  for (const Json& one : *wanted)
+    line += fmt::format(" {} ({}: {})", text(one, "tier"), text(one, "rule"), text(one, "use"));
+  return line + fmt::format(", within {:.0f} s", number(d, "within_s"));
+}
+
+std::string allowed(const Json& d) { return fmt::format("by {}, {}", text(d, "by"), text(d, "tier")); }
+
+std::string stopped(const Json& d) { return fmt::format("by {}: {}", text(d, "by"), text(d, "cause")); }
+
 const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"seen", seen},       {"accepted", accepted}, {"started", started},
     {"attempt", attempt}, {"plan", plan},         {"motion", motion},
@@ -130,7 +143,8 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"resumed", step},    {"found_done", step},   {"cancelling", reason},
     {"halting", reason},  {"pausing", reason},    {"paused", stop},
     {"preempted", stop},  {"held", held},         {"preempting", preempting},
-    {"ended", ended},     {"refused", reason}};
+    {"ended", ended},     {"refused", reason},    {"asked", asked},
+    {"allowed", allowed}, {"stopped", stopped}};
 
 }  // namespace
 

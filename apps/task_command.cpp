@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -27,7 +28,7 @@ using bridge::Json;
 struct TaskOptions {
   fs::path socket;
   std::string journal;
-  std::string file, id, reason;
+  std::string file, id, reason, tier, by;
   bool json = false, at_once = false;
 };
 
@@ -43,12 +44,29 @@ Expected<Json> ask(const TaskOptions& options, const Json& request, std::chrono:
 }
 
 int submit(const TaskOptions& options) {
-  const auto task = read_task(options.file);
+  auto task = read_task(options.file);
   if (!task) return bad_input(task.error());
-  const auto answer = ask(options, {{"op", "submit"}, {"task", *task}});
+  Json request{{"op", "submit"}};
+  if (task->is_object() && task->contains("tasks")) {
+    request.update(*task);
+  } else {
+    request["task"] = *std::move(task);
+  }
+  const auto answer = ask(options, request);
   if (!answer) return bad_input(answer.error());
-  fmt::print("{}: {}\n", answer->value("id", std::string{}),
-             answer->value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
+  for (const Json& one : answer->at("tasks")) {
+    fmt::print("{}: {}\n", one.value("id", std::string{}),
+               one.value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
+  }
+  return kExitGood;
+}
+
+int approve(const TaskOptions& options) {
+  const char* const user = std::getenv("USER");
+  const std::string by = !options.by.empty() ? options.by : user != nullptr && *user != '\0' ? user : "somebody";
+  const auto answer = ask(options, {{"op", "approve"}, {"id", options.id}, {"tier", options.tier}, {"by", by}});
+  if (!answer) return bad_input(answer.error());
+  fmt::print("{}: allowed\n", options.id);
   return kExitGood;
 }
 
@@ -161,7 +179,7 @@ void add_task(CLI::App& app, Chosen& chosen) {
   const auto common = [options](CLI::App* command) {
     command->add_option("--socket", options->socket, "Where the run listens (its --socket)");
   };
-  CLI::App* submit_command = task->add_subcommand("submit", "Submit one task from a JSON file");
+  CLI::App* submit_command = task->add_subcommand("submit", "Submit a task, or a reply of several, from a JSON file");
   submit_command->add_option("file", options->file, "JSON file, - for standard input")->required();
   common(submit_command);
   submit_command->callback([options, &chosen] { chosen = [options] { return submit(*options); }; });
@@ -189,6 +207,13 @@ void add_task(CLI::App& app, Chosen& chosen) {
   watch_command->add_option("id", options->id, "The task's id")->required();
   common(watch_command);
   watch_command->callback([options, &chosen] { chosen = [options] { return watch(*options); }; });
+
+  CLI::App* approve_command = task->add_subcommand("approve", "Allow what a task asks a person for");
+  approve_command->add_option("id", options->id, "The task's id")->required();
+  approve_command->add_option("--as", options->tier, "As whom: one of the world's review.tiers")->required();
+  approve_command->add_option("--by", options->by, "Who you are, for the journal (your user name)");
+  common(approve_command);
+  approve_command->callback([options, &chosen] { chosen = [options] { return approve(*options); }; });
 
   struct Verb {
     const char *name, *done, *help;

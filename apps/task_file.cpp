@@ -37,7 +37,8 @@ Expected<task::Json> read_task(const std::string& file) {
   if (!text) return std::unexpected(text.error());
   auto task = task::parse_json(*text);
   if (task) return task;
-  return fail(task.error().line(), file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}");
+  return fail(task.error().line(), file,
+              "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}, a reply {\"tasks\":[…]}");
 }
 
 }  // namespace pons::apps

@@ -34,6 +34,19 @@ const task::SkillRegistry& skills() {
   return registry;
 }
 
+bridge::Review ruled() {
+  bridge::Review review(skills(), {"arm"});
+  auto rules = bridge::Rules::compile(
+      {.tiers = {"operator"},
+       .rules =
+           {{.name = "odd", .when = {"task.priority > 10", "object != 'A' .. task.id"}, .refuse = "no"},
+            {.name = "fast", .skills = {"pick"}, .when = {"how == 'fast' || speed > 0.5"}, .approve = "operator"}}},
+      skills(), {});
+  if (!rules) found("its own rules: " + rules.error().line());
+  review.use_rules(*std::move(rules), {});
+  return review;
+}
+
 void expect_readable(const Error& error) {
   const std::string line = error.line();
   if (line.empty() || line.size() > 2000) found("an error of " + std::to_string(line.size()) + " bytes");
@@ -45,15 +58,22 @@ void expect_readable(const Error& error) {
 
 // libFuzzer calls it so: NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const bridge::Review review(skills(), {"arm"});
-  const auto task = bridge::Review::parse({reinterpret_cast<const char*>(data), size});
-  if (!task) {
-    expect_readable(task.error());
+  static const bridge::Review review = ruled();
+  const auto tasks = bridge::Review::parse({reinterpret_cast<const char*>(data), size});
+  if (!tasks) {
+    expect_readable(tasks.error());
     return 0;
   }
-  const auto again = task::task_from(task::Json::parse(task::to_json(*task).dump()));
-  if (!again) found("it does not come back: " + again.error().line());
-  if (task::to_json(*again) != task::to_json(*task)) found("it comes back as another");
-  if (const auto good = review.check(*task, Time{}); !good) expect_readable(good.error());
+  for (const task::Task& task : *tasks) {
+    const auto again = task::task_from(task::Json::parse(task::to_json(task).dump()));
+    if (!again) found("it does not come back: " + again.error().line());
+    if (task::to_json(*again) != task::to_json(task)) found("it comes back as another");
+    const auto program = review.check(task, Time{});
+    if (!program) {
+      expect_readable(program.error());
+    } else if (const auto asked = review.judge(task, bridge::Review::uses(task, program->get())); !asked) {
+      expect_readable(asked.error());
+    }
+  }
   return 0;
 }

@@ -37,39 +37,7 @@ Bridge::Bridge(Journal& journal, const task::SkillRegistry& skills, const world:
 
 Bridge::~Bridge() = default;
 
-void Bridge::add_reviewer(Reviewer reviewer) { review_.add(std::move(reviewer)); }
-
 // ---- in ----
-
-Expected<Admission> Bridge::submit(std::string_view json, Time now) {
-  auto admission = admit(json, now);
-  if (!admission) ++refused_;
-  return admission;
-}
-
-Expected<Admission> Bridge::admit(std::string_view json, Time now) {
-  if (fault_) return fail("the bridge has stopped: " + fault_->line(), {}, "start it again");
-  auto task = Review::parse(json);
-  if (!task) return std::unexpected(task.error());
-  // Before everything that may have changed since: a sender that asks again hears the same answer.
-  const auto held = journal_.holds(*task);
-  if (!held) return std::unexpected(held.error());
-  if (*held) return Admission{task->id, Accepted::kAlready};
-  if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
-  auto program = review_.check(*task, now);
-  if (!program) return std::unexpected(program.error());
-  if (open_.size() >= (task->priority < urgent_priority_ ? kMaxOpen : kMaxUrgent))
-    return fail(fmt::format("{} tasks are open already", open_.size()), {}, "submit it again later");
-  const auto accepted = journal_.accept(*task, now);
-  if (!accepted) {
-    set_fault(accepted.error());
-    return std::unexpected(accepted.error());
-  }
-  unkept_ = true;
-  std::string id = task->id;
-  enqueue(add_open(std::move(*task), *std::move(program), now));
-  return Admission{std::move(id), *accepted};
-}
 
 Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted) {
   auto open = std::make_unique<Open>();
@@ -104,7 +72,11 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
     auto program = review_.check(record.task, record.accepted);
     if (!program) {
       finish_unopened(record.task.id, task::Outcome::kFailed, program.error().line(), now);
-    } else if (auto taken = take_up(record, *std::move(program), resume, now); !taken) {
+      continue;
+    }
+    // What was taken before the world had these rules was taken.
+    (void)review_.contradictions().claim(record.task, Review::uses(record.task, program->get()));
+    if (auto taken = take_up(record, *std::move(program), resume, now); !taken) {
       return taken;
     }
   }
@@ -129,13 +101,27 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
     return {};
   }
   const bool begun = story.started();
+  Asked asked;
+  if (!begun) {
+    auto judged = review_.judge(record.task, Review::uses(record.task, program.get()));
+    if (!judged) {
+      finish_unopened(record.task.id, task::Outcome::kFailed, judged.error().line(), now);
+      return {};
+    }
+    asked = *std::move(judged);
+    std::erase_if(asked, [&](const Leave& leave) { return story.allowed().contains(Open::key(leave)); });
+  }
   if (begun && program) return go_on_in_tree(record, std::move(program), story, resume, now);
   if (begun && !story.handed_over()) return go_on(record, story, resume, now);
   if (begun) keep(journal_.event(record.task.id, now, kResumedEvent, {{"step", story.done()}}));
   Open& open = add_open(record.task, std::move(program), record.accepted);
   open.begun = begun;
   open.done = story.done();
-  if (story.paused()) {
+  open.allowed = story.allowed();
+  open.paused = story.paused();
+  if (!asked.empty()) {
+    ask(open, std::move(asked), now);
+  } else if (open.paused) {
     park(open, now);
   } else {
     enqueue(open);
@@ -160,6 +146,7 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
   Open& open = add_open(task, nullptr, record.accepted);
   open.done = what.done;
   open.begun = true;
+  open.allowed = story.allowed();
   open.priority = Arbiter::kFirst;  // it may hold what the next one would need
   if (story.paused()) open.told = Open::Told::kPause;
   enqueue(open);
@@ -202,11 +189,13 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
   open.program = std::move(program);
   open.tree = std::move(tree);
   open.begun = true;
+  open.allowed = story.allowed();
   checkpoint(open, now);
   if (!story.handed_over()) {
     open.priority = Arbiter::kFirst;  // it may hold what the next one would need
     if (story.paused()) open.told = Open::Told::kPause;
   } else if (story.paused()) {
+    open.paused = true;
     park(open, now);
     return {};
   }
@@ -217,7 +206,8 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
 std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_ptr<const tree::Program> program) {
   auto tree = std::make_unique<tree::Tree>(
       std::move(program),
-      [this, id = task.id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); });
+      [this, id = task.id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); },
+      [this, id = task.id](const task::Step& use, Time when) { return permit(id, use, when); });
   if (!task.tree) return tree;
   // The review has seen that the tree knows them.
   for (const auto& [name, value] : task.tree->inputs.items()) (void)tree->set(name, value);
@@ -227,6 +217,7 @@ std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_
 void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now) {
   const auto written = journal_.outcome(id, outcome, reason, now);
   keep(written);
+  review_.contradictions().release(id);
   if (written) ended_.push_back({id, outcome, reason, Json::object()});
 }
 
@@ -238,6 +229,7 @@ void Bridge::tick(Time now) {
   // Who ends frees resources for who starts in the same tick.
   tick_trees(running(), now);
   expire(now);
+  expire_asked(now);
   take_orders(now);
   tick_trees(start_granted(now), now);
   preempt(now);
@@ -248,6 +240,7 @@ void Bridge::tick(Time now) {
   // What waits stays open in the journal.
   std::erase_if(open_, [&](const auto& entry) {
     arbiter_.remove(entry.first);
+    asking_.erase(entry.first);
     return entry.second->stage != Open::Stage::kRuns;
   });
 }
@@ -365,6 +358,8 @@ void Bridge::conclude(const std::string& id, Open& open, const task::Progress& p
 
 void Bridge::finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now) {
   parked_.erase(id);
+  asking_.erase(id);
+  review_.contradictions().release(id);
   const auto closed = open_.extract(open_.find(id));  // until the end of this: `id` may live in it
   const std::string& name = closed.key();
   const auto written = journal_.outcome(name, outcome, reason, now, detail);

@@ -63,7 +63,10 @@ class Bridge {
   Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world);
   ~Bridge();
 
-  void add_reviewer(Reviewer reviewer);
+  // Before the first task.
+  void use_rules(Rules rules, Contradictions contradictions) {
+    review_.use_rules(std::move(rules), std::move(contradictions));
+  }
   // The trees that tasks may name; before the first task.
   void use_trees(tree::Library trees) { review_.use_trees(std::move(trees)); }
 
@@ -71,6 +74,8 @@ class Bridge {
   // otherwise then. Error: what is wrong with the task, the id is taken by another task, the queue is full, the bridge
   // is stopping, or the journal cannot be written. An error leaves nothing behind.
   [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);
+  // A reply from outside, a task or {"tasks":[…]}: all of it or nothing; and no more often than the rules say.
+  [[nodiscard]] Expected<std::vector<Admission>> submit_all(std::string_view json, Time now);
   // Takes up what the journal's last owner left open, before the first tick. Tasks not begun wait again; of those
   // begun, `resume` says which go on, with the first step that is not known to have succeeded and before all others,
   // and which end, and how. Error: the journal cannot be read or written.
@@ -84,6 +89,9 @@ class Bridge {
   [[nodiscard]] Expected<void> pause(std::string_view id, Time now, std::string_view reason);
   // Error also: it is not paused.
   [[nodiscard]] Expected<void> resume(std::string_view id, Time now);
+  // Somebody of that tier allows what the rules of the world do not leave to a brain: all that a waiting task asks
+  // people of that tier, or lower ones, for. Error also: nobody is asked, the tier is unknown or too low.
+  [[nodiscard]] Expected<void> approve(std::string_view id, std::string_view tier, std::string_view by, Time now);
   // Waiting: ends as CANCELLED at once. Running: the skill leaves the world safe first.
   [[nodiscard]] Expected<void> cancel(std::string_view id, Time now, std::string_view reason);
   // Likewise, but what moves stops now, wherever it is.
@@ -114,9 +122,9 @@ class Bridge {
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
   // How an open task stands, for a person to read: "waiting", "running", "pausing", "paused", "making way",
-  // "preempted", "ending"; empty when there is no such open task.
+  // "preempted", "ending", "asks a person"; empty when there is no such open task.
   [[nodiscard]] std::string_view state(std::string_view id) const;
-  // Waiting ones that a person has paused.
+  // Waiting ones that a person has paused, or is asked about.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources() const;
@@ -131,19 +139,40 @@ class Bridge {
 
  private:
   struct Open;
+  // A task that may be taken.
+  struct Candidate {
+    task::Task task;
+    std::shared_ptr<const tree::Program> program;
+    Asked asked;
+    Accepted accepted = Accepted::kNew;
+  };
 
-  [[nodiscard]] Expected<Admission> admit(std::string_view json, Time now);
+  // admission.cpp
+  [[nodiscard]] Expected<std::vector<task::Task>> parse(std::string_view json, Time now);
+  [[nodiscard]] Expected<Admission> admit_one(std::string_view json, Time now);
+  [[nodiscard]] Expected<std::vector<Admission>> admit(std::vector<task::Task> tasks, Time now);
+  [[nodiscard]] Expected<std::vector<Candidate>> examine_all(std::vector<task::Task> tasks, Time now);
+  [[nodiscard]] Expected<Candidate> examine(task::Task task, std::size_t others, Time now);
+  [[nodiscard]] Expected<Admission> take(Candidate candidate, Time now);
+  void let_go(const std::vector<Candidate>& candidates);
+  void note_refused(const std::string& id, const std::string& order, const std::string& reason, Time now);
   [[nodiscard]] Open& add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted);
   [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,
                                                     std::shared_ptr<const tree::Program> program);
   void enqueue(const Open& open);
   void park(Open& open, Time now);
+  void unpark(Open& open, Time now);
   [[nodiscard]] Expected<Open*> find_open(std::string_view id);
   [[nodiscard]] Expected<void> take_up(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
                                        const Resume& resume, Time now);
   [[nodiscard]] Expected<void> go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now);
   [[nodiscard]] Expected<void> go_on_in_tree(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
                                              const Story& story, const Resume& resume, Time now);
+  // approvals.cpp
+  void ask(Open& open, Asked asked, Time now);
+  void expire_asked(Time now);
+  [[nodiscard]] Expected<void> permit(const std::string& id, const task::Step& use, Time now);
+
   void expire(Time now);
   void take_orders(Time now);
   void take_order(const Order& order, Time now);
@@ -177,11 +206,14 @@ class Bridge {
   std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
   std::map<std::string, Open*, std::less<>> running_;
   std::set<std::string> parked_;
+  std::set<std::string> asking_;                 // a person
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
   Time last_commit_, last_tick_, look_at_;  // the last: into the order book again
   Duration held_for_{0};                    // since the first tick
   std::int64_t retries_ = 0, refused_ = 0;
+  Rate refusals_{20, std::chrono::minutes(1)};  // that the journal tells of: a brain may send nonsense for ever
+  std::int64_t untold_refusals_ = 0;
   Hold hold_ = Hold::kOff;
   bool unkept_ = false;  // an acceptance or an outcome waits for commit()
   bool emergency_ = false;

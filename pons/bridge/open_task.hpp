@@ -1,6 +1,7 @@
 // An accepted task without an outcome, as the bridge has it in hand.
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "pons/bridge/bridge.hpp"
@@ -12,8 +13,11 @@ struct Bridge::Open {
   enum class Stage : std::uint8_t {
     kWaits,   // in the arbiter's queue
     kRuns,    // on its way, or paused on it
-    kParked,  // paused, out of the queue
+    kParked,  // paused, or a person is asked about it; out of the queue
   };
+  // By what an allowed use is known again.
+  [[nodiscard]] static std::string key(const Leave& leave) { return leave.rule->name + " " + leave.use; }
+
   // What a running one was told, beside ending.
   enum class Told : std::uint8_t {
     kNothing,
@@ -30,10 +34,14 @@ struct Bridge::Open {
   std::shared_ptr<const tree::Program> program;  // of its tree, none of steps; of one sent along not before it starts
   std::vector<std::string> resources;
   std::unique_ptr<tree::Tree>
-      tree;                // none before it was granted for the first time, but for one that was begun earlier
-  bool unwritten = false;  // a leaf has ended since the last checkpoint
+      tree;                       // none before it was granted for the first time, but for one that was begun earlier
+  Asked asked;                    // what a person must allow before it begins
+  Time asked_since;               // in that time, too
+  std::set<std::string> allowed;  // uses, by key()
+  bool unwritten = false;         // a leaf has ended since the last checkpoint
   Stage stage = Stage::kWaits;
   Told told = Told::kNothing;
+  bool paused = false;       // by a person, while it is parked
   bool begun = false;        // by this bridge or one before
   bool stands = false;       // as it was told
   bool handed_over = false;  // by this bridge: it stands, and waits to regain its resources

@@ -16,7 +16,7 @@ void Bridge::take_orders(Time now) {
   const bool may = !fault_ && !stopping_ && !emergency_ && !held();
   if (!may || now < look_at_) return;
   look_at_ = now + kLookPeriod;
-  const std::size_t waiting = arbiter_.queue_length();
+  const std::size_t waiting = arbiter_.queue_length() + asking_.size();
   if (waiting >= kAhead || open_.size() + kAhead > kMaxOpen) return;
   const auto orders = journal_.claim(kAhead - waiting);
   if (!orders) {
@@ -29,15 +29,15 @@ void Bridge::take_orders(Time now) {
 // Claimed, it is this bridge's whatever comes of it: the claim becomes durable with what is written here.
 void Bridge::take_order(const Order& order, Time now) {
   unkept_ = true;
-  const auto admission = admit(order.body, now);
+  const auto admitted = admit_one(order.body, now);
   if (fault_) return;
-  if (!admission) {
-    const std::string why = admission.error().line();
+  if (!admitted) {
+    const std::string why = admitted.error().line();
     keep(journal_.close_order(order.id, task::Outcome::kFailed, why));
     note(kOrderRefusedEvent, {{"id", order.id}, {"reason", why}}, now, order.id);
     return;
   }
-  if (admission->accepted == Accepted::kNew) return;
+  if (admitted->accepted == Accepted::kNew) return;
   // Somebody had sent the same to this bridge itself, where it may have ended.
   const auto known = journal_.task(order.id);
   if (!known) {

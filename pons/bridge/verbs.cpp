@@ -22,6 +22,7 @@ std::string_view Bridge::state(std::string_view id) const {
   const auto found = open_.find(id);
   if (found == open_.end()) return "";
   const Open& open = *found->second;
+  if (!open.asked.empty() && !open.paused) return "asks a person";
   if (open.stage == Open::Stage::kParked) return "paused";
   if (open.stage == Open::Stage::kWaits && open.told == Open::Told::kPause) return "pausing";
   if (open.stage == Open::Stage::kWaits)
@@ -38,14 +39,15 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   if (!found) return std::unexpected(found.error());
   Open& open = **found;
   if (open.cancelled) return fail(fmt::format("task '{}' is ending already", open.task.id), {}, "wait for its outcome");
-  if (open.told == Open::Told::kPause || open.stage == Open::Stage::kParked)
+  if (open.told == Open::Told::kPause || open.paused)
     return fail(fmt::format("task '{}' is paused already", open.task.id), {}, "pons task history tells since when");
   unkept_ = true;
   // One that an earlier bridge had begun may hold something: it is paused as soon as it has its resources again.
   const bool may_hold = open.priority == Arbiter::kFirst;
-  if (open.stage == Open::Stage::kWaits && !may_hold) {
+  if (open.stage != Open::Stage::kRuns && !may_hold) {
     arbiter_.remove(open.task.id);
-    park(open, now);
+    if (open.stage == Open::Stage::kWaits) park(open, now);
+    open.paused = true;
     keep(journal_.event(open.task.id, now, kPausedEvent, {{"reason", reason}}));
     return {};
   }
@@ -62,22 +64,26 @@ void Bridge::park(Open& open, Time now) {
   parked_.insert(open.task.id);
 }
 
+void Bridge::unpark(Open& open, Time now) {
+  open.stage = Open::Stage::kWaits;
+  open.waits_since += (now - held_for_) - open.parked_at;
+  parked_.erase(open.task.id);
+  enqueue(open);
+}
+
 Expected<void> Bridge::resume(std::string_view id, Time now) {
   const auto found = find_open(id);
   if (!found) return std::unexpected(found.error());
   Open& open = **found;
-  const bool parked = open.stage == Open::Stage::kParked;
+  const bool parked = open.paused;
   if (open.cancelled || (!parked && open.told != Open::Told::kPause))
     return fail(fmt::format("task '{}' is not paused", open.task.id), {}, "pons task show says how it stands");
   unkept_ = true;
   keep(journal_.event(open.task.id, now, kContinuedEvent));
   open.told = Open::Told::kNothing;
   open.stands = false;
-  if (parked) {
-    open.stage = Open::Stage::kWaits;
-    open.waits_since += (now - held_for_) - open.parked_at;
-    parked_.erase(open.task.id);
-    enqueue(open);
+  if (std::exchange(open.paused, false)) {
+    if (open.asked.empty()) unpark(open, now);
   } else if (open.tree) {
     open.tree->resume(now);
   }

@@ -23,12 +23,15 @@ using task::Schema;
 constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
-    "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "observe",
-                    "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
+    "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "approve",
+                    "observe", "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
+    "tasks": {"type": "array", "items": {"type": "object"}},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
     "after": {"type": "integer", "minimum": 0, "maximum": 1000000000000},
     "reason": {"type": "string", "maxLength": 200},
+    "tier": {"type": "string", "minLength": 1, "maxLength": 64},
+    "by": {"type": "string", "minLength": 1, "maxLength": 64},
     "stream": {"type": "integer", "minimum": 0, "maximum": 1000000000},
     "observed": {"type": "number", "minimum": 0, "maximum": 1000000000},
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
@@ -57,16 +60,23 @@ const Schema& schema() {
 const std::map<std::string, Operation, std::less<>> kOfTask = {
     {"show", Operation::kShow},   {"history", Operation::kHistory}, {"watch", Operation::kWatch},
     {"pause", Operation::kPause}, {"resume", Operation::kResume},   {"cancel", Operation::kCancel},
-    {"halt", Operation::kHalt}};
+    {"halt", Operation::kHalt},   {"approve", Operation::kApprove}};
 
 // Which operations each member belongs to; all but kOptional are needed there.
 const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
-    {"task", {"submit"}},     {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt"}},
-    {"after", {"watch"}},     {"reason", {"pause", "cancel", "halt"}},
-    {"stream", {"chunk"}},    {"observed", {"chunk"}},
-    {"period_ms", {"chunk"}}, {"actions", {"chunk"}},
+    {"task", {"submit"}},
+    {"tasks", {"submit"}},
+    {"tier", {"approve"}},
+    {"by", {"approve"}},
+    {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt", "approve"}},
+    {"after", {"watch"}},
+    {"reason", {"pause", "cancel", "halt"}},
+    {"stream", {"chunk"}},
+    {"observed", {"chunk"}},
+    {"period_ms", {"chunk"}},
+    {"actions", {"chunk"}},
     {"last", {"chunk"}}};
-constexpr std::array<std::string_view, 3> kOptional = {"after", "reason", "last"};
+constexpr std::array<std::string_view, 5> kOptional = {"task", "tasks", "after", "reason", "last"};
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
@@ -77,6 +87,14 @@ Expected<void> check_members(const Json& json, std::string_view operation) {
                 fmt::format("/{}", member), fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
   }
   return {};
+}
+
+Expected<Asked> submitted(const Json& json) {
+  const auto task = json.find("task"), tasks = json.find("tasks");
+  if ((task == json.end()) == (tasks == json.end()))
+    return fail("submit needs 'task' or 'tasks', and not both", "/task", "give one task, or a reply's list of them");
+  const bool one = task != json.end();
+  return Asked{.operation = Operation::kSubmit, .task = one ? task->dump() : Json{{"tasks", *tasks}}.dump()};
 }
 
 Expected<Asked> chunk_from(const Json& json) {
@@ -103,11 +121,13 @@ Expected<Asked> asked_from(std::string_view text) {
   if (auto fits = schema().check(*json); !fits) return std::unexpected(fits.error());
   const auto operation = json->at("op").get<std::string>();
   if (auto good = check_members(*json, operation); !good) return std::unexpected(good.error());
-  if (operation == "submit") return Asked{.operation = Operation::kSubmit, .task = json->at("task").dump()};
+  if (operation == "submit") return submitted(*json);
   if (const auto of_task = kOfTask.find(operation); of_task != kOfTask.end()) {
     return Asked{.operation = of_task->second,
                  .task = json->at("id").get<std::string>(),
                  .reason = json->value("reason", std::string{}),
+                 .tier = json->value("tier", std::string{}),
+                 .by = json->value("by", std::string{}),
                  .after = json->value("after", std::int64_t{0})};
   }
   if (operation == "chunk") return chunk_from(*json);

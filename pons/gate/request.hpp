@@ -1,5 +1,7 @@
 // What may be asked over the local socket, and how answers look:
-//   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already"}
+//   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already","tasks":[…]}
+//   {"op":"submit","tasks":[{…},…]}
+//                                → {"ok":true,"tasks":[{"id":…,"accepted":…},…]}: one brain's reply, whole or not
 //   {"op":"list"}                → {"ok":true,"tasks":[…]}
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
 //   {"op":"history","id":"P000123"}
@@ -10,6 +12,8 @@
 //   {"op":"pause","id":"P000123","reason":"…"}
 //                                → {"ok":true,"id":…,"after":…}; likewise resume (without a reason), cancel and halt.
 //                                   What comes of it, watch tells after that sequence
+//   {"op":"approve","id":"P000123","tier":"operator","by":"Kim"}
+//                                → {"ok":true,"id":…}: a person of that tier allows what the task asks for
 //   {"op":"observe"}             → {"ok":true,"stream":1,"time_s":…,"executed":…,"enough_s":…,"position":[…],
 //                                   "speed":[…],"objects":[…]}
 //   {"op":"chunk","stream":1,"observed":…,"period_ms":…,"actions":[[…],…],"last":false}
@@ -41,6 +45,7 @@ enum class Operation : std::uint8_t {
   kResume,
   kCancel,
   kHalt,
+  kApprove,
   // Of streams and of the arm:
   kObserve,
   kChunk,
@@ -53,8 +58,9 @@ enum class Operation : std::uint8_t {
 
 struct Asked {
   Operation operation = Operation::kList;
-  std::string task;          // kSubmit: the task's JSON text; kShow to kHalt: the id
+  std::string task;          // kSubmit: the JSON text of a task or a reply; kShow to kApprove: the id
   std::string reason;        // kPause, kCancel, kHalt; may be empty
+  std::string tier, by;      // kApprove
   std::int64_t after = 0;    // kWatch
   std::uint64_t stream = 0;  // kChunk
   Chunk chunk;               // kChunk; finite, and otherwise as it came

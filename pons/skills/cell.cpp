@@ -67,7 +67,8 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
     : world(cell_world),
       arm(link, cell_world, splice_lead),
       model(robot.copy()),
-      router(cell_world, std::move(robot)),
+      router(cell_world, robot.copy()),
+      reach(cell_world, robot),
       view_end_m_(view_end_m(cell_world, 0)) {}
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen) {

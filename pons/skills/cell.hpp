@@ -12,6 +12,7 @@
 #include "pons/core/belief.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
+#include "pons/skills/reach.hpp"
 #include "pons/skills/route.hpp"
 #include "pons/task/policy.hpp"
 #include "pons/task/skill.hpp"
@@ -132,6 +133,7 @@ class Cell {
   Arm arm;
   model::RobotModel model;
   Router router;
+  Reach reach;
   std::optional<Held> held;
   std::optional<Miss> missed;
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does

@@ -22,6 +22,7 @@ class Conducted final : public task::Skill {
 
   Progress tick(Time now) override {
     if (std::exchange(fresh_, false)) take_over_arm();
+    note_stop();
     Progress progress = advance(now);
     progress.notes = cell_.take_notes();
     return progress;
@@ -79,6 +80,14 @@ class Conducted final : public task::Skill {
         return halted(now);
     }
     return {Status::kFailed, "unreachable"};
+  }
+
+  // The control loop has the last word: what it refused, and why it stands, belongs to the story of the task.
+  void note_stop() {
+    const bool operational = cell_.arm.operational();
+    if (!operational && std::exchange(operational_, operational))
+      cell_.note("stopped", {{"by", "the control loop"}, {"cause", link::name(cell_.arm.state().cause)}});
+    operational_ = operational;
   }
 
   // As it was left by whoever had it before: a skill that was halted may have left something on the cups that nobody
@@ -148,7 +157,7 @@ class Conducted final : public task::Skill {
   std::unique_ptr<ArmSkill> skill_;
   Standstill standstill_;
   std::optional<LateWeighing> weighing_;
-  bool unweighed_ = false;
+  bool unweighed_ = false, operational_ = true;
   Mode mode_ = Mode::kGoes;
   Pause pause_ = Pause::kStand;
   Time rests_since_, halted_at_;

@@ -128,10 +128,15 @@ task::SkillType move_to(Cell& cell) {
           .attempts = 2,
           .outputs = {"way_s"},
           .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
-          .start = [&cell](const task::Json& arguments, Time) {
-            return conduct(cell, std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
-                                                          arguments.value("path", std::string(kJoints))));
-          }};
+          .feasible =
+              [&cell](const task::Json& arguments, task::Moment) {
+                return cell.reach.over(arguments.at("place").get<std::string>(), {{kAbove_m}});
+              },
+          .start =
+              [&cell](const task::Json& arguments, Time) {
+                return conduct(cell, std::make_unique<MoveTo>(cell, arguments.at("place").get<std::string>(),
+                                                              arguments.value("path", std::string(kJoints))));
+              }};
 }
 
 }  // namespace pons::skills

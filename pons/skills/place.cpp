@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -22,6 +23,8 @@ constexpr double kOverRim_m = 0.03;     // between rim and the parcel's undersid
 constexpr double kTipOverRim_m = 0.10;  // at least: lower, the outer mouths are out of reach
 constexpr double kHigher_m = 0.025;     // tried next when a mouth is out of reach
 constexpr int kHeights = 5;
+// Of the empty tool, for the question whether a mouth is within reach at all.
+constexpr std::array kHeightsOverRim_m{kTipOverRim_m, kTipOverRim_m + 2 * kHigher_m, kTipOverRim_m + 4 * kHigher_m};
 constexpr double kSofter_m = 0.015;  // than the longest fall that is allowed: sizes are measured
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
@@ -304,10 +307,18 @@ task::SkillType place(Cell& cell) {
           .attempts = 3,
           .safe_points =
               {"anywhere on the way, with the parcel on the cups; nobody else gets the arm before it is let go of"},
-          .start = [&cell](const task::Json& arguments, Time now) {
-            return conduct(cell, std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),
-                                                         arguments.value("object", std::string{}), now));
-          }};
+          .feasible = [&cell](const task::Json& arguments, task::Moment moment) -> Expected<void> {
+            const auto place = arguments.at("place").get<std::string>();
+            if (auto good = cell.reach.over(place, kHeightsOverRim_m); !good) return good;
+            // Once it is on the cups, its size is what was measured there.
+            if (moment != task::Moment::kAdmission || !arguments.contains("object")) return {};
+            return passes(cell.find(arguments.at("object").get<std::string>()), cell.world.place(place));
+          },
+          .start =
+              [&cell](const task::Json& arguments, Time now) {
+                return conduct(cell, std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),
+                                                             arguments.value("object", std::string{}), now));
+              }};
 }
 
 }  // namespace pons::skills

@@ -29,6 +29,14 @@ constexpr Duration kSettleWithin = std::chrono::milliseconds(1500);  // and from
 constexpr Duration kSteady = std::chrono::milliseconds(300);         // within the tolerance, before it counts
 constexpr double kRise_m = 0.08;
 
+// From where the arm feels its way down.
+Expected<Vector3> over_region(const world::World& world, const std::string& name) {
+  const world::Place* const place = world.place(name);
+  if (place == nullptr || place->kind != world::PlaceKind::kRegion)
+    return fail("'" + name + "' is no region of this world", {}, "name a place of kind region");
+  return Vector3(place->center_m + Vector3(0, 0, 0.5 * place->size_m.z() + kOver_m));
+}
+
 class Press final : public ArmSkill {
  public:
   Press(Cell& cell, std::string place, double force_n, Duration hold)
@@ -82,14 +90,12 @@ class Press final : public ArmSkill {
 
   Progress start(Time now) {
     if (cell_.held) return {Status::kFailed, "the cups hold " + cell_.held->code, {}};
-    const world::Place* place = cell_.world.place(place_);
-    if (place == nullptr || place->kind != world::PlaceKind::kRegion)
-      return {Status::kFailed, "'" + place_ + "' is no region of this world", {}};
+    const auto over = over_region(cell_.world, place_);
+    if (!over) return {Status::kFailed, over.error().line(), {}};
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-    const Vector3 over = place->center_m + Vector3(0, 0, 0.5 * place->size_m.z() + kOver_m);
     const double yaw = yaw_of(cell_.model.world_from_tip(state.position).linear());
-    const auto q = cell_.model.inverse(Cell::tip_down(over, yaw), state.position);
+    const auto q = cell_.model.inverse(Cell::tip_down(*over, yaw), state.position);
     if (!q) return {Status::kFailed, q.error().line(), {}};
     const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
                                         cell_.limits_empty(), &known_);
@@ -193,6 +199,14 @@ class Press final : public ArmSkill {
   bool rising_ = false, stopped_ = false, cancelled_ = false;
 };
 
+Expected<void> feasible(Cell& cell, const std::string& place, double force_n) {
+  const auto over = over_region(cell.world, place);
+  if (!over) return std::unexpected(over.error());
+  const auto posture = cell.reach.posture(*over, place);
+  if (!posture) return std::unexpected(posture.error());
+  return cell.reach.can_press(*posture, force_n);
+}
+
 }  // namespace
 
 task::SkillType press(Cell& cell) {
@@ -210,11 +224,16 @@ task::SkillType press(Cell& cell) {
           .attempts = 2,
           .outputs = {"least_n", "most_n"},
           .safe_points = {"on the way there", "risen again"},
-          .start = [&cell](const task::Json& arguments, Time) {
-            return conduct(cell, std::make_unique<Press>(cell, arguments.at("place").get<std::string>(),
-                                                         arguments.at("force_n").get<double>(),
-                                                         from_s(arguments.at("seconds").get<double>())));
-          }};
+          .feasible =
+              [&cell](const task::Json& arguments, task::Moment) {
+                return feasible(cell, arguments.at("place").get<std::string>(), arguments.at("force_n").get<double>());
+              },
+          .start =
+              [&cell](const task::Json& arguments, Time) {
+                return conduct(cell, std::make_unique<Press>(cell, arguments.at("place").get<std::string>(),
+                                                             arguments.at("force_n").get<double>(),
+                                                             from_s(arguments.at("seconds").get<double>())));
+              }};
 }
 
 }  // namespace pons::skills

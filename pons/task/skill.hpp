@@ -1,6 +1,7 @@
 // What a skill is: a named, typed ability that runs as an explicit state machine, ticked by the bridge.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -75,6 +76,13 @@ class Skill {
   virtual void halt(Time now) = 0;
 };
 
+// When a use of a skill is looked at. The world may change in between: what is not known yet is not held against a task
+// before its skill starts.
+enum class Moment : std::uint8_t {
+  kAdmission,
+  kStart,
+};
+
 struct SkillType {
   std::string name;                       // "pick"
   std::string summary;                    // one line for `pons skills`
@@ -84,6 +92,9 @@ struct SkillType {
   int attempts = 1;                       // how often it may be started when it says kRetry
   std::vector<std::string> outputs = {};  // what of the detail it succeeds with a tree may take up: "mass_kg"
   std::vector<std::string> safe_points;   // where a pause stops it, for a person to read
+  // Whether the robot can do it, as far as that is known: reach, what stands in the way, drives. None: it can. Error:
+  // why not. Quick: it is asked within a tick of the bridge.
+  std::function<Expected<void>(const Json& arguments, Moment moment)> feasible = {};
   std::function<std::unique_ptr<Skill>(const Json& arguments, Time now)> start;
 };
 

@@ -10,6 +10,8 @@ namespace pons::world {
 
 [[nodiscard]] Robot read_robot(const YamlValue& value, const std::filesystem::path& folder);
 
+[[nodiscard]] Review read_review(const YamlValue& value);
+
 // {position: [x, y, z]} with rpy_deg (about the fixed axes x, y, z in turn), `look: down` (z down, x along world +x) or
 // look_at: [x, y, z] (z towards that point, y as far down as it can).
 [[nodiscard]] Pose read_pose(const YamlValue& value);

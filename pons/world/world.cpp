@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -57,13 +58,14 @@ Belt read_belt(const YamlValue& value) {
   return belt;
 }
 
+constexpr std::array kPlaceKinds{PlaceKind::kChute, PlaceKind::kException, PlaceKind::kTray, PlaceKind::kRegion,
+                                 PlaceKind::kObstacle};
+
 PlaceKind read_place_kind(const YamlValue& value) {
   const std::string word = value.text();
-  if (word == "chute") return PlaceKind::kChute;
-  if (word == "exception") return PlaceKind::kException;
-  if (word == "tray") return PlaceKind::kTray;
-  if (word == "region") return PlaceKind::kRegion;
-  if (word == "obstacle") return PlaceKind::kObstacle;
+  for (const PlaceKind kind : kPlaceKinds) {
+    if (word == name(kind)) return kind;
+  }
   value.refuse(fmt::format("'{}' is no kind of place", printable(word)),
                "write chute, exception, tray, region or obstacle");
 }
@@ -255,7 +257,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   const YamlMap map(
       read_yaml(folder / "world.yaml"),
       {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "zones"});
+      {"schedule", "review", "zones"});
   World world;
   world.name = name;
   world.folder = folder;
@@ -267,6 +269,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   world.resources = read_resources(map["resources"]);
   if (map.has("schedule")) world.schedule = read_schedule(map["schedule"]);
+  if (map.has("review")) world.review = read_review(map["review"]);
   if (map.has("zones")) world.zones = read_zones(map["zones"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
@@ -274,6 +277,22 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
 }
 
 }  // namespace
+
+std::string_view name(PlaceKind kind) {
+  switch (kind) {
+    case PlaceKind::kChute:
+      return "chute";
+    case PlaceKind::kException:
+      return "exception";
+    case PlaceKind::kTray:
+      return "tray";
+    case PlaceKind::kRegion:
+      return "region";
+    case PlaceKind::kObstacle:
+      return "obstacle";
+  }
+  return "";
+}
 
 const Place* World::place(std::string_view place_name) const {
   const auto found = std::ranges::find(places, place_name, &Place::name);

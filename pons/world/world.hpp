@@ -14,6 +14,7 @@
 #include "pons/core/image.hpp"
 #include "pons/core/pose.hpp"
 #include "pons/core/time.hpp"
+#include "pons/world/review.hpp"
 
 namespace pons::world {
 
@@ -55,6 +56,8 @@ struct Robot {
 };
 
 enum class PlaceKind : std::uint8_t { kChute, kException, kTray, kRegion, kObstacle };
+
+[[nodiscard]] std::string_view name(PlaceKind kind);  // "chute", …
 
 // A named box of space. For a chute `center` is the middle of its mouth, at the rim, and size z the depth to its floor.
 // An obstacle is what the arm must not touch; nothing is brought there.
@@ -155,6 +158,7 @@ struct World {
   std::vector<CameraSpec> cameras;
   std::vector<Resource> resources;
   Schedule schedule;
+  Review review;
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;
   Rules rules;

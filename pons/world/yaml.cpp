@@ -77,10 +77,14 @@ std::string read_bounded(const std::filesystem::path& file) {
 YamlValue::YamlValue(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node, std::string key)
     : file_(std::move(file)), node_(node), key_(std::move(key)) {}
 
-void YamlValue::refuse(std::string what, std::string mend) const {
+std::string YamlValue::place() const {
   std::string where = fmt::format("{}:{}", file_->string(), std::max(node_.Mark().line, 0) + 1);
   if (!key_.empty()) where += ":" + key_;
-  throw LoadError{{std::move(what), std::move(where), std::move(mend)}};
+  return where;
+}
+
+void YamlValue::refuse(std::string what, std::string mend) const {
+  throw LoadError{{std::move(what), place(), std::move(mend)}};
 }
 
 std::string YamlValue::scalar(std::string_view expected) const {

@@ -44,6 +44,8 @@ class YamlValue {
   // An existing file, named relative to `folder`.
   [[nodiscard]] std::filesystem::path existing_file(const std::filesystem::path& folder) const;
 
+  // For a message: file, line and key.
+  [[nodiscard]] std::string place() const;
   [[noreturn]] void refuse(std::string what, std::string mend) const;
   [[nodiscard]] const YAML::Node& node() const { return node_; }
 

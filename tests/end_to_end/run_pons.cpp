@@ -65,12 +65,12 @@ int run_pons_unheard(const std::vector<std::string>& arguments) {
   return exit_code(child);
 }
 
-Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
-                      const std::function<void(pid_t)>& meanwhile) {
+Finished run_pons_and(const std::vector<std::string>& arguments, int lines, const std::function<void(pid_t)>& meanwhile,
+                      const std::vector<std::string>& environment) {
   std::array<int, 2> err{};
   if (pipe2(err.data(), O_CLOEXEC) != 0) return {};
   const pid_t child = fork();
-  if (child == 0) become(PONS_BINARY, arguments, {}, open("/dev/null", O_WRONLY | O_CLOEXEC), err[1]);
+  if (child == 0) become(PONS_BINARY, arguments, environment, open("/dev/null", O_WRONLY | O_CLOEXEC), err[1]);
   close(err[1]);
   Finished finished;
   std::array<char, 256> chunk{};

@@ -27,7 +27,8 @@ struct Finished {
 // Calls `meanwhile` as soon as it has written `lines` lines to the error stream, and waits for its end. `out` is left
 // empty.
 [[nodiscard]] Finished run_pons_and(const std::vector<std::string>& arguments, int lines,
-                                    const std::function<void(pid_t)>& meanwhile);
+                                    const std::function<void(pid_t)>& meanwhile,
+                                    const std::vector<std::string>& environment = {});
 
 // The program at work beside the test, its words in files of `folder`; killed, if need be, when this goes.
 class Running {

@@ -28,10 +28,10 @@ std::size_t step_of(const Event& event) {
 }  // namespace
 
 bool tells_state(std::string_view kind) {
-  constexpr std::array kKinds{kAcceptedEvent,  kStartedEvent,    kAttemptEvent, kAttemptEndedEvent, kCancellingEvent,
-                              kHaltingEvent,   kPausingEvent,    kPausedEvent,  kPreemptingEvent,   kPreemptedEvent,
-                              kContinuedEvent, kRegainedEvent,   kHeldEvent,    kReleasedEvent,     kResumedEvent,
-                              kFoundDoneEvent, kCheckpointEvent, kEndedEvent};
+  constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent,   kAttemptEvent,   kAttemptEndedEvent, kCancellingEvent,
+                              kAskedEvent,      kAllowedEvent,   kHaltingEvent,   kPausingEvent,      kPausedEvent,
+                              kPreemptingEvent, kPreemptedEvent, kContinuedEvent, kRegainedEvent,     kHeldEvent,
+                              kReleasedEvent,   kResumedEvent,   kFoundDoneEvent, kCheckpointEvent,   kEndedEvent};
   return std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
@@ -57,6 +57,11 @@ Expected<void> Story::take(const Event& event) {
   if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = true;
   if (event.kind == kContinuedEvent) paused_ = false;
   if (event.kind == kCancellingEvent || event.kind == kHaltingEvent) ending_ = task::text_of(event.detail, "reason");
+  if (event.kind == kAllowedEvent && event.detail.is_object()) {
+    for (const Json& use : event.detail.value("uses", Json::array())) {
+      if (use.is_string()) allowed_.insert(use.get<std::string>());
+    }
+  }
   if (event.kind == kPreemptedEvent) handed_over_ = true;
   if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = false;
   // What the bridge before was at, nobody saw end.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -20,11 +21,13 @@ inline constexpr std::string_view kPausingEvent = "pausing";             // {"re
 inline constexpr std::string_view kPausedEvent = "paused";               // {"stop"}, of one that has begun
 inline constexpr std::string_view kPreemptingEvent = "preempting";       // {"by"}: likewise, for that task
 inline constexpr std::string_view kPreemptedEvent = "preempted";         // {"stop"}: and waits again
-inline constexpr std::string_view kContinuedEvent = "continued";         // a person's pause is over
-inline constexpr std::string_view kRegainedEvent = "regained";           // preempted, it has its resources again
-inline constexpr std::string_view kHeldEvent = "held";                   // {"cause"}: an emergency stop has come,
-inline constexpr std::string_view kReleasedEvent = "released";           // and is over
-inline constexpr std::string_view kResumedEvent = "resumed";  // {"step"}: another bridge goes on, with this step
+inline constexpr std::string_view kAskedEvent = "asked";          // {"wanted":[{"rule","tier","use"}],"within_s"}
+inline constexpr std::string_view kAllowedEvent = "allowed";      // {"by","tier","uses":["rule use"]}
+inline constexpr std::string_view kContinuedEvent = "continued";  // a person's pause is over
+inline constexpr std::string_view kRegainedEvent = "regained";    // preempted, it has its resources again
+inline constexpr std::string_view kHeldEvent = "held";            // {"cause"}: an emergency stop has come,
+inline constexpr std::string_view kReleasedEvent = "released";    // and is over
+inline constexpr std::string_view kResumedEvent = "resumed";      // {"step"}: another bridge goes on, with this step
 // What the tree of a task remembers (tree/tree.hpp): at the start of each attempt, and when one has ended and the tree
 // goes on.
 inline constexpr std::string_view kCheckpointEvent = "checkpoint";
@@ -46,6 +49,8 @@ class Story {
   [[nodiscard]] bool paused() const { return paused_; }  // as far as it was asked for
   // Why it was told to end, if it was.
   [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
+  // What a person was asked for, and has allowed: rule, skill and arguments.
+  [[nodiscard]] const std::set<std::string>& allowed() const { return allowed_; }
   // It was preempted and has not gone on: what it had begun stands at a safe point, with nothing in use.
   [[nodiscard]] bool handed_over() const { return handed_over_; }
   // So many of its first steps have succeeded; of a tree, none.
@@ -66,6 +71,7 @@ class Story {
   std::size_t done_ = 0;
   std::map<std::size_t, Json> trying_;
   Json checkpoint_;
+  std::set<std::string> allowed_;
   std::optional<std::string> ending_;
   std::int64_t sequence_ = 0, run_ = 0;
   Time stamp_;

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge {
 namespace {
+
+constexpr std::size_t kMostInReply = 64;
 
 // Levenshtein (1966), one row at a time.
 std::size_t edits(std::string_view a, std::string_view b) {
@@ -47,12 +50,34 @@ Review::Review(const task::SkillRegistry& skills, std::vector<std::string> resou
   for (const auto& [name, type] : skills.all()) schemas_.emplace(name, task::Schema::compile(type.schema));
 }
 
-void Review::add(Reviewer reviewer) { reviewers_.push_back(std::move(reviewer)); }
+void Review::use_rules(Rules rules, Contradictions contradictions) {
+  rules_ = std::move(rules);
+  contradictions_ = std::move(contradictions);
+}
 
-Expected<task::Task> Review::parse(std::string_view json) {
+Expected<std::vector<task::Task>> Review::parse(std::string_view json) {
   const auto parsed = task::parse_json(json);
   if (!parsed) return std::unexpected(parsed.error());
-  return task::task_from(*parsed);
+  const auto reply = parsed->is_object() ? parsed->find("tasks") : parsed->end();
+  if (reply == parsed->end()) {
+    auto task = task::task_from(*parsed);
+    if (!task) return std::unexpected(task.error());
+    return std::vector{*std::move(task)};
+  }
+  if (parsed->size() != 1 || !reply->is_array() || reply->empty() || reply->size() > kMostInReply) {
+    return fail("is no reply", "/tasks",
+                fmt::format("write {{\"tasks\":[…]}} with 1 to {} tasks, and nothing beside", kMostInReply));
+  }
+  std::vector<task::Task> tasks;
+  for (std::size_t i = 0; i < reply->size(); ++i) {
+    auto task = task::task_from((*reply)[i]);
+    if (!task) {
+      task.error().where = fmt::format("/tasks/{}{}", i, task.error().where);
+      return std::unexpected(task.error());
+    }
+    tasks.push_back(*std::move(task));
+  }
+  return tasks;
 }
 
 Expected<void> Review::check_step(const task::Step& step, const std::string& where) const {
@@ -84,22 +109,6 @@ Expected<std::shared_ptr<const tree::Program>> Review::program(const task::Task&
   return trees_.program(*task.tree);
 }
 
-Expected<void> Review::ask_reviewers(const task::Task& task) const {
-  for (const Reviewer& reviewer : reviewers_) {
-    if (auto good = reviewer(task); !good) return good;
-  }
-  return {};
-}
-
-Expected<void> Review::check_skills(const task::Task& task, const tree::Program& program) const {
-  task::Task constant = task;
-  for (const tree::SkillUse& use : program.uses) {
-    if (auto good = check_resources(*use.type, "/tree/" + use.name); !good) return good;
-    if (use.bound.empty()) constant.steps.push_back({use.type->name, use.arguments});
-  }
-  return ask_reviewers(constant);
-}
-
 Expected<std::shared_ptr<const tree::Program>> Review::check(const task::Task& task, Time now) const {
   for (std::size_t i = 0; i < task.steps.size(); ++i) {
     if (auto good = check_step(task.steps[i], fmt::format("/steps/{}", i)); !good) return std::unexpected(good.error());
@@ -109,10 +118,56 @@ Expected<std::shared_ptr<const tree::Program>> Review::check(const task::Task& t
                 "/deadline_s", "name a later one, or none");
   }
   auto program = this->program(task);
-  if (!program) return program;
-  const auto good = *program ? check_skills(task, **program) : ask_reviewers(task);
-  if (!good) return std::unexpected(good.error());
+  if (!program || !*program) return program;
+  for (const tree::SkillUse& use : (*program)->uses) {
+    if (auto good = check_resources(*use.type, "/tree/" + use.name); !good) return std::unexpected(good.error());
+  }
   return program;
+}
+
+// ---- what may be done ----
+
+std::vector<UseOf> Review::uses(const task::Task& task, const tree::Program* program) {
+  std::vector<UseOf> uses;
+  for (std::size_t i = 0; i < task.steps.size(); ++i) uses.push_back({task.steps[i], fmt::format("/steps/{}", i)});
+  if (program == nullptr) return uses;
+  for (const tree::SkillUse& use : program->uses) {
+    if (use.bound.empty()) uses.push_back({{use.type->name, use.arguments}, "/tree/" + use.name});
+  }
+  return uses;
+}
+
+Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, task::Moment moment) const {
+  auto asked = rules_.check(task, use, moment);
+  const task::SkillType* const type = skills_.find(use.skill);
+  if (!asked || type == nullptr || !type->feasible) return asked;
+  if (auto good = type->feasible(use.arguments, moment); !good) {
+    good.error().what = fmt::format("the robot cannot do that: {}", good.error().what);
+    return std::unexpected(good.error());
+  }
+  return asked;
+}
+
+Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& uses) const {
+  Asked all;
+  for (const UseOf& use : uses) {
+    auto asked = judge(task, use.use, task::Moment::kAdmission);
+    if (!asked && task.tree) continue;
+    if (!asked) {
+      asked.error().where = use.where;
+      return asked;
+    }
+    std::ranges::move(*asked, std::back_inserter(all));
+  }
+  return all;
+}
+
+Expected<Asked> Review::judge_start(const task::Task& task, const task::Step& use) {
+  auto asked = judge(task, use, task::Moment::kStart);
+  if (!asked || !task.tree) return asked;  // steps were claimed when the task was taken
+  const UseOf started{use, {}};
+  if (auto claimed = contradictions_.claim(task, {&started, 1}); !claimed) return std::unexpected(claimed.error());
+  return asked;
 }
 
 }  // namespace pons::bridge

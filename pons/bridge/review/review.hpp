@@ -1,12 +1,17 @@
-// Admission: what a brain asks for is checked here, before anything else sees it. Brains may be wrong or hostile.
+// What a brain asks for is looked at here, before anything else sees it, and again when a skill starts. Brains may be
+// wrong or hostile. Three layers say no, each in words of its own: the form of what was asked; the rules of the world
+// (rules.hpp, contradictions.hpp); and what the robot can do (task::SkillType::feasible). The control loop is the last,
+// and asks nobody.
 #pragma once
 
-#include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pons/bridge/review/contradictions.hpp"
+#include "pons/bridge/review/rules.hpp"
 #include "pons/bridge/tree/library.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
@@ -16,10 +21,6 @@
 
 namespace pons::bridge {
 
-// A further check of a well-formed task: reach, rules of the site. Says yes, or why not. Of a tree it is given, as
-// steps, the skills whose arguments are constants.
-using Reviewer = std::function<Expected<void>(const task::Task&)>;
-
 class Review {
  public:
   // `skills` must outlive it and must not change. `resources` are those of the world.
@@ -27,30 +28,41 @@ class Review {
 
   // The trees that tasks may name.
   void use_trees(tree::Library trees) { trees_ = std::move(trees); }
+  // Before the first task.
+  void use_rules(Rules rules, Contradictions contradictions);
 
-  // Asked in the order of their adding, after the built-in checks.
-  void add(Reviewer reviewer);
-
-  // Text to task: size, depth, encoding, shape (docs/schema/task.json).
-  [[nodiscard]] static Expected<task::Task> parse(std::string_view json);
+  // Text to tasks: size, depth, encoding, shape (docs/schema/task.json); {"tasks":[…]} is one reply of several.
+  [[nodiscard]] static Expected<std::vector<task::Task>> parse(std::string_view json);
   // Known skills (an unknown one is answered with the nearest name), each step's arguments against the skill's schema,
-  // its resources against the world's, the deadline against `now`, then the reviewers. Of a tree: that it can be run.
-  // Returns what the tree runs as; of steps nullptr.
+  // its resources against the world's, the deadline against `now`. Of a tree: that it can be run. Returns what the tree
+  // runs as; of steps nullptr.
   [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> check(const task::Task& task, Time now) const;
   // Likewise, of a task that was checked before. Error: its tree cannot be run any more.
   [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> program(const task::Task& task) const;
 
+  // The uses of skills whose arguments are known before it runs: all of steps; of a tree those that take none from its
+  // blackboard.
+  [[nodiscard]] static std::vector<UseOf> uses(const task::Task& task, const tree::Program* program);
+  // Whether it may be done, and by the robot. Not all leaves of a tree come to pass: what of them may not be done is
+  // found out when it starts. Error: the first step that may not be.
+  [[nodiscard]] Expected<Asked> judge(const task::Task& task, const std::vector<UseOf>& uses) const;
+  // Likewise of a use that starts now, and whether it contradicts another task.
+  [[nodiscard]] Expected<Asked> judge_start(const task::Task& task, const task::Step& use);
+
+  [[nodiscard]] Rules& rules() { return rules_; }
+  [[nodiscard]] Contradictions& contradictions() { return contradictions_; }
+
  private:
   [[nodiscard]] Expected<void> check_resources(const task::SkillType& type, const std::string& where) const;
-  [[nodiscard]] Expected<void> check_skills(const task::Task& task, const tree::Program& program) const;
-  [[nodiscard]] Expected<void> ask_reviewers(const task::Task& task) const;
   [[nodiscard]] Expected<void> check_step(const task::Step& step, const std::string& where) const;
+  [[nodiscard]] Expected<Asked> judge(const task::Task& task, const task::Step& use, task::Moment moment) const;
 
   const task::SkillRegistry& skills_;
   std::vector<std::string> resources_;
   std::map<std::string, Expected<task::Schema>, std::less<>> schemas_;
-  std::vector<Reviewer> reviewers_;
   tree::Library trees_;
+  Rules rules_;
+  Contradictions contradictions_;
 };
 
 }  // namespace pons::bridge

@@ -16,7 +16,8 @@ class ReviewTest : public testing::Test {
   [[nodiscard]] Expected<void> check(const std::string& steps, const std::string& rest = "") const {
     const auto task = Review::parse(R"({"id":"a","steps":)" + steps + rest + "}");
     if (!task) return std::unexpected(task.error());
-    if (const auto good = Review(skills_, {"arm"}).check(*task, at(5)); !good) return std::unexpected(good.error());
+    if (const auto good = Review(skills_, {"arm"}).check(task->front(), at(5)); !good)
+      return std::unexpected(good.error());
     return {};
   }
 
@@ -46,7 +47,7 @@ TEST_F(ReviewTest, RefusesDeadlinesThatHavePassed) {
 
 TEST_F(ReviewTest, RefusesSkillsThatThisWorldCannotDo) {
   const auto task = Review::parse(R"({"id":"a","steps":[{"skill":"pick"}]})");
-  const auto checked = Review(skills_, {"lift"}).check(*task, at(0));
+  const auto checked = Review(skills_, {"lift"}).check(task->front(), at(0));
   EXPECT_NE(checked.error().what.find("needs 'arm'"), std::string::npos);
 }
 
@@ -59,21 +60,39 @@ TEST_F(ReviewTest, ABrokenSchemaSpoilsItsSkillOnly) {
   EXPECT_NE(check(R"([{"skill":"odd"}])").error().what.find("'oneOf' is not supported"), std::string::npos);
 }
 
-TEST_F(ReviewTest, AsksTheReviewersLast) {
-  Review review(skills_, {"arm"});
-  int asked = 0;
-  review.add([&asked](const task::Task& task) -> Expected<void> {
-    ++asked;
-    if (task.steps[0].arguments.contains("object")) return {};
-    return fail("out of reach", "/steps/0", "ask for something nearer");
-  });
-  EXPECT_FALSE(review.check(*Review::parse(R"({"id":"a","steps":[{"skill":"jump"}]})"), at(0)));
-  EXPECT_EQ(asked, 0);
-  EXPECT_EQ(review.check(*Review::parse(R"({"id":"a","steps":[{"skill":"pick"}]})"), at(0)).error().what,
-            "out of reach");
-  EXPECT_TRUE(
-      review.check(*Review::parse(R"({"id":"a","steps":[{"skill":"pick","arguments":{"object":"b"}}]})"), at(0)));
-  EXPECT_EQ(asked, 2);
+TEST_F(ReviewTest, AsksWhetherTheRobotCanDoIt) {
+  task::SkillRegistry skills;
+  std::vector<task::Moment> asked;
+  task::SkillType type = pick_.type();
+  type.feasible = [&](const Json& arguments, task::Moment moment) -> Expected<void> {
+    asked.push_back(moment);
+    if (arguments.contains("object")) return {};
+    return fail("out of reach", {}, "ask for something nearer");
+  };
+  skills.add(type);
+  Review review(skills, {"arm"});
+  const auto judge = [&](const std::string& steps) {
+    const task::Task task = Review::parse(R"({"id":"a","steps":)" + steps + "}").value().front();
+    return review.judge(task, Review::uses(task, nullptr));
+  };
+  const auto refused = judge(R"([{"skill":"pick","arguments":{"object":"b"}},{"skill":"pick"}])");
+  EXPECT_EQ(refused.error().line(), "/steps/1: the robot cannot do that: out of reach; ask for something nearer");
+  EXPECT_TRUE(judge(R"([{"skill":"pick","arguments":{"object":"b"}}])"));
+  EXPECT_EQ(asked, std::vector(3, task::Moment::kAdmission));
+  EXPECT_FALSE(review.judge_start({}, {"pick", Json::object()}));
+  EXPECT_EQ(asked.back(), task::Moment::kStart);
+}
+
+TEST_F(ReviewTest, AReplyHoldsOneTaskOrSeveral) {
+  EXPECT_EQ(Review::parse(R"({"id":"a","steps":[{"skill":"pick"}]})").value().size(), 1U);
+  EXPECT_EQ(Review::parse(R"({"tasks":[{"id":"a","steps":[{"skill":"pick"}]},{"id":"b","steps":[{"skill":"pick"}]}]})")
+                .value()[1]
+                .id,
+            "b");
+  EXPECT_EQ(Review::parse(R"({"tasks":[{"id":"a","steps":[{"skill":"pick"}]},{"id":"?"}]})").error().where,
+            "/tasks/1/id");
+  for (const char* const wrong : {R"({"tasks":[]})", R"({"tasks":{}})", R"({"tasks":[],"id":"a"})"})
+    EXPECT_EQ(Review::parse(wrong).error().where, "/tasks") << wrong;
 }
 
 }  // namespace

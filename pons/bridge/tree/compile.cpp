@@ -311,7 +311,10 @@ Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::st
 Expected<std::int32_t> Compiler::script(const std::string& text, std::int32_t scope, const std::string& where) {
   if (!entry_in(text, "").empty())
     return fail("a script that is read from the blackboard is not run", where, "write the script itself");
-  auto parsed = Script::parse(text, [&](std::string_view name) { return slot(scope, name); });
+  auto parsed = Script::parse(text, [&](std::string_view name) -> Expected<int> {
+    if (name.contains('.')) return fail(fmt::format("'{}' is no name of an entry", task::excerpt(name)));
+    return slot(scope, name);
+  });
   if (!parsed) {
     parsed.error().where = where;
     return std::unexpected(parsed.error());

@@ -122,11 +122,9 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
     return NodeStatus::kRunning;
   }
   const auto what = this->step(step);
-  if (!what) {
-    failure_ = Progress{Status::kFailed, what.error().line(), Json::object()};
-    const task::Note note{"refused", {{"skill", use.type->name}, {"reason", failure_->reason}}};
-    (void)observer_({step, use.type->name, leaf.tries, nullptr, nullptr, &note}, now_);
-    return NodeStatus::kFailure;
+  if (!what) return refused(step, what.error());
+  if (permit_) {
+    if (const auto may = permit_(*what, now_); !may) return refused(step, may.error());
   }
   if (leaf.tries++ == 0) leaf.began = clock_;
   if (auto told = observer_({step, use.type->name, leaf.tries, &what->arguments}, now_); !told)
@@ -145,6 +143,16 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   run_skill(step, Duration{0});
   std::erase_if(active_, [&](std::size_t other) { return !leaves_[other].skill; });
   return {};
+}
+
+NodeStatus Tree::refused(std::size_t step, const Error& why) {
+  Leaf& leaf = leaves_[step];
+  const std::string& skill = program_->uses[step].type->name;
+  leaf.began = clock_;  // it may be come to again at once
+  failure_ = Progress{Status::kFailed, why.line(), Json::object()};
+  const task::Note note{"refused", {{"skill", skill}, {"reason", failure_->reason}}};
+  (void)observer_({step, skill, leaf.tries, nullptr, nullptr, &note}, now_);
+  return NodeStatus::kFailure;
 }
 
 // What the leaf comes to.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -197,6 +198,11 @@ Expected<Value> Script::compare(const Expression& expression, std::span<Slot> sl
     next = link.third;
   }
   return truth(true);
+}
+
+bool Script::is_condition() const {
+  return statements_.size() == 1 &&
+         std::ranges::none_of(expressions_, [](const Expression& each) { return each.op >= Operator::kCreate; });
 }
 
 Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slots) const {

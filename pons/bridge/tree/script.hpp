@@ -1,8 +1,8 @@
 // The scripting language of BehaviorTree.CPP 4: statements apart by ';', variables of the blackboard, := = += -= *= /=,
 // ?:, || &&, comparisons in chains, | ^ & ~, + - * /, .. to join text, numbers, 'text', true and false.
 //
-// Both sides of && and || are evaluated. Equal are numbers within the epsilon of a float, as there. Enumerations are
-// not known: a name is a variable.
+// A name may have parts, as in object.mass_kg. Both sides of && and || are evaluated. Equal are numbers within the
+// epsilon of a float, as there. Enumerations are not known: a name is a variable.
 #pragma once
 
 #include <cstdint>
@@ -75,6 +75,8 @@ class Script {
   [[nodiscard]] Expected<Value> run(std::span<Slot> slots) const;
   // Likewise, as a truth value.
   [[nodiscard]] Expected<bool> holds(std::span<Slot> slots) const;
+  // Whether it is one statement that writes to no variable.
+  [[nodiscard]] bool is_condition() const;
   // How much there is to do.
   [[nodiscard]] std::size_t size() const { return expressions_.size(); }
 

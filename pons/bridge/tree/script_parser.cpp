@@ -77,6 +77,16 @@ std::size_t number_length(std::string_view text) {
   return i;
 }
 
+// Of speed, @speed, object.mass_kg; two dots join texts.
+std::size_t name_length(std::string_view text) {
+  std::size_t i = 1;
+  for (; i < text.size(); ++i) {
+    const bool part_begins = text[i] == '.' && i + 1 < text.size() && is_letter(text[i + 1]);
+    if (!is_letter(text[i]) && !is_digit(text[i]) && !part_begins) break;
+  }
+  return i;
+}
+
 std::optional<Value> number(std::string_view text) {
   const char* const end = text.data() + text.size();
   if (text.starts_with("0x") || text.starts_with("0X")) {
@@ -139,9 +149,7 @@ class Script::Parser {
     if (rest.empty()) return take(Token::Kind::kEnd, 0);
     if (is_digit(rest[0])) return take(Token::Kind::kNumber, number_length(rest));
     if (is_letter(rest[0]) || rest[0] == '@') {
-      const auto end =
-          std::find_if_not(rest.begin() + 1, rest.end(), [](char c) { return is_letter(c) || is_digit(c); });
-      return take(Token::Kind::kName, static_cast<std::size_t>(end - rest.begin()));
+      return take(Token::Kind::kName, name_length(rest));
     }
     if (rest[0] == '\'' || rest[0] == '"') {
       const std::size_t end = rest.find(rest[0], 1);

@@ -19,9 +19,10 @@ constexpr std::size_t kMostWork = 20'000;
 
 }  // namespace
 
-Tree::Tree(std::shared_ptr<const Program> program, Observer observer)
+Tree::Tree(std::shared_ptr<const Program> program, Observer observer, Permit permit)
     : program_(std::move(program)),
       observer_(std::move(observer)),
+      permit_(std::move(permit)),
       states_(program_->nodes.size()),
       slots_(program_->entries.size()),
       leaves_(program_->uses.size()),

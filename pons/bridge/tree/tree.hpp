@@ -43,9 +43,13 @@ struct Attempt {
 // of it.
 using Observer = std::function<Expected<void>(const Attempt& attempt, Time now)>;
 
+// Whether a leaf may start its skill now. Error: why not; the leaf has failed.
+using Permit = std::function<Expected<void>(const task::Step& use, Time now)>;
+
 class Tree {
  public:
-  Tree(std::shared_ptr<const Program> program, Observer observer);
+  // Without `permit` every leaf may.
+  Tree(std::shared_ptr<const Program> program, Observer observer, Permit permit = {});
 
   // Sets an entry of the main tree's blackboard, before the first tick. Error: the program has none of that name.
   [[nodiscard]] Expected<void> set(std::string_view name, const Json& value);
@@ -174,6 +178,7 @@ class Tree {
   [[nodiscard]] NodeStatus wait_out(std::int32_t index);
   [[nodiscard]] NodeStatus skill(std::int32_t index);
   [[nodiscard]] std::optional<NodeStatus> begin(std::size_t step);
+  [[nodiscard]] NodeStatus refused(std::size_t step, const Error& why);
   [[nodiscard]] NodeStatus skill_ended(std::size_t step);
   // In this tick, and the tree has not come by yet.
   [[nodiscard]] bool skill_has_ended(std::int32_t index) const;
@@ -185,6 +190,7 @@ class Tree {
 
   std::shared_ptr<const Program> program_;
   Observer observer_;
+  Permit permit_;
   std::vector<State> states_;
   std::vector<Slot> slots_;
   std::vector<Leaf> leaves_;

@@ -1,0 +1,124 @@
+// A brain that lies, contradicts itself, asks for what people must allow, and asks too often, beside a run's own work.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class HostileBrain : public ::testing::Test {
+ protected:
+  HostileBrain() {
+    std::filesystem::copy(PONS_WORLDS_SOURCE, folder_ / "worlds", std::filesystem::copy_options::recursive);
+    const auto file = folder_ / "worlds" / "small_cell" / "world.yaml";
+    std::string text = read_text(file);
+    const auto insert = [&](const std::string& before, const std::string& line) {
+      const auto at = text.find(before);
+      ASSERT_NE(at, std::string::npos) << before;
+      text.insert(at, line);
+    };
+    insert("    - {name: hard_press", "    - {name: lookout, skills: [detect], approve: operator}\n");
+    insert("    - {name: senders", "    - {name: lookouts, skills: [detect], at_most: 1, per_s: 3600}\n");
+    write_text(file, text);
+  }
+  void during_a_run(const std::function<void()>& visit) {
+    const Finished run = run_pons_and({"run", "small_cell", "--parcels", "8", "--seed", "3", "--lockstep", "--socket",
+                                       folder_ / "s", "--journal", folder_ / "j.db", "--report", folder_ / "r.json"},
+                                      1, [&](pid_t) { visit(); }, {"PONS_WORLDS=" + (folder_ / "worlds").string()});
+    EXPECT_EQ(run.code, 0) << run.err;
+  }
+  Finished submit(const std::string& task) {
+    write_text(folder_ / "task.json", task);
+    return run_pons({"task", "submit", folder_ / "task.json", "--socket", folder_ / "s"});
+  }
+  Finished task(const std::string& verb, const std::string& id, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> line{"task", verb};
+    if (!id.empty()) line.push_back(id);
+    line.insert(line.end(), more.begin(), more.end());
+    line.insert(line.end(), {"--socket", folder_ / "s"});
+    return run_pons(line);
+  }
+  std::string story(const std::string& id) {
+    return run_pons({"task", "history", id, "--journal", folder_ / "j.db"}).out;
+  }
+  static std::string place(const std::string& id, const std::string& object, const std::string& where) {
+    return fmt::format(R"({{"id":"{}","steps":[{{"skill":"place","arguments":{{"object":"{}","place":"{}"}}}}]}})", id,
+                       object, where);
+  }
+
+  Folder folder_;
+};
+
+TEST_F(HostileBrain, IsRefusedInWordsThatItCanActOn) {
+  during_a_run([&] {
+    int refused = 0;
+    for (const char* const chute : {"north", "south", "east"}) {
+      const Finished lie = submit(place(fmt::format("lie-{}", chute), "P000008", chute));
+      if (lie.err.find("(ordered_place): it is ordered elsewhere") != std::string::npos) ++refused;
+    }
+    EXPECT_GE(refused, 2) << "one of them is right";
+    const Finished reply =
+        submit(fmt::format(R"({{"tasks":[{},{}]}})", place("a", "X", "exception"), place("b", "X", "tray")));
+    EXPECT_EQ(reply.code, 2);
+    EXPECT_THAT(reply.err, AllOf(HasSubstr("/tasks/1/steps/0: against the rules of this world (one_way)"),
+                                 HasSubstr("leave it out, or cancel the other task")));
+    EXPECT_THAT(submit(place("nobody", "X", "north")).err, HasSubstr("(ordered_place): it is ordered elsewhere"));
+    EXPECT_EQ(submit(fmt::format(R"({{"tasks":[{},{}]}})",
+                                 R"({"id":"c","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})",
+                                 R"({"id":"d","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})"))
+                  .out,
+              "c: accepted\nd: accepted\n");
+  });
+  EXPECT_EQ(run_pons({"task", "show", "a", "--journal", folder_ / "j.db"}).code, 2);
+  EXPECT_THAT(story("b"), HasSubstr("refused")) << "the journal knows";
+  EXPECT_THAT(story("d"), HasSubstr("SUCCEEDED"));
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
+  const nlohmann::json report = read_json(folder_ / "r.json");
+  EXPECT_EQ(report["parcels"]["missorted"], 0);
+  EXPECT_EQ(report["parcels"]["lost"], 0);
+}
+
+TEST_F(HostileBrain, WaitsForPeopleAndIsKeptToItsRates) {
+  const std::string look = R"("steps":[{"skill":"detect","arguments":{"object":"nobody","within_s":0.1}}])";
+  during_a_run([&] {
+    EXPECT_EQ(submit(fmt::format(R"({{"id":"first",{}}})", look)).code, 0);
+    EXPECT_EQ(submit(fmt::format(R"({{"id":"second",{}}})", look)).code, 0);
+    EXPECT_THAT(task("list", "").out, HasSubstr("asks a person"));
+    EXPECT_THAT(task("approve", "first", {"--as", "cleaner"}).err, HasSubstr("people are operator, supervisor"));
+    const Finished allowed = task("approve", "first", {"--as", "supervisor", "--by", "Kim"});
+    EXPECT_EQ(allowed.out, "first: allowed\n") << allowed.err;
+    EXPECT_EQ(task("watch", "first").code, 0);
+    EXPECT_EQ(task("approve", "second", {"--as", "operator"}).code, 0);
+    EXPECT_EQ(task("watch", "second").code, 0);
+    EXPECT_EQ(task("approve", "second", {"--as", "operator"}).code, 2);
+  });
+  EXPECT_THAT(story("first"), AllOf(HasSubstr("asked         for leave: operator (lookout: detect {"),
+                                    HasSubstr("allowed       by Kim, supervisor"), HasSubstr("step 0, detect, try 1")));
+  EXPECT_THAT(story("second"), HasSubstr("FAILED: against the rules of this world (lookouts): at most 1 in 3600 s"));
+}
+
+TEST_F(HostileBrain, RulesThatMeanNothingAreErrorsOfTheFile) {
+  const auto file = folder_ / "worlds" / "small_cell" / "world.yaml";
+  std::string text = read_text(file);
+  const std::string right = "place != object.destination";
+  ASSERT_NE(text.find(right), std::string::npos);
+  write_text(file, text.replace(text.find(right), right.size(), "place != object.desitnation"));
+  const Finished run = run_pons({"run", "small_cell", "--parcels", "1", "--journal", folder_ / "none.db"},
+                                {"PONS_WORLDS=" + (folder_ / "worlds").string()});
+  EXPECT_EQ(run.code, 2);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("world.yaml:"), HasSubstr("review.rules[0]: nothing has a 'desitnation'"),
+                             HasSubstr("of things may be known: kind, destination")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "none.db"));
+}
+
+}  // namespace
+}  // namespace pons::tests
