@@ -26,6 +26,8 @@ constexpr std::string_view kSchema = R"({
     "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "observe",
                     "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
+    "which": {"enum": ["open", "ended"]},
+    "limit": {"type": "integer", "minimum": 1, "maximum": 1000},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
     "after": {"type": "integer", "minimum": 0, "maximum": 1000000000000},
     "reason": {"type": "string", "maxLength": 200},
@@ -39,13 +41,9 @@ constexpr std::string_view kSchema = R"({
 
 // Those with nothing beside their name.
 const std::map<std::string, Operation, std::less<>> kBare = {
-    {"list", Operation::kList},
-    {"observe", Operation::kObserve},
-    {"robot", Operation::kRobot},
-    {"stop", Operation::kStop},
-    {"emergency_stop", Operation::kEmergencyStop},
-    {"reset", Operation::kReset},
-    {"arm", Operation::kArm},
+    {"observe", Operation::kObserve}, {"robot", Operation::kRobot},
+    {"stop", Operation::kStop},       {"emergency_stop", Operation::kEmergencyStop},
+    {"reset", Operation::kReset},     {"arm", Operation::kArm},
 };
 
 const Schema& schema() {
@@ -61,12 +59,13 @@ const std::map<std::string, Operation, std::less<>> kOfTask = {
 
 // Which operations each member belongs to; all but kOptional are needed there.
 const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
-    {"task", {"submit"}},     {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt"}},
-    {"after", {"watch"}},     {"reason", {"pause", "cancel", "halt"}},
-    {"stream", {"chunk"}},    {"observed", {"chunk"}},
-    {"period_ms", {"chunk"}}, {"actions", {"chunk"}},
+    {"task", {"submit"}},         {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt"}},
+    {"after", {"list", "watch"}}, {"reason", {"pause", "cancel", "halt"}},
+    {"which", {"list"}},          {"limit", {"list"}},
+    {"stream", {"chunk"}},        {"observed", {"chunk"}},
+    {"period_ms", {"chunk"}},     {"actions", {"chunk"}},
     {"last", {"chunk"}}};
-constexpr std::array<std::string_view, 3> kOptional = {"after", "reason", "last"};
+constexpr std::array<std::string_view, 5> kOptional = {"after", "which", "limit", "reason", "last"};
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
@@ -109,6 +108,12 @@ Expected<Asked> asked_from(std::string_view text) {
                  .task = json->at("id").get<std::string>(),
                  .reason = json->value("reason", std::string{}),
                  .after = json->value("after", std::int64_t{0})};
+  }
+  if (operation == "list") {
+    return Asked{.operation = Operation::kList,
+                 .after = json->value("after", std::int64_t{0}),
+                 .which = json->value("which", "open") == "open" ? Which::kOpen : Which::kEnded,
+                 .limit = json->value("limit", kListed)};
   }
   if (operation == "chunk") return chunk_from(*json);
   return Asked{.operation = kBare.at(operation)};
