@@ -291,6 +291,9 @@ TEST_P(AnyJournal, LeavesOutWhatACheckpointHasTakenIn) {
   EXPECT_EQ(story.trying().at(0).arguments, (Json{{"object", "lamp"}}));
   EXPECT_EQ(story.checkpoint(), (Json{{"clock_ns", 49}}));
   EXPECT_EQ(journal->task("other").value()->events.size(), 1u);
+  ASSERT_TRUE(shorten(*journal, "tree", 0, at(50)));
+  EXPECT_EQ(story_of(*journal).checkpoint(), (Json{{"clock_ns", 49}})) << "however few shall stay";
+  EXPECT_EQ(journal->task("tree").value()->events.size(), 3u + 4 + 1);
 }
 
 TEST_P(AnyJournal, ShortenedAgainItTellsHowManyAreLeftOutInAll) {
