@@ -73,7 +73,7 @@ class Arbiter {
 
  private:
   using Mask = std::uint64_t;
-  // Priority negated, aged; deadline, or the end of time; acceptance; what was added first.
+  // Priority negated, aged; deadline, or the end of time; acceptance, or since when for a seat again; what came first.
   using Rank = std::tuple<int, Time, Time, std::uint64_t>;
   struct Entry {
     Claim claim;
