@@ -116,8 +116,7 @@ void print_more(const TaskOptions& options, const Json& answer, const std::strin
   if (first ? all <= shown : shown < options.limit) return;
   const std::string how =
       fmt::format("pons task list --{}{}", which, shown > 0 ? fmt::format(" --after {}", after) : "");
-  const char* const is = which == "open" ? "open" : "ended";
-  fmt::print("{} {}: {}\n", first ? fmt::format("{} more", all - shown) : "further ones,", is, how);
+  fmt::print("{}: {}\n", first ? fmt::format("{} more {}", all - shown, which) : "what follows, if anything", how);
 }
 
 // Open ones first.
