@@ -354,7 +354,7 @@ void Bridge::checkpoint(Open& open, Time now) {
   open.unwritten = false;
   if (!open.program) return;
   tell(open, now, kCheckpointEvent, open.tree->checkpoint());
-  if (fault_ || open.events < kMostEvents) return;
+  if (open.events < kMostEvents) return;
   keep(shorten(journal_, open.task.id, kLastEvents, now));
   open.events = kLastEvents;
 }
