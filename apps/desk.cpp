@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -33,6 +34,7 @@ bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Opera
 
 constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
 constexpr std::size_t kWatchersMost = 16;  // half of the socket's clients: the other half is for whoever else asks
+constexpr std::int64_t kEndOfJournal = std::numeric_limits<std::int64_t>::max();
 constexpr std::string_view kAskedFor = "asked for over the socket";
 
 const Error kNoStream{"no stream goes on", "chunk_stream",
@@ -114,7 +116,7 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kHistory:
       return history(asked.task);
     case gate::Operation::kList:
-      return list();
+      return list(asked);
     case gate::Operation::kShow:
       return show(asked.task);
     case gate::Operation::kPause:
@@ -160,12 +162,24 @@ Json Desk::with_state(const bridge::TaskRecord& record) const {
   return json;
 }
 
-Json Desk::list() const {
-  const auto tasks = journal_.tasks();
-  if (!tasks) return gate::refusal(tasks.error());
-  Json list = Json::array();
-  for (const bridge::TaskRecord& record : *tasks) list.push_back(with_state(record));
-  return {{"ok", true}, {"tasks", std::move(list)}};
+// No look at more of the journal than is told: it may hold years, and the bridge waits meanwhile.
+Json Desk::list(const gate::Asked& asked) const {
+  std::vector<bridge::TaskRecord> records;
+  if (asked.which == gate::Which::kOpen) {
+    records = bridge_.open_tasks(asked.after, static_cast<std::size_t>(asked.limit));
+  } else {
+    auto ended = journal_.ended_tasks(asked.after > 0 ? asked.after : kEndOfJournal, asked.limit);
+    if (!ended) return gate::refusal(ended.error());
+    records = std::move(*ended);
+  }
+  Json tasks = Json::array();
+  for (const bridge::TaskRecord& record : records) tasks.push_back(with_state(record));
+  const std::int64_t after = records.empty() ? asked.after : records.back().sequence;
+  return {{"ok", true},
+          {"tasks", std::move(tasks)},
+          {"after", after},
+          {"open", bridge_.open_count()},
+          {"ended", journal_.ended()}};
 }
 
 Json Desk::show(const std::string& id) const {
@@ -194,8 +208,7 @@ std::optional<Json> Desk::news(const gate::Asked& asked) const {
 
 Json Desk::tell_task(const gate::Asked& asked, Time now) {
   const std::string_view reason = asked.reason.empty() ? kAskedFor : asked.reason;
-  const auto before = journal_.history(asked.task);
-  if (!before) return gate::refusal(before.error());
+  const std::int64_t before = journal_.newest();
   const auto told = [&]() -> Expected<void> {
     if (asked.operation == gate::Operation::kPause) return bridge_.pause(asked.task, now, reason);
     if (asked.operation == gate::Operation::kResume) return bridge_.resume(asked.task, now);
@@ -203,7 +216,7 @@ Json Desk::tell_task(const gate::Asked& asked, Time now) {
     return bridge_.cancel(asked.task, now, reason);
   }();
   if (!told) return gate::refusal(told.error());
-  return {{"ok", true}, {"id", asked.task}, {"after", before->empty() ? 0 : before->back().sequence}};
+  return {{"ok", true}, {"id", asked.task}, {"after", before}};
 }
 
 Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {

@@ -32,7 +32,7 @@ class Desk {
   [[nodiscard]] bridge::Json submit(const std::string& task, Time now);
   // The bridge knows more of an open task than the journal's row.
   [[nodiscard]] bridge::Json with_state(const bridge::TaskRecord& record) const;
-  [[nodiscard]] bridge::Json list() const;
+  [[nodiscard]] bridge::Json list(const gate::Asked& asked) const;
   [[nodiscard]] bridge::Json show(const std::string& id) const;
   [[nodiscard]] bridge::Json history(const std::string& order) const;
   [[nodiscard]] bridge::Json tell_task(const gate::Asked& asked, Time now);

@@ -4,6 +4,7 @@ namespace pons::apps {
 
 task::Json to_json(const bridge::TaskRecord& record) {
   task::Json json{{"id", record.task.id},
+                  {"sequence", record.sequence},
                   {"priority", record.task.priority},
                   {"accepted_s", record.accepted.s()},
                   {"started", record.started}};

@@ -119,6 +119,8 @@ std::string ended(const Json& d) {
   return fmt::format("{}{}{}{}{}", text(d, "outcome"), why.empty() ? "" : ": ", why, stopped, left);
 }
 
+std::string left_out(const Json& d) { return fmt::format("{} earlier events", text(d, "events")); }
+
 std::string preempting(const Json& d) { return "for " + text(d, "by"); }
 
 std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
@@ -144,7 +146,7 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"halting", reason},  {"pausing", reason},    {"paused", stop},
     {"preempted", stop},  {"held", held},         {"preempting", preempting},
     {"ended", ended},     {"refused", reason},    {"asked", asked},
-    {"allowed", allowed}, {"stopped", stopped}};
+    {"allowed", allowed}, {"stopped", stopped},   {"left_out", left_out}};
 
 }  // namespace
 

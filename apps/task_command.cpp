@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <set>
 #include <string>
 #include <string_view>
@@ -18,6 +20,7 @@
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/gate/request.hpp"
 
 namespace pons::apps {
 namespace {
@@ -29,7 +32,8 @@ struct TaskOptions {
   fs::path socket;
   std::string journal;
   std::string file, id, reason, tier, by;
-  bool json = false, at_once = false;
+  bool json = false, at_once = false, open = false, ended = false;
+  std::int64_t limit = gate::kListed, after = 0;
 };
 
 constexpr std::chrono::seconds kPatience{10};
@@ -80,14 +84,6 @@ void print_row(const Json& task) {
 Expected<Json> from_journal(const std::string& file, const std::string& id) {
   const auto journal = bridge::Journal::open_to_read(file);
   if (!journal) return std::unexpected(journal.error());
-  Json answer;
-  if (id.empty()) {
-    const auto tasks = (*journal)->tasks();
-    if (!tasks) return std::unexpected(tasks.error());
-    answer["tasks"] = Json::array();
-    for (const bridge::TaskRecord& record : *tasks) answer["tasks"].push_back(to_json(record));
-    return answer;
-  }
   const auto history = (*journal)->task(id);
   if (!history) return std::unexpected(history.error());
   if (!*history) return fail("no task '" + id + "'", bridge::shown(file), "pons task list shows those there are");
@@ -104,10 +100,63 @@ Expected<Json> story_from_journal(const std::string& file, const std::string& or
   return Json{{"events", to_json(*events)}};
 }
 
+// As a run answers.
+Expected<Json> list_from_journal(const TaskOptions& options, std::string_view which, std::int64_t limit) {
+  const auto journal = bridge::Journal::open_to_read(options.journal);
+  if (!journal) return std::unexpected(journal.error());
+  auto tasks = (*journal)->tasks();
+  if (!tasks) return std::unexpected(tasks.error());
+  const bool ended = which == "ended";
+  if (ended) std::ranges::reverse(*tasks);
+  std::map<std::string, std::int64_t> counts{{"open", 0}, {"ended", 0}};
+  Json page = Json::array();
+  for (const bridge::TaskRecord& record : *tasks) {
+    ++counts[record.outcome ? "ended" : "open"];
+    const bool further = options.after == 0 || (record.sequence > options.after) != ended;
+    const bool here = record.outcome.has_value() == ended && further && record.sequence != options.after;
+    if (here && std::ssize(page) < limit) page.push_back(to_json(record));
+  }
+  Json answer{{"tasks", page}, {"open", counts["open"]}, {"ended", counts["ended"]}};
+  answer["after"] = page.empty() ? options.after : page.back().at("sequence").get<std::int64_t>();
+  return answer;
+}
+
+// Which: "open" or "ended".
+Expected<Json> list_page(const TaskOptions& options, const std::string& which, std::int64_t limit) {
+  if (!options.journal.empty()) return list_from_journal(options, which, limit);
+  return ask(options, {{"op", "list"}, {"which", which}, {"limit", limit}, {"after", options.after}});
+}
+
+// What is not on this page, and how to see it.
+void print_more(const TaskOptions& options, const Json& answer, const std::string& which, std::int64_t shown) {
+  const std::int64_t all = answer.at(which), after = answer.at("after");
+  const bool first = options.after == 0;
+  if (first ? all <= shown : shown < options.limit) return;
+  const std::string how =
+      fmt::format("pons task list --{}{}", which, shown > 0 ? fmt::format(" --after {}", after) : "");
+  fmt::print("{}: {}\n", first ? fmt::format("{} more {}", all - shown, which) : "what follows, if anything", how);
+}
+
+// Open ones first.
 int list(const TaskOptions& options) {
-  const auto answer = options.journal.empty() ? ask(options, {{"op", "list"}}) : from_journal(options.journal, {});
-  if (!answer) return bad_input(answer.error());
-  for (const Json& task : answer->at("tasks")) print_row(task);
+  const bool both = options.open == options.ended;
+  if (both && options.after > 0)
+    return bad_input({"it goes on with one of two lists", "--after", "say --open or --ended, too"});
+  std::int64_t left = options.limit;
+  Json answer;
+  for (const std::string which : {"open", "ended"}) {
+    if (!both && (which == "open") != options.open) continue;
+    std::int64_t shown = 0;
+    if (left > 0) {
+      auto page = list_page(options, which, left);
+      if (!page) return bad_input(page.error());
+      answer = *std::move(page);
+      for (const Json& task : answer.at("tasks")) print_row(task);
+      shown = std::ssize(answer.at("tasks"));
+    }
+    left -= shown;
+    print_more(options, answer, which, shown);
+  }
   return kExitGood;
 }
 
@@ -184,9 +233,15 @@ void add_task(CLI::App& app, Chosen& chosen) {
   common(submit_command);
   submit_command->callback([options, &chosen] { chosen = [options] { return submit(*options); }; });
 
-  CLI::App* list_command = task->add_subcommand("list", "List the tasks");
+  CLI::App* list_command =
+      task->add_subcommand("list", "List the tasks: those that are open, then those that have ended");
   common(list_command);
   list_command->add_option("--journal", options->journal, "Read this journal instead of asking a run");
+  list_command->add_flag("--open", options->open, "Only those that are open, in the order of acceptance");
+  list_command->add_flag("--ended", options->ended, "Only those that have ended, the last accepted first");
+  list_command->add_option("--limit", options->limit, "At most so many (100)")->check(CLI::Range(1, 1000));
+  list_command->add_option("--after", options->after, "On from there; the page before says from where")
+      ->check(CLI::NonNegativeNumber);
   list_command->callback([options, &chosen] { chosen = [options] { return list(*options); }; });
 
   CLI::App* show_command = task->add_subcommand("show", "Show one task and what happened to it");

@@ -118,7 +118,7 @@ Expected<Admission> Bridge::take(Candidate candidate, Time now) {
     return std::unexpected(accepted.error());
   }
   unkept_ = true;
-  Open& open = add_open(std::move(candidate.task), std::move(candidate.program), now);
+  Open& open = add_open(std::move(candidate.task), std::move(candidate.program), now, journal_.newest());
   if (candidate.asked.empty()) {
     enqueue(open);
   } else {

@@ -39,8 +39,7 @@ void Bridge::ask(Open& open, Asked asked, Time now) {
   open.asked_since = now - held_for_;
   asking_.insert(open.task.id);
   unkept_ = true;
-  keep(journal_.event(open.task.id, now, kAskedEvent,
-                      {{"wanted", listed(open.asked)}, {"within_s", to_s(patience(open.asked))}}));
+  tell(open, now, kAskedEvent, {{"wanted", listed(open.asked)}, {"within_s", to_s(patience(open.asked))}});
   park(open, now);
 }
 
@@ -65,7 +64,7 @@ Expected<void> Bridge::approve(std::string_view id, std::string_view tier, std::
     open.allowed.insert(Open::key(leave));
   }
   unkept_ = true;
-  keep(journal_.event(open.task.id, now, kAllowedEvent, {{"by", by}, {"tier", tier}, {"uses", std::move(keys)}}));
+  tell(open, now, kAllowedEvent, {{"by", by}, {"tier", tier}, {"uses", std::move(keys)}});
   open.asked = std::move(left);
   if (!open.asked.empty()) return {};
   asking_.erase(open.task.id);

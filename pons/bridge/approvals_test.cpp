@@ -256,6 +256,26 @@ TEST_F(Approvals, OneThatHadBegunKeepsWhatWasAllowed) {
   EXPECT_EQ(pick_.log.started.size(), 2U);
 }
 
+// A long story is shortened; not by that.
+TEST_F(Approvals, WhatWasAllowedStaysAllowedHoweverLongTheStory) {
+  open(asks());
+  masses_ = {{"crate", 3.0}};
+  ASSERT_TRUE(
+      submit_text(R"({"id":"a","tree":{"xml":"<root BTCPP_format='4'><BehaviorTree ID='t'><Repeat num_cycles='-1'>)"
+                  R"(<Action ID='pick' object='crate'/></Repeat></BehaviorTree></root>"}})"));
+  ASSERT_TRUE(bridge_->approve("a", "operator", "Kim", now_));
+  EXPECT_THAT(run(60), IsEmpty());
+  EXPECT_THAT(kinds("a"), Contains("left_out"));
+  ASSERT_TRUE(bridge_->commit(now_));
+  begin();
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+  const std::size_t picked = pick_.log.started.size();
+  EXPECT_THAT(run(5), IsEmpty());
+  EXPECT_GT(pick_.log.started.size(), picked + 10);
+  EXPECT_THAT(kinds("a"), Not(Contains("refused")));
+  EXPECT_TRUE(audit(*journal_).empty());
+}
+
 TEST_F(Approvals, AReplyIsTakenWholeOrNotAtAll) {
   open({.contradictions = {{.name = "once", .skills = {"pick"}, .same = {"object"}, .differ = {}}}});
   const auto reply = [](const std::string& second) {

@@ -16,6 +16,11 @@ namespace {
 // Events between the durable moments of a task may wait this long for the disk.
 constexpr Duration kCommitPeriod = std::chrono::seconds(5);
 
+// Tasks that need no resource share so much of a tick, in nodes and operators, about 5 ms; who does not come to its
+// turn has it in the next. A start of a skill waits for the disk, which is as long as so many of them.
+constexpr std::size_t kSharedWork = 50'000;
+constexpr std::size_t kWorkOfACommit = 10'000;
+
 // Of the skills that a task has used its outcome tells the last ones; a tree may go round for weeks.
 constexpr std::size_t kMostTold = 64;
 
@@ -39,7 +44,8 @@ Bridge::~Bridge() = default;
 
 // ---- in ----
 
-Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted) {
+Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted,
+                               std::int64_t sequence) {
   auto open = std::make_unique<Open>();
   if (program) open->resources = program->resources;
   for (const task::Step& step : task.steps) {
@@ -48,6 +54,7 @@ Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Prog
   }
   // What thousands wait with need not be ready to run.
   if (task.tree && task.tree->xml.empty()) open->program = std::move(program);
+  open->sequence = sequence;
   open->accepted = accepted;
   open->waits_since = accepted - held_for_;
   open->priority = task.priority;
@@ -114,7 +121,7 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
   if (begun && program) return go_on_in_tree(record, std::move(program), story, resume, now);
   if (begun && !story.handed_over()) return go_on(record, story, resume, now);
   if (begun) keep(journal_.event(record.task.id, now, kResumedEvent, {{"step", story.done()}}));
-  Open& open = add_open(record.task, std::move(program), record.accepted);
+  Open& open = add_open(record.task, std::move(program), record.accepted, record.sequence);
   open.begun = begun;
   open.done = story.done();
   open.allowed = story.allowed();
@@ -143,11 +150,11 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
     return {};
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", what.done}}));
-  Open& open = add_open(task, nullptr, record.accepted);
+  Open& open = add_open(task, nullptr, record.accepted, record.sequence);
   open.done = what.done;
   open.begun = true;
   open.allowed = story.allowed();
-  open.priority = Arbiter::kFirst;  // it may hold what the next one would need
+  if (!open.resources.empty()) open.priority = Arbiter::kFirst;  // it may hold what the next one would need
   if (story.paused()) open.told = Open::Told::kPause;
   enqueue(open);
   return {};
@@ -166,11 +173,11 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
     }
   }
   Json anew = Json::array();
-  for (const auto& [leaf, arguments] : story.trying()) {
+  for (const auto& [leaf, trying] : story.trying()) {
     if (!tree->under_way(leaf)) continue;
     Resumption what;
     if (!story.handed_over()) {
-      const task::Step step{program->uses[leaf].type->name, arguments};
+      const task::Step step{program->uses[leaf].type->name, trying.arguments};
       what = resume({.id = task.id, .order = task.order, .steps = {step}}, 0);
     }
     if (what.outcome == task::Outcome::kException) {
@@ -185,14 +192,15 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
     }
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", std::move(anew)}}));
-  Open& open = add_open(task, program, record.accepted);
+  Open& open = add_open(task, program, record.accepted, record.sequence);
   open.program = std::move(program);
   open.tree = std::move(tree);
   open.begun = true;
   open.allowed = story.allowed();
+  open.events = story.length();
   checkpoint(open, now);
   if (!story.handed_over()) {
-    open.priority = Arbiter::kFirst;  // it may hold what the next one would need
+    if (!open.resources.empty()) open.priority = Arbiter::kFirst;  // it may hold what the next one would need
     if (story.paused()) open.told = Open::Told::kPause;
   } else if (story.paused()) {
     open.paused = true;
@@ -227,7 +235,8 @@ void Bridge::tick(Time now) {
   if (held()) stand_still(now);
   last_tick_ = now;
   // Who ends frees resources for who starts in the same tick.
-  tick_trees(running(), now);
+  shared_work_ = 0;
+  tick_trees(in_turn(), now);
   expire(now);
   expire_asked(now);
   take_orders(now);
@@ -278,16 +287,14 @@ std::vector<std::string> Bridge::start_granted(Time now) {
 void Bridge::regain(Open& open, Time now) {
   open.told = Open::Told::kNothing;
   open.stands = false;
-  keep(journal_.event(open.task.id, now, kRegainedEvent));
+  tell(open, now, kRegainedEvent);
   // Before anything moves, as with an attempt. Where that cannot be written, it is cancelled where it stands.
   keep(commit(now));
   if (!fault_) open.tree->resume(now);
 }
 
 void Bridge::start(Open& open, Time now) {
-  const std::string& id = open.task.id;
-  if (!std::exchange(open.begun, true))
-    keep(journal_.event(id, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}}));
+  if (!std::exchange(open.begun, true)) tell(open, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}});
   if (!open.tree) {
     // It was seen to be good when it was taken.
     if (open.task.tree && !open.program) open.program = review_.program(open.task).value_or(nullptr);
@@ -298,10 +305,23 @@ void Bridge::start(Open& open, Time now) {
   if (open.told == Open::Told::kPause) open.tree->pause(now, task::Pause::kStand);
 }
 
+// Of those that share the time, who did not come to its turn in the last tick is the first.
+std::vector<std::string> Bridge::in_turn() {
+  std::vector<std::string> ids = running();
+  std::ranges::rotate(ids, std::ranges::lower_bound(ids, std::exchange(next_, {})));
+  return ids;
+}
+
 void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
   for (const std::string& id : ids) {
     Open& open = *running_.find(id)->second;
+    const bool shares = open.resources.empty();
+    if (shares && shared_work_ >= kSharedWork) {
+      if (next_.empty()) next_ = id;
+      continue;
+    }
     const task::Status status = open.tree->tick(now);
+    if (shares) shared_work_ += open.tree->work();
     // Never begun, because the journal could not say that it would: it stays open there.
     if (fault_ && open.attempts == 0) {
       arbiter_.release(id);
@@ -313,7 +333,7 @@ void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
       conclude(id, open, open.tree->result(), now);
       continue;
     }
-    if (open.unwritten) checkpoint(open, now);
+    if (open.unwritten || (open.program && open.events >= kMostEvents)) checkpoint(open, now);
     if (status == task::Status::kPaused && !open.cancelled) {
       stands(open, now);
     } else if (give_up(open)) {
@@ -325,7 +345,11 @@ void Bridge::tick_trees(const std::vector<std::string>& ids, Time now) {
 // Of steps the attempts tell all.
 void Bridge::checkpoint(Open& open, Time now) {
   open.unwritten = false;
-  if (open.program) keep(journal_.event(open.task.id, now, kCheckpointEvent, open.tree->checkpoint()));
+  if (!open.program) return;
+  tell(open, now, kCheckpointEvent, open.tree->checkpoint());
+  if (open.events < kMostEvents) return;
+  keep(shorten(journal_, open.task.id, kLastEvents, now));
+  open.events = kLastEvents;
 }
 
 bool Bridge::give_up(const Open& open) {
@@ -376,7 +400,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
           {fmt::format("the skill {} notes '{}', which only the bridge may say", attempt.skill, attempt.note->kind),
            "bridge", "mend the skill"});
     } else {
-      keep(journal_.event(id, now, attempt.note->kind, attempt.note->detail));
+      tell(open, now, attempt.note->kind, attempt.note->detail);
     }
     return {};
   }
@@ -385,10 +409,11 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
     if (fault_) return std::unexpected(*fault_);
     checkpoint(open, now);
     if (open.program && attempt.arguments != nullptr) detail["arguments"] = *attempt.arguments;
-    keep(journal_.event(id, now, kAttemptEvent, detail));
+    tell(open, now, kAttemptEvent, detail);
     // Before anything moves: whoever reads this after a crash must know what may have been moved, and what was done
     // before it.
     if (auto kept = commit(now); !kept) return kept;
+    if (open.resources.empty()) shared_work_ += kWorkOfACommit;
     ++open.attempts;
     if (attempt.number > 1) ++retries_;
     return {};
@@ -399,7 +424,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
   detail["status"] = task::name(attempt.ended->status);
   detail["reason"] = attempt.ended->reason;
   detail["detail"] = attempt.ended->detail;
-  keep(journal_.event(id, now, kAttemptEndedEvent, detail));
+  tell(open, now, kAttemptEndedEvent, detail);
   open.unwritten = true;
   return {};
 }
@@ -430,6 +455,11 @@ std::vector<std::string> Bridge::running() const {
 
 bool Bridge::uses_resources() const {
   return std::ranges::any_of(running_, [](const auto& entry) { return !entry.second->resources.empty(); });
+}
+
+void Bridge::tell(Open& open, Time now, std::string_view kind, const Json& detail) {
+  keep(journal_.event(open.task.id, now, kind, detail));
+  ++open.events;
 }
 
 void Bridge::keep(const Expected<void>& written) {

@@ -31,6 +31,9 @@ namespace pons::bridge {
 
 inline constexpr std::size_t kMaxOpen = 10'000;    // tasks without an outcome;
 inline constexpr std::size_t kMaxUrgent = 10'100;  // until there are so many, an urgent one is taken all the same
+// A tree may go round for weeks. Of one that is open the journal holds fewer events than kMostEvents and those of one
+// tick; when there are as many, what the checkpoint has taken in goes, but for the last ones, which tell its story.
+inline constexpr std::size_t kMostEvents = 512, kLastEvents = 256;
 // A skill that was cancelled, or ran out of time, and has not ended after this long is given up: see Bridge::fault().
 inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
 
@@ -121,6 +124,10 @@ class Bridge {
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
+  // Open tasks, in the order of their acceptance: at most so many, of those accepted after that event of the journal.
+  // Of the task itself, id and priority only.
+  [[nodiscard]] std::vector<TaskRecord> open_tasks(std::int64_t after, std::size_t most) const;
+  [[nodiscard]] std::size_t open_count() const { return open_.size(); }
   // How an open task stands, for a person to read: "waiting", "running", "pausing", "paused", "making way",
   // "preempted", "ending", "asks a person"; empty when there is no such open task.
   [[nodiscard]] std::string_view state(std::string_view id) const;
@@ -156,7 +163,8 @@ class Bridge {
   [[nodiscard]] Expected<Admission> take(Candidate candidate, Time now);
   void let_go(const std::vector<Candidate>& candidates);
   void note_refused(const std::string& id, const std::string& order, const std::string& reason, Time now);
-  [[nodiscard]] Open& add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted);
+  [[nodiscard]] Open& add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted,
+                               std::int64_t sequence);
   [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,
                                                     std::shared_ptr<const tree::Program> program);
   void enqueue(const Open& open);
@@ -183,7 +191,9 @@ class Bridge {
   void preempt(Time now);
   void stands(Open& open, Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
+  [[nodiscard]] std::vector<std::string> in_turn();
   [[nodiscard]] bool give_up(const Open& open);
+  void tell(Open& open, Time now, std::string_view kind, const Json& detail = Json::object());
   void checkpoint(Open& open, Time now);
   void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
   enum class Ending : std::uint8_t { kCancel, kHalt };
@@ -209,6 +219,8 @@ class Bridge {
   std::set<std::string> asking_;                 // a person
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_;
+  std::size_t shared_work_ = 0;  // of this tick, by those that need no resource
+  std::string next_;             // of those, who has the first turn in the next tick; empty: all have had theirs
   Time last_commit_, last_tick_, look_at_;  // the last: into the order book again
   Duration held_for_{0};                    // since the first tick
   std::int64_t retries_ = 0, refused_ = 0;

@@ -26,7 +26,8 @@ struct Bridge::Open {
   };
 
   task::Task task;
-  int priority = 50;  // it waits with
+  int priority = 50;          // it waits with
+  std::int64_t sequence = 0;  // of its acceptance in the journal
   Time accepted;
   Time waits_since;      // it ages from then on, in the arbiter's time, which stands while nothing may start
   Time parked_at;        // in that time, too
@@ -49,6 +50,7 @@ struct Bridge::Open {
   bool cancelled = false, halted = false;
   std::string cancel_reason;
   int attempts = 0;
+  std::size_t events = 0;      // in the journal, about
   Json steps = Json::array();  // what each step that ended had to tell
 };
 

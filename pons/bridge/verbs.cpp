@@ -1,6 +1,7 @@
 // What a task may be told after it was accepted: pause, resume, preempt, cancel, halt.
 #include <fmt/format.h>
 
+#include <ranges>
 #include <utility>
 
 #include "pons/bridge/bridge.hpp"
@@ -16,6 +17,20 @@ Expected<Bridge::Open*> Bridge::find_open(std::string_view id) {
     return fail(fmt::format("there is no open task '{}'", task::excerpt(id)), {},
                 "pons task list shows those there are");
   return found->second.get();
+}
+
+std::vector<TaskRecord> Bridge::open_tasks(std::int64_t after, std::size_t most) const {
+  std::map<std::int64_t, const Open*> in_order;
+  for (const auto& [id, open] : open_) {
+    if (open->sequence > after) in_order.emplace(open->sequence, open.get());
+  }
+  std::vector<TaskRecord> tasks;
+  for (const auto& [sequence, open] : in_order | std::views::take(most))
+    tasks.push_back({.sequence = sequence,
+                     .task = {.id = open->task.id, .priority = open->task.priority},
+                     .accepted = open->accepted,
+                     .started = open->begun});
+  return tasks;
 }
 
 std::string_view Bridge::state(std::string_view id) const {
@@ -48,12 +63,12 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
     arbiter_.remove(open.task.id);
     if (open.stage == Open::Stage::kWaits) park(open, now);
     open.paused = true;
-    keep(journal_.event(open.task.id, now, kPausedEvent, {{"reason", reason}}));
+    tell(open, now, kPausedEvent, {{"reason", reason}});
     return {};
   }
   open.told = Open::Told::kPause;
   open.stands = false;
-  keep(journal_.event(open.task.id, now, kPausingEvent, {{"reason", reason}}));
+  tell(open, now, kPausingEvent, {{"reason", reason}});
   if (open.tree) open.tree->pause(now, task::Pause::kStand);
   return {};
 }
@@ -79,7 +94,7 @@ Expected<void> Bridge::resume(std::string_view id, Time now) {
   if (open.cancelled || (!parked && open.told != Open::Told::kPause))
     return fail(fmt::format("task '{}' is not paused", open.task.id), {}, "pons task show says how it stands");
   unkept_ = true;
-  keep(journal_.event(open.task.id, now, kContinuedEvent));
+  tell(open, now, kContinuedEvent);
   open.told = Open::Told::kNothing;
   open.stands = false;
   if (std::exchange(open.paused, false)) {
@@ -94,12 +109,13 @@ Expected<void> Bridge::resume(std::string_view id, Time now) {
 
 void Bridge::preempt(Time now) {
   if (held() || fault_) return;
-  for (const auto& [id, by] : arbiter_.preemptions()) {
+  const auto stays = [this](std::string_view id) { return running_.find(id)->second->told == Open::Told::kPause; };
+  for (const auto& [id, by] : arbiter_.preemptions(stays)) {
     Open& open = *running_.find(id)->second;
     if (open.told != Open::Told::kNothing || open.cancelled) continue;
     open.told = Open::Told::kPreempt;
     open.stands = false;
-    keep(journal_.event(id, now, kPreemptingEvent, {{"by", by}}));
+    tell(open, now, kPreemptingEvent, {{"by", by}});
     open.tree->pause(now, task::Pause::kHandOver);
   }
 }
@@ -116,10 +132,10 @@ void Bridge::stands(Open& open, Time now) {
     return;
   }
   if (open.told != Open::Told::kPreempt) {
-    keep(journal_.event(id, now, kPausedEvent, detail));
+    tell(open, now, kPausedEvent, detail);
     return;
   }
-  keep(journal_.event(id, now, kPreemptedEvent, detail));
+  tell(open, now, kPreemptedEvent, detail);
   running_.erase(id);
   arbiter_.hand_over(id);
   open.stage = Open::Stage::kWaits;
@@ -172,7 +188,7 @@ void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view r
   }
   // After a fault nobody has told it to end: another bridge goes on with it.
   if (fault_) return;
-  keep(journal_.event(open.task.id, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}}));
+  tell(open, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}});
 }
 
 void Bridge::end_all(Time now, std::string_view reason) {
@@ -203,7 +219,7 @@ void Bridge::emergency_stop(Time now, std::string_view cause) {
   for (const auto& [id, open] : open_) {
     open->held = true;
     unkept_ = true;
-    keep(journal_.event(id, now, kHeldEvent, {{"cause", cause}}));
+    tell(*open, now, kHeldEvent, {{"cause", cause}});
   }
 }
 
@@ -212,7 +228,7 @@ void Bridge::released(Time now) {
   for (const auto& [id, open] : open_) {
     if (!std::exchange(open->held, false)) continue;
     unkept_ = true;
-    keep(journal_.event(id, now, kReleasedEvent));
+    tell(*open, now, kReleasedEvent);
   }
 }
 

@@ -27,6 +27,8 @@ constexpr std::string_view kSchema = R"({
                     "observe", "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
     "tasks": {"type": "array", "items": {"type": "object"}},
+    "which": {"enum": ["open", "ended"]},
+    "limit": {"type": "integer", "minimum": 1, "maximum": 1000},
     "id": {"type": "string", "minLength": 1, "maxLength": 64},
     "after": {"type": "integer", "minimum": 0, "maximum": 1000000000000},
     "reason": {"type": "string", "maxLength": 200},
@@ -42,13 +44,9 @@ constexpr std::string_view kSchema = R"({
 
 // Those with nothing beside their name.
 const std::map<std::string, Operation, std::less<>> kBare = {
-    {"list", Operation::kList},
-    {"observe", Operation::kObserve},
-    {"robot", Operation::kRobot},
-    {"stop", Operation::kStop},
-    {"emergency_stop", Operation::kEmergencyStop},
-    {"reset", Operation::kReset},
-    {"arm", Operation::kArm},
+    {"observe", Operation::kObserve}, {"robot", Operation::kRobot},
+    {"stop", Operation::kStop},       {"emergency_stop", Operation::kEmergencyStop},
+    {"reset", Operation::kReset},     {"arm", Operation::kArm},
 };
 
 const Schema& schema() {
@@ -69,14 +67,16 @@ const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
     {"tier", {"approve"}},
     {"by", {"approve"}},
     {"id", {"show", "history", "watch", "pause", "resume", "cancel", "halt", "approve"}},
-    {"after", {"watch"}},
+    {"after", {"list", "watch"}},
+    {"which", {"list"}},
+    {"limit", {"list"}},
     {"reason", {"pause", "cancel", "halt"}},
     {"stream", {"chunk"}},
     {"observed", {"chunk"}},
     {"period_ms", {"chunk"}},
     {"actions", {"chunk"}},
     {"last", {"chunk"}}};
-constexpr std::array<std::string_view, 5> kOptional = {"task", "tasks", "after", "reason", "last"};
+constexpr std::array<std::string_view, 7> kOptional = {"task", "tasks", "after", "which", "limit", "reason", "last"};
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
@@ -129,6 +129,12 @@ Expected<Asked> asked_from(std::string_view text) {
                  .tier = json->value("tier", std::string{}),
                  .by = json->value("by", std::string{}),
                  .after = json->value("after", std::int64_t{0})};
+  }
+  if (operation == "list") {
+    return Asked{.operation = Operation::kList,
+                 .after = json->value("after", std::int64_t{0}),
+                 .which = json->value("which", "open") == "open" ? Which::kOpen : Which::kEnded,
+                 .limit = json->value("limit", kListed)};
   }
   if (operation == "chunk") return chunk_from(*json);
   return Asked{.operation = kBare.at(operation)};

@@ -2,7 +2,10 @@
 //   {"op":"submit","task":{…}}   → {"ok":true,"id":…,"accepted":"new"|"already","tasks":[…]}
 //   {"op":"submit","tasks":[{…},…]}
 //                                → {"ok":true,"tasks":[{"id":…,"accepted":…},…]}: one brain's reply, whole or not
-//   {"op":"list"}                → {"ok":true,"tasks":[…]}
+//   {"op":"list","which":"open","limit":100,"after":117}
+//                                → {"ok":true,"tasks":[…],"after":121,"open":12,"ended":3456}: at most so many; those
+//                                   that are open, in the order of acceptance, or "ended", the last accepted first;
+//                                   on from where another answer ended. How many there are of either in all
 //   {"op":"show","id":"P000123"} → {"ok":true,"task":{…},"events":[…]}
 //   {"op":"history","id":"P000123"}
 //                                → {"ok":true,"events":[…]}, of every task of that order
@@ -56,14 +59,19 @@ enum class Operation : std::uint8_t {
   kArm
 };
 
+enum class Which : std::uint8_t { kOpen, kEnded };
+inline constexpr std::int64_t kListed = 100, kMostListed = 1000;  // without a limit, and at most
+
 struct Asked {
   Operation operation = Operation::kList;
-  std::string task;          // kSubmit: the JSON text of a task or a reply; kShow to kApprove: the id
-  std::string reason;        // kPause, kCancel, kHalt; may be empty
-  std::string tier, by;      // kApprove
-  std::int64_t after = 0;    // kWatch
-  std::uint64_t stream = 0;  // kChunk
-  Chunk chunk;               // kChunk; finite, and otherwise as it came
+  std::string task;              // kSubmit: the JSON text of a task or a reply; kShow to kApprove: the id
+  std::string reason;            // kPause, kCancel, kHalt; may be empty
+  std::string tier, by;          // kApprove
+  std::int64_t after = 0;        // kList, kWatch
+  Which which = Which::kOpen;    // kList
+  std::int64_t limit = kListed;  // kList
+  std::uint64_t stream = 0;      // kChunk
+  Chunk chunk;                   // kChunk; finite, and otherwise as it came
 };
 
 // Hostile text to a question: bounded, no unknown operation, no unknown member. Error chunk_size (by `where`): an

@@ -10,7 +10,15 @@ TEST(AskedFrom, ReadsEachQuestion) {
   ASSERT_TRUE(submit) << submit.error().line();
   EXPECT_EQ(submit->operation, Operation::kSubmit);
   EXPECT_EQ(submit->task, R"({"id":"a","steps":[]})");
-  EXPECT_EQ(asked_from(R"({"op":"list"})")->operation, Operation::kList);
+  const auto list = asked_from(R"({"op":"list"})");
+  EXPECT_EQ(list->operation, Operation::kList);
+  EXPECT_EQ(list->which, Which::kOpen);
+  EXPECT_EQ(list->limit, 100);
+  EXPECT_EQ(list->after, 0);
+  const auto ended = asked_from(R"({"op":"list","which":"ended","limit":1000,"after":117})");
+  EXPECT_EQ(ended->which, Which::kEnded);
+  EXPECT_EQ(ended->limit, 1000);
+  EXPECT_EQ(ended->after, 117);
   const auto show = asked_from(R"({"op":"show","id":"a"})");
   EXPECT_EQ(show->operation, Operation::kShow);
   EXPECT_EQ(show->task, "a");
@@ -65,6 +73,12 @@ TEST(AskedFrom, RefusesEverythingElse) {
                            R"({"op":"submit"})",
                            R"({"op":"submit","task":1})",
                            R"({"op":"list","id":"a"})",
+                           R"({"op":"list","limit":0})",
+                           R"({"op":"list","limit":1001})",
+                           R"({"op":"list","limit":"all"})",
+                           R"({"op":"list","which":"all"})",
+                           R"({"op":"list","after":-1})",
+                           R"({"op":"show","id":"a","limit":1})",
                            R"({"op":"stop","id":"a"})",
                            R"({"op":"show"})",
                            R"({"op":"history"})",

@@ -21,6 +21,7 @@ namespace {
 constexpr double kReach = 100;         // m
 constexpr double kMaxSeconds = 3600;   // of a period, a phase, a latency
 constexpr int kNobodysPriority = 101;  // a task has 100 at most
+constexpr int kMostRunning = 1000;     // tasks that need no resource
 constexpr double kMaxMass = 1000;      // kg
 constexpr double kMaxBeltRamp = 50;    // m/s²
 constexpr double kSlowest = 0.05;      // share of the speed limits: slower, nothing gets anywhere
@@ -158,10 +159,11 @@ std::vector<Resource> read_resources(const YamlValue& value) {
 }
 
 Schedule read_schedule(const YamlValue& value) {
-  const YamlMap map(value, {}, {"ageing_s", "urgent_priority", "on_emergency_stop"});
+  const YamlMap map(value, {}, {"ageing_s", "urgent_priority", "running", "on_emergency_stop"});
   Schedule schedule;
   if (map.has("ageing_s")) schedule.ageing = from_s(map["ageing_s"].number(1, kMaxSeconds));
   if (map.has("urgent_priority")) schedule.urgent_priority = map["urgent_priority"].integer(1, kNobodysPriority);
+  if (map.has("running")) schedule.running = map["running"].integer(1, kMostRunning);
   if (map.has("on_emergency_stop")) {
     const std::string word = map["on_emergency_stop"].name();
     if (word != "hold" && word != "cancel")

@@ -144,6 +144,7 @@ enum class OnEmergencyStop : std::uint8_t {
 struct Schedule {
   Duration ageing = std::chrono::seconds(30);  // a task that has waited so long counts one priority more, and so on
   int urgent_priority = 95;                    // from here on a task makes running ones that count less give way
+  int running = 64;                            // so many tasks that need no resource run at a time
   OnEmergencyStop on_emergency_stop = OnEmergencyStop::kHold;
 };
 

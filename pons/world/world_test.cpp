@@ -256,15 +256,19 @@ TEST_F(BrokenWorld, TheScheduleIsTheFilesOrElseTheUsualOne) {
   ASSERT_TRUE(usual) << usual.error().line();
   EXPECT_EQ(usual->schedule.ageing, std::chrono::seconds(30));
   EXPECT_EQ(usual->schedule.urgent_priority, 95);
+  EXPECT_EQ(usual->schedule.running, 64);
   EXPECT_EQ(usual->schedule.on_emergency_stop, OnEmergencyStop::kHold);
   const auto put = [&](const std::string& keys) { return text_ + "\nschedule: {" + keys + "}\n"; };
-  const auto own = load_text(put("ageing_s: 2.5, urgent_priority: 101, on_emergency_stop: cancel"));
+  const auto own = load_text(put("ageing_s: 2.5, urgent_priority: 101, running: 8, on_emergency_stop: cancel"));
   ASSERT_TRUE(own) << own.error().line();
   EXPECT_EQ(own->schedule.ageing, std::chrono::milliseconds(2500));
   EXPECT_EQ(own->schedule.urgent_priority, 101);
+  EXPECT_EQ(own->schedule.running, 8);
   EXPECT_EQ(own->schedule.on_emergency_stop, OnEmergencyStop::kCancel);
   EXPECT_THAT(error(put("ageing_s: 0")), HasSubstr("schedule.ageing_s: 0 is out of range"));
   EXPECT_THAT(error(put("urgent_priority: 0")), HasSubstr("schedule.urgent_priority: '0' is not possible"));
+  EXPECT_THAT(error(put("running: 0")), HasSubstr("schedule.running: '0' is not possible"));
+  EXPECT_THAT(error(put("running: 1001")), HasSubstr("schedule.running: '1001' is not possible"));
   EXPECT_THAT(error(put("on_emergency_stop: panic")), HasSubstr("is 'panic'; write hold or cancel"));
   EXPECT_THAT(error(put("fifo: yes")), HasSubstr("schedule.fifo: unknown key"));
 }

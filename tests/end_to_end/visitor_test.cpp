@@ -5,6 +5,12 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
 #include "pons/gate/local_socket.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -50,6 +56,62 @@ TEST_F(Visitor, SubmitsAndReadsWhatBecameOfIt) {
   });
   EXPECT_THAT(show("home-1").out, HasSubstr("SUCCEEDED"));
   EXPECT_EQ(report_["parcels"]["lost"], 0);
+}
+
+// The ids of all pages of two, gone through as each says.
+std::vector<std::string> pages(const std::string& which, std::vector<std::string> from) {
+  std::vector<std::string> ids;
+  from.insert(from.end(), {"--limit", "2"});
+  std::vector<std::string> command = from;
+  for (bool more = true; more && ids.size() < 100;) {
+    std::vector<std::string> line{"task", "list", "--" + which};
+    line.insert(line.end(), command.begin(), command.end());
+    const Finished page = run_pons(line);
+    EXPECT_EQ(page.code, 0) << page.err;
+    more = false;
+    std::istringstream rows(page.out);
+    for (std::string row; std::getline(rows, row);) {
+      const std::size_t hint = row.find("pons task list --" + which + " --after ");
+      more = more || hint != std::string::npos;
+      if (hint == std::string::npos) {
+        ids.push_back(row.substr(0, row.find(' ')));
+      } else {
+        command = from;
+        command.insert(command.end(), {"--after", row.substr(row.rfind(' ') + 1)});
+      }
+    }
+  }
+  return ids;
+}
+
+TEST_F(Visitor, ListsTasksPageByPageOpenOnesFirst) {
+  using ::testing::IsSupersetOf;
+  const std::vector<std::string> homes{"home-1", "home-2", "home-3", "home-4", "home-5"};
+  during_a_run([&] {
+    EXPECT_EQ(robot("stop").code, 0);  // it starts nothing
+    for (const std::string& id : homes)
+      EXPECT_EQ(submit(R"({"id":")" + id + R"(","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})").code, 0);
+    const std::vector<std::string> run{"--socket", folder_ / "s"};
+    const auto open = pages("open", run);
+    EXPECT_THAT(open, IsSupersetOf(homes));
+    EXPECT_THAT(std::vector<std::string>(open.end() - 5, open.end()), ::testing::ElementsAreArray(homes));
+    const std::string some = run_pons({"task", "list", "--limit", "1", "--socket", folder_ / "s"}).out;
+    EXPECT_THAT(some, HasSubstr(fmt::format("{} more open: pons task list --open --after ", open.size() - 1)));
+    EXPECT_EQ(robot("reset").code, 0);
+    EXPECT_EQ(robot("arm").code, 0);
+  });
+  const std::vector<std::string> journal{"--journal", folder_ / "j.db"};
+  auto ended = pages("ended", journal);
+  EXPECT_EQ(ended.size(), std::set<std::string>(ended.begin(), ended.end()).size());
+  EXPECT_THAT(ended, IsSupersetOf(homes));
+  EXPECT_LT(std::ranges::find(ended, "home-5"), std::ranges::find(ended, "home-1")) << "the last accepted first";
+  EXPECT_EQ(pages("open", journal), std::vector<std::string>{});
+  const std::string all = run_pons({"task", "list", "--journal", folder_ / "j.db"}).out;
+  EXPECT_EQ(std::ranges::count(all, '\n'), std::ssize(ended)) << all;
+  const Finished which = run_pons({"task", "list", "--after", "3", "--journal", folder_ / "j.db"});
+  EXPECT_EQ(which.code, 2);
+  EXPECT_THAT(which.err, HasSubstr("say --open or --ended, too"));
+  EXPECT_EQ(run_pons({"task", "list", "--limit", "1001", "--journal", folder_ / "j.db"}).code, 2);
 }
 
 // From what was seen to what became of it, over the socket as from the journal.

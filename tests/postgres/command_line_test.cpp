@@ -48,6 +48,8 @@ TEST_F(CommandLine, ARunTakesOrdersAndItsJournalIsReadAsAFileIs) {
   const std::string journal = place_ + "#small_cell";
   EXPECT_THAT(pons({"journal", "check", journal}).out, HasSubstr("whole: 3 tasks (3 succeeded"));
   EXPECT_THAT(pons({"task", "list", "--journal", journal}).out, HasSubstr("home"));
+  EXPECT_THAT(pons({"task", "list", "--limit", "2", "--journal", journal}).out,
+              HasSubstr("1 more ended: pons task list"));
   EXPECT_THAT(pons({"task", "show", "home", "--journal", journal}).out, HasSubstr("attempt"));
   EXPECT_THAT(pons({"task", "history", "odd", "--journal", journal}).out, HasSubstr("order_refused"));
   EXPECT_THAT(pons({"journal", "compact", journal}).out, HasSubstr("events dropped"));

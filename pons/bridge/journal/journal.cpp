@@ -1,13 +1,14 @@
-#include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/journal/journal_impl.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <limits>
 #include <utility>
 
-#include "pons/bridge/journal/book_end.hpp"
 #include "pons/bridge/journal/layout.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/bridge/journal/postgres.hpp"
@@ -19,7 +20,8 @@ namespace {
 
 constexpr std::string_view kTaskColumns =
     "SELECT a.task, a.run, a.stamp_ns, a.detail, e.run, e.stamp_ns, e.detail, "
-    "CASE WHEN EXISTS(SELECT 1 FROM event s WHERE s.task = a.task AND s.kind = 'started') THEN 1 ELSE 0 END "
+    "CASE WHEN EXISTS(SELECT 1 FROM event s WHERE s.task = a.task AND s.kind = 'started') THEN 1 ELSE 0 END, "
+    "a.sequence "
     "FROM {} LEFT JOIN event e ON e.task = a.task AND e.kind = 'ended' WHERE a.kind = 'accepted' ";
 constexpr std::string_view kEventColumns = "SELECT sequence, run, stamp_ns, task, order_id, kind, detail FROM event ";
 
@@ -34,55 +36,11 @@ Json ending(task::Outcome outcome, std::string_view reason, const Json& detail) 
   return {{"outcome", task::name(outcome)}, {"reason", reason}, {"detail", detail}};
 }
 
-Expected<OutcomeRecord> outcome_from(const Json& ending) {
-  const auto outcome = task::outcome_from(task::text_of(ending, "outcome"));
-  if (!outcome) return std::unexpected(outcome.error());
-  return OutcomeRecord{*outcome, task::text_of(ending, "reason"), ending.value("detail", Json::object())};
-}
-
 std::unexpected<Error> reserved(std::string_view kind) {
   return fail(fmt::format("'{}' is a word of the journal's own", kind), "journal", "note it under another");
 }
 
 }  // namespace
-
-struct Journal::Impl {
-  std::string file;  // or database, for people
-  std::unique_ptr<Database> database;
-  std::optional<BookEnd> book;  // of a journal in a database, opened for writing
-  std::int64_t run = 0;
-  Time last;            // stamp that was written in this run
-  bool behind = false;  // the clock is, since it ran back
-  // Nothing is written any more. Whether SQLite took back what came before a failed write depends on why it failed, and
-  // what was to become durable together must not become so in part.
-  std::optional<Error> failed;
-  // Only open_to_read() leaves those that write unprepared.
-  mutable Statement find_task, all_tasks, one_task, events_of_task, notes, events_of_order, every_event, count, endings,
-      newest;
-  std::int64_t last_written = 0, durable = 0;  // sequences
-  Statement add_first, add_event, add_note, begin, commit;
-
-  [[nodiscard]] Expected<void> begin_run();
-  [[nodiscard]] Expected<void> prepare(Mode mode);
-  [[nodiscard]] Expected<void> ensure_transaction();
-  [[nodiscard]] Expected<void> make_durable();
-  [[nodiscard]] Expected<void> look_up_durable();
-  // The sequence of what was inserted; 0 when nothing was.
-  [[nodiscard]] Expected<std::int64_t> write(Statement& statement);
-  void give_up(const Error& error);
-  // A transaction, and the stamp for what is written now: a clock that runs back is told of, and waited for.
-  [[nodiscard]] Expected<std::int64_t> begin_at(Time now);
-  // To an open task.
-  [[nodiscard]] Expected<void> add(std::string_view id, Time now, std::string_view kind, const Json& detail);
-  [[nodiscard]] Expected<TaskRecord> read_task(const Statement& row) const;
-  [[nodiscard]] Expected<Event> read_event(const Statement& row) const;
-  // Reads to the end.
-  [[nodiscard]] Expected<void> each_of(Statement& rows, const std::function<Expected<void>(const Event&)>& take) const;
-  [[nodiscard]] Expected<std::vector<Event>> all_of(Statement& rows) const;
-  [[nodiscard]] std::unexpected<Error> broken(std::string_view what) const {
-    return fail(fmt::format("a record is broken: {}", what), file, "restore a copy, or name another file");
-  }
-};
 
 // ---- opening ----
 
@@ -118,11 +76,16 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
     return {};
   };
   const std::string tasks = fmt::format(kTaskColumns, acceptances(database->dialect())), events(kEventColumns);
-  const std::array<std::pair<Statement*, std::string>, 10> reads{{
+  const std::string in_order = fmt::format(kTaskColumns, in_their_order(database->dialect()));
+  const std::array<std::pair<Statement*, std::string>, 13> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
       {&all_tasks, tasks + "ORDER BY a.sequence"},
       {&one_task, tasks + "AND a.task = ?1"},
+      {&ended_tasks, in_order + "AND a.sequence < ?1 AND e.sequence IS NOT NULL ORDER BY a.sequence DESC LIMIT ?2"},
       {&events_of_task, events + "WHERE task = ?1 AND kind NOT IN ('accepted', 'ended') ORDER BY sequence"},
+      {&outline,
+       "SELECT sequence, run, stamp_ns, task, order_id, kind, CASE WHEN kind = ?1 THEN '{}' ELSE detail END FROM event "
+       "WHERE task = ?2 ORDER BY sequence"},
       {&notes, events + "WHERE task = '' ORDER BY sequence"},
       {&events_of_order, events + "WHERE ?1 <> '' AND sequence > ?2 AND sequence IN (SELECT sequence FROM event WHERE "
                                   "order_id = ?1 AND order_id <> '' "
@@ -132,6 +95,7 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
       {&every_event, events + "ORDER BY task, sequence"},
       {&newest, "SELECT coalesce(max(sequence), 0) FROM event"},
       {&count, "SELECT count(*) FILTER (WHERE kind = 'accepted'), count(*) FROM event"},
+      {&count_ended, "SELECT count(*) FROM event WHERE kind = 'ended'"},
       {&endings, "SELECT detail FROM event WHERE kind = 'ended'"},
   }};
   const std::string returning = database->dialect() == Dialect::kSqlite ? "" : " RETURNING sequence";
@@ -176,7 +140,7 @@ Expected<std::unique_ptr<Journal>> Journal::open(const std::string& place, const
     if (auto promised = impl->database->promise_durability(); !promised) return promised;
     if (auto begun = impl->begin_run(); !begun) return begun;
     if (auto prepared = impl->prepare(Mode::kOwn); !prepared) return prepared;
-    (void)impl->look_up_durable();  // of a damaged file `check` tells more
+    (void)impl->look_up_what_is_there();  // of a damaged file `check` tells more
     if (impl->database->dialect() == Dialect::kSqlite) return {};
     auto book = BookEnd::open(*impl->database);
     if (!book) return std::unexpected(book.error());
@@ -259,10 +223,13 @@ Expected<void> Journal::Impl::make_durable() {
   return {};
 }
 
-Expected<void> Journal::Impl::look_up_durable() {
+Expected<void> Journal::Impl::look_up_what_is_there() {
   const auto last_one = newest.run_for_integer();
   if (!last_one) return std::unexpected(last_one.error());
   durable = *last_one;
+  const auto outcomes = count_ended.run_for_integer();
+  if (!outcomes) return std::unexpected(outcomes.error());
+  ended = *outcomes;
   return {};
 }
 
@@ -325,7 +292,26 @@ Expected<void> Journal::note(Time now, std::string_view kind, const Json& detail
 Expected<void> Journal::outcome(std::string_view id, task::Outcome outcome, std::string_view reason, Time now,
                                 const Json& detail) {
   if (auto added = impl_->add(id, now, kEndedEvent, ending(outcome, reason, detail)); !added) return added;
+  ++impl_->ended;
   return close_order(id, outcome, reason);
+}
+
+Expected<void> Journal::leave_out(std::string_view id, Time now, std::int64_t before, const std::set<std::int64_t>& but,
+                                  std::int64_t so_far) {
+  if (auto begun = impl_->ensure_transaction(); !begun) return begun;
+  const auto drop = [&](const std::string& which, std::int64_t below) -> Expected<std::int64_t> {
+    auto dropped = impl_->database->prepare(
+        "DELETE FROM event WHERE task = ?1 AND sequence < ?2 AND kind NOT IN ('accepted', 'started', 'ended') AND " +
+        which + " AND NOT EXISTS(SELECT 1 FROM event e WHERE e.task = ?1 AND e.kind = 'ended')");
+    if (!dropped) return std::unexpected(dropped.error());
+    if (auto done = impl_->write(dropped->bind(id).bind(below)); !done) return std::unexpected(done.error());
+    return impl_->database->changes();
+  };
+  const auto told = drop(fmt::format("kind = '{}'", kLeftOutEvent), std::numeric_limits<std::int64_t>::max());
+  if (!told) return std::unexpected(told.error());
+  const auto dropped = drop(fmt::format("sequence NOT IN ({})", fmt::join(but, ",")), before);
+  if (!dropped) return std::unexpected(dropped.error());
+  return impl_->add(id, now, kLeftOutEvent, {{"events", so_far + *dropped}});
 }
 
 Expected<void> Journal::commit() { return impl_->make_durable(); }
@@ -377,117 +363,5 @@ Expected<std::int64_t> Journal::compact(std::int64_t keep) {
   if (auto freed = give_back_space(*impl_->database); !freed) return std::unexpected(freed.error());
   return dropped;
 }
-
-// ---- reading ----
-
-Expected<TaskRecord> Journal::Impl::read_task(const Statement& row) const {
-  const Json json = Json::parse(row.text(3), nullptr, false);
-  if (json.is_discarded()) return broken("a task is not JSON");
-  auto task = task::task_from(json);
-  if (!task) return broken(task.error().line());
-  if (task->id != row.text(0)) return broken(fmt::format("task '{}' stands under '{}'", task->id, row.text(0)));
-  TaskRecord record{std::move(*task), row.integer(1), Time(Duration(row.integer(2))), row.integer(7) != 0,
-                    std::nullopt};
-  if (row.is_null(4)) return record;
-  auto end = outcome_from(Json::parse(row.text(6), nullptr, false));
-  if (!end) return broken(end.error().line());
-  end->run = row.integer(4);
-  end->stamp = Time(Duration(row.integer(5)));
-  record.outcome = std::move(*end);
-  return record;
-}
-
-Expected<Event> Journal::Impl::read_event(const Statement& row) const {
-  Json detail = Json::parse(row.text(6), nullptr, false);
-  if (!detail.is_object()) return broken(fmt::format("the detail of event {} is no JSON object", row.integer(0)));
-  return Event{row.integer(0), row.text(3),      row.text(4), row.integer(1), Time(Duration(row.integer(2))),
-               row.text(5),    std::move(detail)};
-}
-
-Expected<void> Journal::Impl::each_of(Statement& rows, const std::function<Expected<void>(const Event&)>& take) const {
-  Reading reading(rows);
-  for (;;) {
-    const auto row = rows.step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return {};
-    const auto event = read_event(rows);
-    if (!event) return std::unexpected(event.error());
-    if (auto taken = take(*event); !taken) return taken;
-  }
-}
-
-Expected<std::vector<Event>> Journal::Impl::all_of(Statement& rows) const {
-  std::vector<Event> events;
-  const auto done = each_of(rows, [&events](const Event& event) -> Expected<void> {
-    events.push_back(event);
-    return {};
-  });
-  if (!done) return std::unexpected(done.error());
-  return events;
-}
-
-Expected<std::vector<TaskRecord>> Journal::tasks() const {
-  Reading reading(impl_->all_tasks);
-  std::vector<TaskRecord> records;
-  for (;;) {
-    const auto row = impl_->all_tasks.step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return records;
-    auto record = impl_->read_task(impl_->all_tasks);
-    if (!record) return std::unexpected(record.error());
-    records.push_back(std::move(*record));
-  }
-}
-
-Expected<std::optional<TaskHistory>> Journal::task(std::string_view id) const {
-  Reading reading(impl_->one_task);
-  const auto row = impl_->one_task.bind(id).step();
-  if (!row) return std::unexpected(row.error());
-  if (!*row) return std::nullopt;
-  auto record = impl_->read_task(impl_->one_task);
-  if (!record) return std::unexpected(record.error());
-  auto happened = impl_->all_of(impl_->events_of_task.bind(id));
-  if (!happened) return std::unexpected(happened.error());
-  return TaskHistory{std::move(*record), std::move(*happened)};
-}
-
-Expected<std::vector<Event>> Journal::notes() const { return impl_->all_of(impl_->notes); }
-
-std::int64_t Journal::durable() const { return impl_->durable; }
-
-Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64_t after) const {
-  return impl_->all_of(impl_->events_of_order.bind(order).bind(after));
-}
-
-Expected<void> Journal::each_event(const std::function<Expected<void>(const Event&)>& take) const {
-  return impl_->each_of(impl_->every_event, take);
-}
-
-Expected<Counts> Journal::counts() const {
-  Counts counts;
-  {
-    Reading reading(impl_->count);
-    const auto row = impl_->count.step();
-    if (!row) return std::unexpected(row.error());
-    counts.accepted = impl_->count.integer(0);
-    counts.events = impl_->count.integer(1);
-  }
-  Reading reading(impl_->endings);
-  for (;;) {
-    const auto row = impl_->endings.step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) break;
-    const auto end = outcome_from(Json::parse(impl_->endings.text(0), nullptr, false));
-    if (!end) return impl_->broken(end.error().line());
-    std::array<std::int64_t*, 4> of{&counts.succeeded, &counts.failed, &counts.cancelled, &counts.exception};
-    ++*of.at(static_cast<std::size_t>(end->outcome));
-  }
-  counts.open = counts.accepted - counts.succeeded - counts.failed - counts.cancelled - counts.exception;
-  return counts;
-}
-
-Expected<void> Journal::check_storage() const { return check_layout(*impl_->database); }
-
-std::int64_t Journal::run() const { return impl_->run; }
 
 }  // namespace pons::bridge

@@ -14,6 +14,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,7 @@ struct OutcomeRecord {
 };
 
 struct TaskRecord {
+  std::int64_t sequence = 0;  // of its acceptance
   task::Task task;
   std::int64_t run = 0;  // of its acceptance
   Time accepted;
@@ -77,6 +79,7 @@ inline constexpr std::string_view kAcceptedEvent = "accepted";  // detail: the t
 inline constexpr std::string_view kStartedEvent = "started";    // the task has left the queue: it may have moved things
 inline constexpr std::string_view kEndedEvent = "ended";        // detail: {"outcome", "reason", "detail"}
 inline constexpr std::string_view kCompactedEvent = "compacted";   // {"events": how many were dropped}
+inline constexpr std::string_view kLeftOutEvent = "left_out";      // of an open task; likewise, in all
 inline constexpr std::string_view kClockBackEvent = "clock_back";  // {"by_s"}: until it has caught up, time stands
 
 class Journal {
@@ -111,6 +114,11 @@ class Journal {
   // The task's one outcome, and its last event. Errors: as of event().
   [[nodiscard]] Expected<void> outcome(std::string_view id, task::Outcome outcome, std::string_view reason, Time now,
                                        const Json& detail = Json::object());
+  // Drops what happened to an open task before the event of that sequence, but for its start and the events in `but`,
+  // and says how many that are in all, with the `so_far` of earlier times. Becomes durable with the next commit(),
+  // together with all that was written before. Errors: as of event().
+  [[nodiscard]] Expected<void> leave_out(std::string_view id, Time now, std::int64_t before,
+                                         const std::set<std::int64_t>& but, std::int64_t so_far);
   // Makes everything so far durable; costs nothing when there is nothing. Error: this or an earlier write failed. Then
   // whatever was written since the last commit is not part of the journal, and nothing is written any more: open it
   // anew. (What a disk had taken of a commit that failed may come to light there: send the same again.)
@@ -126,15 +134,24 @@ class Journal {
 
   // In the order of acceptance.
   [[nodiscard]] Expected<std::vector<TaskRecord>> tasks() const;
+  // At most so many that have ended, of those accepted before the event of that sequence; the last accepted first.
+  [[nodiscard]] Expected<std::vector<TaskRecord>> ended_tasks(std::int64_t before, std::int64_t most) const;
   // Nothing when there is no such task.
+  [[nodiscard]] Expected<std::optional<TaskRecord>> record(std::string_view id) const;
   [[nodiscard]] Expected<std::optional<TaskHistory>> task(std::string_view id) const;
   // Those of no task.
   [[nodiscard]] Expected<std::vector<Event>> notes() const;
+  // All of a task, acceptance and outcome among them, but for the details of that kind of event.
+  [[nodiscard]] Expected<std::vector<Event>> outline(std::string_view id, std::string_view without) const;
   // All that belongs to an order, of whatever task or of none, written after that sequence; a task's own id will do as
   // well.
   [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order, std::int64_t after = 0) const;
-  // The sequence of the last event that a commit has made durable; of one opened for writing.
+  // The sequence of the last event that was written, and of the last that a commit has made durable; of one opened for
+  // writing.
+  [[nodiscard]] std::int64_t newest() const;
   [[nodiscard]] std::int64_t durable() const;
+  // How many tasks have ended; likewise, and at no cost.
+  [[nodiscard]] std::int64_t ended() const;
   // Every event, task by task in the order of their ids, those of no task first. Stops at the first error of `take`.
   [[nodiscard]] Expected<void> each_event(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<Counts> counts() const;

@@ -239,6 +239,10 @@ std::string_view acceptances(Dialect dialect) {
   return dialect == Dialect::kSqlite ? "event a INDEXED BY one_acceptance" : "event a";
 }
 
+std::string_view in_their_order(Dialect dialect) {
+  return dialect == Dialect::kSqlite ? "event a NOT INDEXED" : "event a";
+}
+
 Expected<void> check_layout(Database& database) {
   if (database.dialect() == Dialect::kSqlite) {
     const auto found = database.text("PRAGMA integrity_check");

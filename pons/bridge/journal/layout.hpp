@@ -38,6 +38,8 @@ enum class Layout : std::uint8_t {
 
 // What a query reads acceptances from, as `a`.
 [[nodiscard]] std::string_view acceptances(Dialect dialect);
+// Likewise, one after the other in the order of their sequences, so that a few are found without looking at all.
+[[nodiscard]] std::string_view in_their_order(Dialect dialect);
 // Whether it is whole, as far as the database itself can tell. Error: what is not.
 [[nodiscard]] Expected<void> check_layout(Database& database);
 // Gives space that was freed back to the disk.

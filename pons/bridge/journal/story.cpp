@@ -31,7 +31,8 @@ bool tells_state(std::string_view kind) {
   constexpr std::array kKinds{kAcceptedEvent,   kStartedEvent,   kAttemptEvent,   kAttemptEndedEvent, kCancellingEvent,
                               kAskedEvent,      kAllowedEvent,   kHaltingEvent,   kPausingEvent,      kPausedEvent,
                               kPreemptingEvent, kPreemptedEvent, kContinuedEvent, kRegainedEvent,     kHeldEvent,
-                              kReleasedEvent,   kResumedEvent,   kFoundDoneEvent, kCheckpointEvent,   kEndedEvent};
+                              kReleasedEvent,   kResumedEvent,   kFoundDoneEvent, kCheckpointEvent,   kLeftOutEvent,
+                              kEndedEvent};
   return std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
@@ -54,16 +55,20 @@ Expected<void> Story::take(const Event& event) {
   const bool of_running = event.kind == kCancellingEvent || event.kind == kHaltingEvent ||
                           event.kind == kPreemptingEvent || event.kind == kPreemptedEvent;
   if (of_running && !started_) taken = impossible(event, "comes before it was started");
-  if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = true;
-  if (event.kind == kContinuedEvent) paused_ = false;
-  if (event.kind == kCancellingEvent || event.kind == kHaltingEvent) ending_ = task::text_of(event.detail, "reason");
+  if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = event.sequence;
+  if (event.kind == kContinuedEvent) paused_ = 0;
+  if (event.kind == kCancellingEvent || event.kind == kHaltingEvent) {
+    ending_ = task::text_of(event.detail, "reason");
+    told_to_end_ = event.sequence;
+  }
+  if (event.kind == kPreemptedEvent) handed_over_ = event.sequence;
+  if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = 0;
   if (event.kind == kAllowedEvent && event.detail.is_object()) {
     for (const Json& use : event.detail.value("uses", Json::array())) {
       if (use.is_string()) allowed_.insert(use.get<std::string>());
     }
+    allowances_.insert(event.sequence);
   }
-  if (event.kind == kPreemptedEvent) handed_over_ = true;
-  if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = false;
   // What the bridge before was at, nobody saw end.
   if (event.kind == kResumedEvent) trying_.clear();
   if (event.kind == kCheckpointEvent) checkpoint_ = event.detail;
@@ -71,6 +76,7 @@ Expected<void> Story::take(const Event& event) {
   sequence_ = event.sequence;
   run_ = event.run;
   stamp_ = event.stamp;
+  ++length_;
   return {};
 }
 
@@ -91,7 +97,8 @@ Expected<void> Story::take_attempt(const Event& event) {
   if (is_tree_) {
     if (step == kNoStep) return impossible(event, "is of no leaf");
     const auto arguments = event.detail.find("arguments");
-    if (!trying_.emplace(step, arguments != event.detail.end() ? *arguments : Json()).second)
+    const Trying trying{arguments != event.detail.end() ? *arguments : Json(), event.sequence};
+    if (!trying_.emplace(step, trying).second)
       return impossible(event, fmt::format("comes while leaf {} goes on", step));
     return {};
   }
@@ -99,7 +106,7 @@ Expected<void> Story::take_attempt(const Event& event) {
   if (step < done_) return impossible(event, fmt::format("starts step {} again, which has succeeded", step));
   if (step > done_) return impossible(event, fmt::format("starts step {} before step {} has succeeded", step, done_));
   if (!trying_.empty()) return impossible(event, fmt::format("comes while step {} goes on", trying_.begin()->first));
-  trying_.emplace(step, Json());
+  trying_.emplace(step, Trying{{}, event.sequence});
   return {};
 }
 
@@ -132,6 +139,33 @@ Expected<void> Story::take_end(const Event& event) {
     return impossible(event, fmt::format("says SUCCEEDED while leaf {} goes on", trying_.begin()->first));
   ended_ = true;
   return {};
+}
+
+std::set<std::int64_t> Story::rests_on() const {
+  std::set<std::int64_t> events = allowances_;
+  for (const auto& [step, trying] : trying_) events.insert(trying.sequence);
+  for (const std::int64_t event : {paused_, handed_over_, told_to_end_}) {
+    if (event > 0) events.insert(event);
+  }
+  return events;
+}
+
+Expected<void> shorten(Journal& journal, std::string_view id, std::size_t keep, Time now) {
+  const auto events = journal.outline(id, kCheckpointEvent);
+  if (!events) return std::unexpected(events.error());
+  std::size_t from = 0;  // what stays, whatever it is
+  std::int64_t so_far = 0;
+  for (std::size_t i = 0; i < events->size(); ++i) {
+    const Event& event = (*events)[i];
+    if (event.kind == kCheckpointEvent) from = std::min(i, events->size() - std::min(keep, events->size()));
+    if (event.kind == kLeftOutEvent) so_far = event.detail.value("events", std::int64_t{0});
+  }
+  Story story;
+  for (std::size_t i = 0; i < from; ++i) {
+    if (auto taken = story.take((*events)[i]); !taken) return {};  // audit() tells of it, and needs all of it for that
+  }
+  if (from == 0) return {};
+  return journal.leave_out(id, now, (*events)[from].sequence, story.rests_on(), so_far);
 }
 
 std::vector<std::string> audit(const Journal& journal) {

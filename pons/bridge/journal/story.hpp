@@ -46,19 +46,27 @@ class Story {
 
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] bool ended() const { return ended_; }
-  [[nodiscard]] bool paused() const { return paused_; }  // as far as it was asked for
+  [[nodiscard]] bool paused() const { return paused_ > 0; }  // as far as it was asked for
   // Why it was told to end, if it was.
   [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
   // What a person was asked for, and has allowed: rule, skill and arguments.
   [[nodiscard]] const std::set<std::string>& allowed() const { return allowed_; }
   // It was preempted and has not gone on: what it had begun stands at a safe point, with nothing in use.
-  [[nodiscard]] bool handed_over() const { return handed_over_; }
+  [[nodiscard]] bool handed_over() const { return handed_over_ > 0; }
   // So many of its first steps have succeeded; of a tree, none.
   [[nodiscard]] std::size_t done() const { return done_; }
-  // The skills that run, a step or leaves of a tree, with what they were started with; null where that was not told.
-  [[nodiscard]] const std::map<std::size_t, Json>& trying() const { return trying_; }
+  // The skills that run, a step or leaves of a tree.
+  struct Trying {
+    Json arguments;  // that it was started with; null where that was not told
+    std::int64_t sequence = 0;
+  };
+  [[nodiscard]] const std::map<std::size_t, Trying>& trying() const { return trying_; }
   // The last; null when there is none.
   [[nodiscard]] const Json& checkpoint() const { return checkpoint_; }
+  // Of a tree: beside acceptance, start and checkpoint, the events without which it would come to something else, by
+  // their sequences. What is taken next can follow these as it can follow all.
+  [[nodiscard]] std::set<std::int64_t> rests_on() const;
+  [[nodiscard]] std::size_t length() const { return length_; }  // events that were taken
 
  private:
   [[nodiscard]] Expected<void> take_acceptance(const Event& event);
@@ -69,15 +77,23 @@ class Story {
 
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
-  std::map<std::size_t, Json> trying_;
+  std::map<std::size_t, Trying> trying_;
   Json checkpoint_;
   std::set<std::string> allowed_;
+  std::set<std::int64_t> allowances_;  // the events that say so
   std::optional<std::string> ending_;
   std::int64_t sequence_ = 0, run_ = 0;
+  std::size_t length_ = 0;
   Time stamp_;
-  bool accepted_ = false, started_ = false, paused_ = false, handed_over_ = false, ended_ = false;
+  std::int64_t paused_ = 0, handed_over_ = 0, told_to_end_ = 0;  // the events that say so; 0: it is not
+  bool accepted_ = false, started_ = false, ended_ = false;
   bool is_tree_ = false;
 };
+
+// Of an open task that is a tree: drops what its newest checkpoint has taken in, but for the last `keep` events and
+// those on which its story rests, and says how many that are. It becomes durable together with what was written before,
+// that checkpoint among it. Errors: as of Journal::event().
+[[nodiscard]] Expected<void> shorten(Journal& journal, std::string_view id, std::size_t keep, Time now);
 
 // Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and
 // every record's form.

@@ -1,6 +1,7 @@
 /* Arbiter (pons/bridge/schedule/arbiter.hpp), and how the bridge preempts and pauses (pons/bridge/verbs.cpp). No resource
  * is in use by two tasks. No circle of waiting closes: tasks end. And nobody starves: once a task has waited so long that
  * it counts most, others are granted what it needs at most OVERTAKEN times before it has ended, however many keep coming.
+ * Who makes way counts less than the one that it makes way for, so that it is not the next again.
  *
  * Three tasks, each of which comes again as often as it likes. Task t counts t, and needs resource t, the next one round,
  * or both; with a deadline or without. The last one is urgent. A run ends at any time. A person pauses any that runs,
@@ -16,7 +17,8 @@
  *   NO_AGEING         a task counts the same for ever: more important ones keep coming
  *   DEADLINES_FIRST   deadlines order those too that count most: ones with a deadline keep coming
  *   ALL_GIVE_WAY      those too give way to an urgent task that count as much by now: one that begins never ends
- *   HAND_OVER_FIRST   a preempted task's resources are given away when it is told to stop, not when it stands */
+ *   HAND_OVER_FIRST   a preempted task's resources are given away when it is told to stop, not when it stands
+ *   RUNNERS_AGE       who runs grows older, too: one that has run for long is granted again before the urgent one */
 #define TASKS 3
 #define NOBODY TASKS
 #define URGENT 2
@@ -36,7 +38,7 @@
 
 byte stage[TASKS], told[TASKS], needs[TASKS];
 bool hurries[TASKS];
-byte waited[TASKS];  /* so many periods since it came */
+byte waited[TASKS];  /* so many periods */
 byte came[TASKS];    /* after so many of those that are there */
 byte counted[TASKS]; /* so much when it was granted */
 byte held = 0;       /* by all who run */
@@ -57,6 +59,12 @@ byte got[TASKS];
 #define HURRIES(t) (hurries[t])
 #else
 #define HURRIES(t) (hurries[t] && COUNTS(t) < MOST)
+#endif
+
+#ifdef RUNNERS_AGE
+#define AGING(t) (stage[t] != AWAY)
+#else
+#define AGING(t) (stage[t] == WAITS)
 #endif
 
 #define WAITED_LONG(t) (t + waited[t] == MOST)
@@ -146,6 +154,7 @@ inline wait_again(who) {
   held = held & ~needs[who];
   counted[who] = 0;
   stage[who] = WAITS;
+  assert(COUNTS(who) < COUNTS(URGENT));
   changed = true
 }
 
@@ -260,7 +269,7 @@ end:
   od
 }
 
-#define AGES(t) (stage[t] != AWAY && !WAITED_LONG(t))
+#define AGES(t) (AGING(t) && !WAITED_LONG(t))
 #define AGE(t) waited[t] = waited[t] + AGES(t)
 
 proctype time() {

@@ -27,6 +27,7 @@ void Arbiter::add(const Claim& claim) {
   Entry& entry = waiting_[claim.id];
   entry.claim = claim;
   entry.number = added_++;
+  entry.since = entry.ages_from = claim.accepted;
   for (const std::string& name : claim.resources) {
     const auto bit = bits_.find(name);
     assert(bit != bits_.end());
@@ -46,14 +47,16 @@ bool Arbiter::remove(std::string_view id) {
 // What it counts for now, and when for more.
 void Arbiter::take_rank(Entry& entry) const {
   const Claim& claim = entry.claim;
-  const auto waited = std::max<std::int64_t>(0, (now_ - claim.accepted) / schedule_.ageing);
+  const auto waited = std::max<std::int64_t>(0, (now_ - entry.ages_from) / schedule_.ageing);
   const auto missing = std::max(0, kAged - claim.priority);
   const int gained = static_cast<int>(std::min<std::int64_t>(waited, missing));
   const int counts = claim.priority + gained;
   entry.counts_more.reset();
-  if (gained < missing) entry.counts_more = claim.accepted + (gained + 1) * schedule_.ageing;
-  const Time deadline = counts == kAged ? kNever : claim.deadline.value_or(kNever);
-  entry.rank = {-counts, deadline, claim.accepted, entry.number};
+  if (gained < missing) entry.counts_more = entry.ages_from + (gained + 1) * schedule_.ageing;
+  // Who stood up comes after all who count as much: a seat that it gave to one of them must not be its own again.
+  const bool again = entry.needs == 0 && entry.started;
+  const Time deadline = counts == kAged || again ? kNever : claim.deadline.value_or(kNever);
+  entry.rank = {-counts, deadline, again ? entry.since : claim.accepted, entry.number};
 }
 
 void Arbiter::wait(Entry& entry) {
@@ -125,11 +128,13 @@ std::vector<std::string> Arbiter::grant(Time now) {
   std::set<Mask> passed;
   while (const Lanes::value_type* const lane = first_lane(passed)) {
     const Mask needs = lane->first;
-    if ((needs & taken) == 0) {
+    if (is_free(needs, taken)) {
       Entry& entry = waiting_.find(lane->second.begin()->second->claim.id)->second;
       wait_no_more(entry);  // and the lane may be no more
       entry.started = true;
+      entry.since = now_;
       held_ |= needs;
+      seated_ += needs == 0 ? 1 : 0;
       granted.push_back(entry.claim.id);
       running_.insert(waiting_.extract(entry.claim.id));
     } else {
@@ -142,10 +147,19 @@ std::vector<std::string> Arbiter::grant(Time now) {
   return granted;
 }
 
+bool Arbiter::is_free(Mask needs, Mask taken) const {
+  return needs != 0 ? (needs & taken) == 0 : seated_ < schedule_.running;
+}
+
+void Arbiter::give_back(const Entry& entry) {
+  held_ &= ~entry.needs;
+  seated_ -= entry.needs == 0 ? 1 : 0;
+}
+
 void Arbiter::release(std::string_view id) {
   const auto found = running_.find(id);
   assert(found != running_.end());
-  held_ &= ~found->second.needs;
+  give_back(found->second);
   running_.erase(found);
   changed_ = true;
 }
@@ -153,18 +167,48 @@ void Arbiter::release(std::string_view id) {
 void Arbiter::hand_over(std::string_view id) {
   const auto found = running_.find(id);
   assert(found != running_.end());
-  held_ &= ~found->second.needs;
   Entry& entry = found->second;
+  give_back(entry);
+  entry.ages_from += now_ - entry.since;  // who runs grows no older
+  entry.since = now_;
   waiting_.insert(running_.extract(found));
   wait(entry);
 }
 
-std::vector<Arbiter::Preemption> Arbiter::preemptions() const {
+bool Arbiter::gives_seat(const Entry& sits, const Entry& waits) const {
+  const int more = std::get<int>(sits.rank) - std::get<int>(waits.rank);  // that the waiting one counts
+  if (waits.claim.priority >= schedule_.urgent_priority && more > 0) return true;
+  return more >= 0 && now_ - sits.since >= schedule_.ageing && now_ - waits.since >= schedule_.ageing;
+}
+
+// One for each of the first that wait, as far as there are any: who comes after one that gets none gains nothing.
+void Arbiter::free_seats(const Lane& lane, const Stays& stays, std::map<std::string, std::string>& by) const {
+  std::vector<const Entry*> sitting;
+  for (const auto& [id, entry] : running_) {
+    if (entry.needs == 0 && !(stays && stays(id))) sitting.push_back(&entry);
+  }
+  std::ranges::sort(sitting, [](const Entry* a, const Entry* b) {
+    return std::tuple(-std::get<int>(a->rank), a->since, a->number) <
+           std::tuple(-std::get<int>(b->rank), b->since, b->number);
+  });
+  for (const auto& [rank, waits] : lane) {
+    const auto found = std::ranges::find_if(sitting, [&](const Entry* sits) { return gives_seat(*sits, *waits); });
+    if (found == sitting.end()) return;
+    by.emplace((*found)->claim.id, waits->claim.id);
+    sitting.erase(found);
+  }
+}
+
+std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays) const {
   std::map<std::string, std::string> by;
   Mask claimed = 0;  // by those before: who comes after them gains nothing by a preemption
   std::set<Mask> passed;
   while (const Lanes::value_type* const lane = first_lane(passed)) {
     passed.insert(lane->first);
+    if (lane->first == 0) {
+      free_seats(lane->second, stays, by);
+      continue;
+    }
     const Entry& urgent = *lane->second.begin()->second;
     const bool alone = (claimed & urgent.needs) == 0;
     claimed |= urgent.needs;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -30,6 +31,10 @@ struct Claim {
 // starved by tasks that need less. And with every `ageing` that it has waited it counts one priority more, at last more
 // than any brain may ask for, where acceptance alone decides: nor can it be starved by a stream of more important ones.
 //
+// Tasks that need no resource need a seat; there are `running` of them, all alike. Who needs resources needs no seat.
+// Seats are given in the same order. Trees may go round for ever, so seats are also shared by turns: who has waited for
+// one for `ageing` may have that of one that counts no more, and has had it for as long.
+//
 // add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
 // different sets of resources that are waited for.
 class Arbiter {
@@ -46,26 +51,29 @@ class Arbiter {
   [[nodiscard]] std::vector<std::string> grant(Time now);
   // A task that was granted has ended.
   void release(std::string_view id);
-  // A task that was granted waits again, at the place in the queue that its age gives it; its deadline was met.
+  // A task that was granted waits again, at the place in the queue that the age gives it with which it was granted; its
+  // deadline was met.
   void hand_over(std::string_view id);
   // Takes a task out of the queue; false when it is not in it.
   bool remove(std::string_view id);
   // Takes out the queued tasks whose deadline is before `now`, in the queue's order.
   [[nodiscard]] std::vector<std::string> take_expired(Time now);
 
-  // Running tasks that stand in the way of urgent ones, and of which: a waiting task whose own priority is urgent, and
-  // where all who hold what it needs count less than it, aged or not. After grant().
+  // Running tasks that stand in the way of others, and of which: of a waiting task whose own priority is urgent, where
+  // all who hold what it needs count less than it, aged or not; of a seat, the one that counts least, also where its
+  // turn is over. Of who sits, `stays` says who cannot give way. After grant().
   struct Preemption {
     std::string running, by;
   };
-  [[nodiscard]] std::vector<Preemption> preemptions() const;
+  using Stays = std::function<bool(std::string_view id)>;
+  [[nodiscard]] std::vector<Preemption> preemptions(const Stays& stays = {}) const;
 
   [[nodiscard]] std::vector<std::string> queue() const;  // in order
   [[nodiscard]] std::size_t queue_length() const { return waiting_.size(); }
 
  private:
   using Mask = std::uint64_t;
-  // Priority negated, aged; deadline, or the end of time; acceptance; what was added first.
+  // Priority negated, aged; deadline, or the end of time; acceptance, or since when for a seat again; what came first.
   using Rank = std::tuple<int, Time, Time, std::uint64_t>;
   struct Entry {
     Claim claim;
@@ -73,10 +81,12 @@ class Arbiter {
     std::uint64_t number = 0;
     Rank rank;                        // by which it waits, or was granted
     std::optional<Time> counts_more;  // while it waits: from when on
+    Time since;                       // it waits, or holds what it needs
+    Time ages_from;                   // it has waited as long as if ever since then
     bool started = false;             // then its deadline was met
   };
   using Entries = std::map<std::string, Entry, std::less<>>;
-  // Those that wait for the same resources, of which only the first can be next.
+  // Those that wait for the same resources, of which only the first can be next; with none, for a seat.
   using Lane = std::map<Rank, const Entry*>;
   using Lanes = std::map<Mask, Lane>;
   // Of waiting entries, by a time of theirs.
@@ -88,6 +98,10 @@ class Arbiter {
   void take_rank(Entry& entry) const;
   // The lane whose head comes first, of those that are none of `passed`; null when there is none.
   [[nodiscard]] const Lanes::value_type* first_lane(const std::set<Mask>& passed) const;
+  [[nodiscard]] bool is_free(Mask needs, Mask taken) const;
+  void give_back(const Entry& entry);
+  [[nodiscard]] bool gives_seat(const Entry& sits, const Entry& waits) const;
+  void free_seats(const Lane& lane, const Stays& stays, std::map<std::string, std::string>& by) const;
 
   world::Schedule schedule_;
   std::map<std::string, std::size_t, std::less<>> bits_;
@@ -95,6 +109,7 @@ class Arbiter {
   Lanes lanes_;  // none empty
   Agenda ageing_, deadlines_;
   Mask held_ = 0;
+  int seated_ = 0;
   std::uint64_t added_ = 0;
   Time now_;
   bool changed_ = false;  // since the last grant(): otherwise there is nothing new to give

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "pons/core/random.hpp"
@@ -213,6 +214,20 @@ TEST(Arbiter, NobodyGivesWayToOneThatCountsLessOrCouldNotStartAllTheSame) {
   EXPECT_EQ(arbiter.preemptions().size(), 2u);
 }
 
+TEST(Arbiter, WhoHasRunForLongDoesNotComeBeforeTheOneItMadeWayFor) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(1)});
+  arbiter.add(claim("patrol", 50, {"arm"}));
+  EXPECT_EQ(arbiter.grant(at(0)), Ids{"patrol"});
+  arbiter.add(claim("urgent", 95, {"arm"}, {}, at(3600)));
+  EXPECT_TRUE(arbiter.grant(at(3600)).empty());
+  EXPECT_EQ(arbiter.preemptions().size(), 1u);
+  arbiter.hand_over("patrol");
+  EXPECT_EQ(arbiter.grant(at(3600)), Ids{"urgent"});
+  arbiter.add(claim("next", 60, {"arm"}, {}, at(3600)));
+  EXPECT_TRUE(arbiter.grant(at(3611)).empty());
+  EXPECT_EQ(arbiter.queue(), (Ids{"next", "patrol"})) << "both have waited 11 s";
+}
+
 TEST(Arbiter, WhoHandedOverWaitsByItsAgeAndDoesNotExpire) {
   Arbiter arbiter({"arm"}, {});
   arbiter.add(claim("first", 50, {"arm"}, at(5), at(0)));
@@ -227,10 +242,134 @@ TEST(Arbiter, WhoHandedOverWaitsByItsAgeAndDoesNotExpire) {
   EXPECT_EQ(arbiter.grant(at(10)), Ids{"first"});
 }
 
+// ---- seats ----
+
+TEST(Arbiter, SoManyThatNeedNothingRunAndNobodyElseWaitsForThat) {
+  Arbiter arbiter({"arm"}, {.running = 2});
+  for (const char* id : {"a", "b", "c", "d"}) arbiter.add(claim(id, 50, {}));
+  arbiter.add(claim("arm", 1, {"arm"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"a", "b", "arm"}));
+  arbiter.release("arm");
+  EXPECT_TRUE(arbiter.grant({}).empty()) << "an arm is no seat";
+  arbiter.release("a");
+  EXPECT_EQ(arbiter.grant({}), Ids{"c"});
+  arbiter.hand_over("b");
+  EXPECT_EQ(arbiter.grant({}), Ids{"b"}) << "came before d";
+}
+
+TEST(Arbiter, SeatsAreGivenInTheOrderOfPriorityDeadlineAndAcceptance) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(10), .running = 1});
+  arbiter.add(claim("sits", 100, {}));
+  EXPECT_EQ(arbiter.grant(at(0)), Ids{"sits"});
+  arbiter.add(claim("old", 50, {}));
+  arbiter.add(claim("express", 80, {}, {}, at(25)));
+  arbiter.add(claim("new", 52, {}, {}, at(25)));
+  arbiter.add(claim("soon", 52, {}, at(90), at(26)));
+  EXPECT_TRUE(arbiter.grant(at(26)).empty());
+  arbiter.release("sits");
+  EXPECT_EQ(drain(arbiter, at(26)), (Ids{"express", "soon", "old", "new"})) << "old counts 52 by now";
+}
+
+TEST(Arbiter, AnUrgentTaskGetsTheSeatOfTheOneThatCountsLeast) {
+  Arbiter arbiter({"arm"}, {.urgent_priority = 90, .running = 3});
+  arbiter.add(claim("high", 80, {}));
+  arbiter.add(claim("low", 20, {}));
+  arbiter.add(claim("middle", 50, {}));
+  arbiter.add(claim("arm", 1, {"arm"}));
+  EXPECT_EQ(arbiter.grant({}).size(), 4u);
+  arbiter.add(claim("express", 89, {}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "important, but not urgent";
+  for (const char* id : {"u1", "u2"}) arbiter.add(claim(id, 90, {}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
+  for (int i = 0; i < 2; ++i) {  // and again, while they make way
+    const auto preemptions = arbiter.preemptions();
+    ASSERT_EQ(preemptions.size(), 2u);
+    EXPECT_EQ(preemptions[0].running + preemptions[0].by, "lowu1");
+    EXPECT_EQ(preemptions[1].running + preemptions[1].by, "middleu2");
+  }
+  const auto others = arbiter.preemptions([](std::string_view id) { return id == "low"; });
+  ASSERT_EQ(others.size(), 2u);
+  EXPECT_EQ(others[0].running, "high") << "where the lowest cannot";
+  EXPECT_EQ(others[1].running, "middle");
+  arbiter.hand_over("low");
+  EXPECT_EQ(arbiter.grant({}), Ids{"u1"});
+  for (const char* id : {"v1", "v2", "v3"}) arbiter.add(claim(id, 90, {}));
+  EXPECT_TRUE(arbiter.grant({}).empty());
+  EXPECT_EQ(arbiter.preemptions().size(), 2u) << "those that count as much stay";
+}
+
+TEST(Arbiter, WhoHasWaitedLongGetsTheSeatOfOneThatHasHadItForAsLong) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(10), .running = 2});
+  arbiter.add(claim("a", 50, {}));
+  arbiter.add(claim("b", 90, {}));
+  EXPECT_EQ(arbiter.grant(at(0)).size(), 2u);
+  arbiter.add(claim("c", 50, {}, {}, at(3)));
+  EXPECT_TRUE(arbiter.grant(at(12)).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "has waited 9 s only";
+  EXPECT_TRUE(arbiter.grant(at(13)).empty());
+  ASSERT_EQ(arbiter.preemptions().size(), 1u);
+  EXPECT_EQ(arbiter.preemptions()[0].running, "a");
+  arbiter.hand_over("a");
+  EXPECT_EQ(arbiter.grant(at(13)), Ids{"c"});
+  EXPECT_TRUE(arbiter.grant(at(22)).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "now it is for a to wait";
+}
+
+TEST(Arbiter, AtEqualCountTheSeatIsTheOthersToo) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(1), .running = 1});
+  arbiter.add(claim("a", 100, {}, at(3), at(0)));
+  EXPECT_TRUE(arbiter.preemptions().empty());
+  EXPECT_EQ(arbiter.grant(at(2)), Ids{"a"}) << "counts 101, as much as anybody";
+  arbiter.add(claim("b", 100, {}, {}, at(2)));
+  Time now = at(2);
+  for (const auto& [from, to] : {std::pair("a", "b"), std::pair("b", "a"), std::pair("a", "b")}) {
+    for (int i = 0; i < 100 && arbiter.preemptions().empty(); ++i) (void)arbiter.grant(now += from_s(0.1));
+    ASSERT_EQ(arbiter.preemptions().size(), 1u);
+    ASSERT_EQ(arbiter.preemptions()[0].running, from);
+    arbiter.hand_over(from);
+    EXPECT_EQ(arbiter.grant(now), Ids{to});
+  }
+}
+
+// However many go round for ever, each has its turn; and a task with resources never makes one of them stand up.
+TEST(Arbiter, TreesWithoutEndTakeTurns) {
+  constexpr int kTrees = 9;
+  Random random(7);
+  Arbiter arbiter({"arm"}, {.ageing = from_s(2), .running = 3});
+  std::map<std::string, int> turns;
+  for (int i = 0; i < kTrees; ++i) arbiter.add(claim(fmt::format("t{}", i), static_cast<int>(random.below(101)), {}));
+  std::set<std::string> sit;
+  bool arm = false;
+  int preempted = 0;
+  for (int step = 0; step < 6'000; ++step) {
+    const Time now = at(0.1 * step);
+    if (!arm && random.uniform() < 0.1) arbiter.add(claim(fmt::format("arm{}", step), 100, {"arm"}, {}, now));
+    for (const std::string& id : arbiter.grant(now)) {
+      if (id.starts_with("arm")) {
+        arbiter.release(id);
+      } else {
+        ++turns[id];
+        sit.insert(id);
+      }
+    }
+    ASSERT_EQ(sit.size(), 3u);
+    for (const auto& [id, by] : arbiter.preemptions()) {
+      ASSERT_TRUE(by.starts_with("t")) << by;
+      arbiter.hand_over(id);
+      sit.erase(id);
+      ++preempted;
+    }
+  }
+  EXPECT_EQ(turns.size(), static_cast<std::size_t>(kTrees));
+  for (const auto& [id, count] : turns) EXPECT_GT(count, 20) << id;
+  EXPECT_LE(preempted, 3 * 600 / 2) << "a seat is kept for a period at least";
+}
+
 TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
   const Ids names{"r0", "r1", "r2", "r3", "r4"};
   Random random(5);
-  Arbiter arbiter(names, {});
+  Arbiter arbiter(names, {.running = 2});
   std::map<std::string, Ids> running, needs;
   std::size_t ended = 0, added = 0;
   for (int step = 0; step < 20'000; ++step) {
@@ -249,6 +388,7 @@ TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
       for (const std::string& name : held) ++holders[name];
     }
     for (const auto& [name, count] : holders) ASSERT_EQ(count, 1) << name;
+    ASSERT_LE(std::ranges::count_if(running, [](const auto& one) { return one.second.empty(); }), 2);
     if (!running.empty() && random.uniform() < 0.6) {
       const auto victim = std::next(running.begin(), static_cast<std::ptrdiff_t>(random.below(running.size())));
       arbiter.release(victim->first);

@@ -57,6 +57,7 @@ Status Tree::tick(Time now) {
   now_ = now;
   ticked_ = true;
   clock_ += passed;
+  work_ = 0;
   run_skills(passed);
   if (end_) return active_.empty() ? ended(*end_) : Status::kRunning;
   if (broken_) return broken_off();
@@ -65,7 +66,6 @@ Status Tree::tick(Time now) {
 
   auto status = NodeStatus::kRunning;
   waits_ = false;
-  work_ = 0;
   for (int round = 0; round < kMostRounds; ++round) {
     wakes_ = false;
     status = tick_node(0);

@@ -70,6 +70,8 @@ class Tree {
   void halt(Time now);
   // Before a tick: the time since the one before does not count.
   void stand_still() { stood_still_ = true; }
+  // Of the last tick, in nodes and operators.
+  [[nodiscard]] std::size_t work() const { return work_; }
   // Whether a skill has not ended so long after it was told to.
   [[nodiscard]] bool overdue(Duration grace) const;
 
