@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "apps/policies.hpp"
+#include "apps/resources.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/thinker.hpp"
 
@@ -16,18 +17,6 @@ brain::Orders orders_of(const world::Manifest& manifest) {
   brain::Orders orders;
   for (const world::ManifestRow& row : manifest) orders[row.parcel_id] = {row.destination, row.priority};
   return orders;
-}
-
-// What the skills hold must be there to be held; nobody could submit a task otherwise.
-Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
-  for (const auto& [name, type] : skills.all()) {
-    for (const std::string& needed : type.resources) {
-      if (std::ranges::find(world.resources, needed, &world::Resource::name) != world.resources.end()) continue;
-      return fail(fmt::format("resources: there is no '{}', which the skill '{}' holds", needed, name),
-                  (world.folder / "world.yaml").string(), "add it to resources");
-    }
-  }
-  return {};
 }
 
 cerebellum::Settings settings_of(const world::World& world) {
@@ -68,6 +57,17 @@ Expected<std::string> body_in(const bridge::Journal& journal) {
 }
 
 }  // namespace
+
+Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
+  for (const auto& [name, type] : skills.all()) {
+    for (const std::string& needed : type.resources) {
+      if (std::ranges::find(world.resources, needed, &world::Resource::name) != world.resources.end()) continue;
+      return fail(fmt::format("resources: there is no '{}', which the skill '{}' holds", needed, name),
+                  (world.folder / "world.yaml").string(), "add it to resources");
+    }
+  }
+  return {};
+}
 
 // ---- below the link ----
 
