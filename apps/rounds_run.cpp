@@ -72,9 +72,12 @@ class Run {
 
  private:
   int reckon(const runner::RunResult& result, double wall_s) {
-    referee::RoundsRules rules{.speed_m_s = rounds_.world.base->speed_m_s, .places = {}};
+    referee::RoundsRules rules{
+        .speed_m_s = rounds_.world.base->speed_m_s,
+    };
     for (const world::Station& station : rounds_.world.base->stations)
       rules.places[station.name] = station.map_from_base;
+    for (const brain::Errand& errand : rounds_.errands.all()) rules.asked.push_back(task::text_of(errand.task, "id"));
     const sim::BaseTruth& truth = sim::truth_of(*rounds_.simulation);
     const auto verdict = referee::judge_rounds(truth, *rounds_.journal, rules);
     if (!verdict) return bad_run(verdict.error());

@@ -51,6 +51,17 @@ class Judge {
     outcome(history.record);
   }
 
+  // Of a task that the journal does not have: the note says why.
+  void refused(const std::string& id, const std::vector<bridge::Event>& notes) {
+    ++verdict_.tasks;
+    ++verdict_.refused;
+    const auto note = std::ranges::find_if(notes, [&](const bridge::Event& event) {
+      return event.kind == "ride" && (event.order == id || task::text_of(event.detail, "code") == id);
+    });
+    find(fmt::format("{}: was not accepted: {}", id,
+                     note == notes.end() ? "nobody asked for it" : task::text_of(note->detail, "reason")));
+  }
+
   void drive() {
     verdict_.collisions = truth_.collisions;
     verdict_.fastest_m_s = truth_.fastest_m_s;
@@ -121,6 +132,12 @@ Expected<RoundsVerdict> judge_rounds(const sim::BaseTruth& truth, const bridge::
     const auto history = journal.task(record.task.id);
     if (!history) return std::unexpected(history.error());
     if (*history) judge.task(**history);
+  }
+  const auto notes = journal.notes();
+  if (!notes) return std::unexpected(notes.error());
+  for (const std::string& id : rules.asked) {
+    const bool known = std::ranges::any_of(*tasks, [&](const auto& record) { return record.task.id == id; });
+    if (!known) judge.refused(id, *notes);
   }
   judge.drive();
   return verdict;

@@ -15,15 +15,17 @@ namespace pons::referee {
 
 // What a base promises.
 struct RoundsRules {
-  double goal_m = 0.05, goal_rad = 0.05;  // from its goal, when the journal says that it is there
-  double speed_m_s = 0;                   // at most
-  std::map<std::string, Pose2> places;    // where a goal's name leads
+  double goal_m = 0.05, goal_rad = 0.05;     // from its goal, when the journal says that it is there
+  double speed_m_s = 0;                      // at most
+  std::map<std::string, Pose2> places = {};  // where a goal's name leads
+  std::vector<std::string> asked = {};       // ids of the tasks that the run was to do
 };
 
 struct RoundsVerdict {
   int tasks = 0, succeeded = 0, failed = 0, cancelled = 0, exceptions = 0, open = 0;
-  int goals = 0;   // that the journal says were reached
-  int missed = 0;  // of those, where the base was elsewhere
+  int refused = 0;  // that were asked for and not even accepted
+  int goals = 0;    // that the journal says were reached
+  int missed = 0;   // of those, where the base was elsewhere
   double worst_goal_m = 0, worst_goal_rad = 0;
   int collisions = 0;
   double fastest_m_s = 0, driven_m = 0;

@@ -25,7 +25,9 @@ class RoundsJudged : public ::testing::Test {
     ASSERT_TRUE(journal_->event(
         id, at, "attempt_ended",
         {{"step", 0}, {"skill", "navigate"}, {"attempt", 1}, {"status", "succeeded"}, {"detail", Json::object()}}));
-    if (outcome) ASSERT_TRUE(journal_->outcome(id, *outcome, "why", at));
+    if (outcome) {
+      ASSERT_TRUE(journal_->outcome(id, *outcome, "why", at));
+    }
   }
   RoundsVerdict judge() {
     auto verdict = judge_rounds(truth_, *journal_, {.speed_m_s = 0.5, .places = {{"door", {0.5, 0, 0}}}});
@@ -63,6 +65,15 @@ TEST_F(RoundsJudged, CollisionsAndHasteAreFound) {
   truth_.touched = "pillar";
   truth_.fastest_m_s = 0.51;
   EXPECT_THAT(judge().findings, ElementsAre(HasSubstr("2 collisions, the last with pillar"), HasSubstr("0.510 m/s")));
+}
+
+TEST_F(RoundsJudged, ATaskThatNobodyTookIsFound) {
+  ASSERT_TRUE(
+      journal_->note(Time{}, "ride", {{"code", "late"}, {"reason", "refused: the deadline has passed"}}, "late"));
+  const auto verdict = judge_rounds(truth_, *journal_, {.speed_m_s = 0.5, .asked = {"late"}});
+  ASSERT_TRUE(verdict);
+  EXPECT_EQ(verdict->refused, 1);
+  EXPECT_THAT(verdict->findings, ElementsAre(HasSubstr("late: was not accepted: refused: the deadline has passed")));
 }
 
 TEST_F(RoundsJudged, ATaskWithoutAGoodOutcomeIsFound) {

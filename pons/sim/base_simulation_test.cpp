@@ -91,6 +91,20 @@ TEST_F(OnItsFloor, WithoutPowerItsBrakesHoldIt) {
   EXPECT_NEAR(truth().way.back().map_from_base.x, at.x, 1e-3);
 }
 
+TEST_F(OnItsFloor, KeepsTheContractOfABody) {
+  const Time settled(std::chrono::seconds(1));  // onto its wheels, which are not as drawn
+  simulation_->advance_to(settled);
+  body::Subject subject{.body = simulation_->body(),
+                        .advance = [this](Time now) { simulation_->advance_to(now); },
+                        .cups_on = [] { return 0U; },
+                        .push_nm = AxisVector::Constant(2, 2),
+                        .now = settled};
+  std::vector<std::string> findings = body::nonconformities(subject);
+  // A base has no cups that could keep on what they were told.
+  std::erase_if(findings, [](const std::string& line) { return line.find("cup") != std::string::npos; });
+  EXPECT_TRUE(findings.empty()) << testing::PrintToString(findings);
+}
+
 TEST_F(OnItsFloor, WhatItRunsIntoCountsOnce) {
   drive(-4, -4, 4);  // into the west wall, 0.75 m behind it
   EXPECT_EQ(truth().collisions, 1);

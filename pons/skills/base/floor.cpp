@@ -7,7 +7,7 @@ namespace pons::skills {
 namespace {
 
 // What stood there and is not seen any more may stand behind the base; who walked by has gone on.
-constexpr Duration kRemembered = std::chrono::seconds(15);
+constexpr Duration kRemembered = std::chrono::seconds(120);
 
 }  // namespace
 
