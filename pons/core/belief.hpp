@@ -40,7 +40,9 @@ struct BaseBelief {
   int returns = 0;                                       // rays that came back
   double matched = 0;                                    // share of them that ends on the map
   double nearest_m = 0;                                  // the shortest
-  std::vector<Vector2> unmapped;                         // where the others end, map frame
+  Vector2 eye = Vector2::Zero();                         // where the rays come from, map frame
+  std::vector<Vector2> ends;                             // where those that came back end, likewise
+  std::vector<Vector2> unmapped;                         // of these, those that end far from anything on the map
 };
 
 // Whether `upper` lies or leans on `lower`, as far as can be told: lifted first, the lower one would carry it along.

@@ -108,8 +108,10 @@ void Localiser::correct() {
 void Localiser::judge() {
   int matched = 0;
   double nearest_m = lidar_.range_m;
+  belief_->eye = map_from_base_ * lidar_.base_from_lidar.position();
   for (const Vector2& end : ends_) {
     const Vector2 on_map = map_from_base_ * end;
+    belief_->ends.push_back(on_map);
     nearest_m = std::min(nearest_m, (end - lidar_.base_from_lidar.position()).norm());
     if (!world_.map->contains(on_map)) continue;
     const double off_m = world_.map->distance_m(on_map);

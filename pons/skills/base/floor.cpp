@@ -6,8 +6,19 @@
 namespace pons::skills {
 namespace {
 
-// What stood there and is not seen any more may stand behind the base; who walked by has gone on.
-constexpr Duration kRemembered = std::chrono::seconds(120);
+constexpr Duration kRemembered = std::chrono::minutes(5);  // where nobody has looked since
+// A ray goes through a point that it passes so closely and ends so far beyond.
+constexpr double kThrough_m = 0.02, kBeyond_m = 0.15;
+
+bool seen_through(const BaseBelief& belief, const Vector2& at) {
+  const Vector2 to = at - belief.eye;
+  return std::ranges::any_of(belief.ends, [&](const Vector2& end) {
+    const Vector2 ray = end - belief.eye;
+    const double length_m = ray.norm(), along_m = to.dot(ray) / length_m;
+    return along_m > 0 && along_m + kBeyond_m < length_m &&
+           std::abs(ray.x() * to.y() - ray.y() * to.x()) < kThrough_m * length_m;
+  });
+}
 
 }  // namespace
 
@@ -44,16 +55,24 @@ void Floor::see(const BaseBelief& belief) {
     seen_[cell] = belief.stamp;
   }
   if (news) ++version_;
+  forget([&](std::size_t cell) {
+    const auto width = static_cast<std::size_t>(map_.width());
+    return seen_[cell] < belief.stamp &&
+           seen_through(belief, map_.middle(static_cast<int>(cell % width), static_cast<int>(cell / width)));
+  });
 }
 
 void Floor::forget_until(Time now) {
-  const std::size_t before = known_.size();
-  std::erase_if(known_, [&](std::size_t cell) {
-    if (now - seen_[cell] < kRemembered) return false;
-    seen_[cell] = Time{};
-    return true;
+  forget([&](std::size_t cell) { return now - seen_[cell] >= kRemembered; });
+}
+
+void Floor::forget(const std::function<bool(std::size_t cell)>& gone) {
+  const std::size_t forgotten = std::erase_if(known_, [&](std::size_t cell) {
+    const bool is_gone = gone(cell);
+    if (is_gone) seen_[cell] = Time{};
+    return is_gone;
   });
-  if (known_.size() == before) return;
+  if (forgotten == 0) return;
   ++version_;
   std::ranges::fill(seen_m_, static_cast<float>(kFar_m));
   const auto width = static_cast<std::size_t>(map_.width());

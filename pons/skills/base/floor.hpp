@@ -1,7 +1,9 @@
 // The room that a base has: what the map shows, and what the lidar saw beside it not long ago.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "pons/core/belief.hpp"
@@ -15,7 +17,8 @@ class Floor {
   // Both must outlive it.
   Floor(const world::Grid& map, const world::Base& base);
 
-  // What stands where the map shows nothing: remembered until it was not seen for a while.
+  // What stands where the map shows nothing: remembered until a ray goes through it, or nobody has looked there for
+  // long.
   void see(const BaseBelief& belief);
   void forget_until(Time now);
 
@@ -36,6 +39,7 @@ class Floor {
 
  private:
   void mark(int column, int row);
+  void forget(const std::function<bool(std::size_t cell)>& gone);
 
   const world::Grid& map_;
   double radius_m_;

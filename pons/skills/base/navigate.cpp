@@ -21,7 +21,7 @@ constexpr double kThere_m = 0.025, kThere_rad = 0.02;
 constexpr int kCellsATick = 6000;  // of the search for a way: about a millisecond
 constexpr Duration kRenewed = std::chrono::milliseconds(100);
 constexpr Duration kSettled = std::chrono::milliseconds(500);  // the filter has seen it stand in a few scans
-constexpr Duration kWaitsForRoom = std::chrono::seconds(25);   // longer than what was seen is remembered
+constexpr Duration kWaitsForRoom = std::chrono::seconds(25);   // who stands in the way may go on
 constexpr Duration kWaitsForSight = std::chrono::seconds(10);
 constexpr Duration kHeadway = std::chrono::seconds(20);  // without getting nearer by kNearer_m
 constexpr double kNearer_m = 0.05, kNearer_rad = 0.1;
@@ -112,6 +112,7 @@ class Navigate final : public task::Skill {
   void plan_anew() {
     phase_ = Phase::kPlans;
     search_.reset();
+    refused_.reset();
     headway_at_.reset();
   }
 
@@ -144,13 +145,19 @@ class Navigate final : public task::Skill {
   }
 
   Progress plan(Time now) {
+    if (refused_ && version_ == chassis_.floor.version()) return wait_for_room(now);
     if (!search_ || search_->version() != chassis_.floor.version())
       search_.emplace(chassis_.floor, chassis_.expected(chassis_.wheels.splice_time(now)).map_from_base.position(),
                       goal_.position());
     auto found = search_->go_on(kCellsATick);
     if (!found) return {};
     search_.reset();
-    if (!*found) return wait_for_room(now, found->error());
+    version_ = chassis_.floor.version();
+    if (!*found) {
+      refused_ = found->error();
+      return wait_for_room(now);
+    }
+    refused_.reset();
     double length_m = 0;
     task::Json corners = task::Json::array();
     for (std::size_t i = 0; i < (*found)->size(); ++i) {
@@ -161,18 +168,18 @@ class Navigate final : public task::Skill {
     notes_.push_back({"plan", {{"way", std::move(corners)}, {"length_m", length_m}}});
     if (corrections_ == 0) way_m_ = std::max(way_m_, length_m);
     steer_.follow(std::move(**found), goal_.yaw);
-    version_ = chassis_.floor.version();
     phase_ = Phase::kDrives;
     renewed_at_.reset();
     return drive(now);
   }
 
-  Progress wait_for_room(Time now, const Error& why) {
+  // A search that found no way is made again when something was seen, or is gone.
+  Progress wait_for_room(Time now) {
     brake(now);
     if (!blocked_since_) blocked_since_ = now;
     // What only the map shows does not go away.
     if (chassis_.floor.version() > 0 && now < *blocked_since_ + kWaitsForRoom) return {};
-    return {Status::kFailed, why.line(), detail()};
+    return {Status::kFailed, refused_->line(), detail()};
   }
 
   [[nodiscard]] bool way_is_blocked() {
@@ -258,6 +265,7 @@ class Navigate final : public task::Skill {
   Mode mode_ = Mode::kGoes;
   Phase phase_ = Phase::kPlans;
   std::optional<WaySearch> search_;
+  std::optional<Error> refused_;  // by the last search
   std::uint64_t version_ = 0;  // of the floor when the way was last looked at
   std::optional<Time> renewed_at_, blocked_since_, unsure_since_, headway_at_;
   Pose2 headway_from_;

@@ -69,9 +69,21 @@ TEST_F(OnTheFloor, WhatWasSeenIsGoneRoundAndForgottenLater) {
   const std::uint64_t version = floor_.version();
   floor_.forget_until(Time(std::chrono::seconds(10)));
   EXPECT_EQ(floor_.version(), version);
-  floor_.forget_until(Time(std::chrono::seconds(180)));
+  floor_.forget_until(Time(std::chrono::seconds(400)));
   EXPECT_GT(floor_.version(), version);
   EXPECT_EQ(way({0, 0}, {5.6, 0}).value(), *straight);
+}
+
+TEST_F(OnTheFloor, WhatALookGoesThroughIsGone) {
+  see({{1.5, 0.5}, {2.5, 0.5}});
+  EXPECT_LT(floor_.clearance_m(Vector2(1.5, 0.5)), 0.05);
+  BaseBelief look;
+  look.stamp = Time(std::chrono::seconds(2));
+  look.eye = {0, 0.525};
+  look.ends = {{2.0, 0.525}, {1.4, 0.9}};  // through the nearer one, and short of the other
+  floor_.see(look);
+  EXPECT_GT(floor_.clearance_m(Vector2(1.5, 0.5)), 0.3);
+  EXPECT_LT(floor_.clearance_m(Vector2(2.5, 0.5)), 0.05);
 }
 
 TEST_F(OnTheFloor, SaysWhyThereIsNoWay) {
