@@ -266,7 +266,7 @@ class Navigate final : public task::Skill {
   Phase phase_ = Phase::kPlans;
   std::optional<WaySearch> search_;
   std::optional<Error> refused_;  // by the last search
-  std::uint64_t version_ = 0;  // of the floor when the way was last looked at
+  std::uint64_t version_ = 0;     // of the floor when the way was last looked at
   std::optional<Time> renewed_at_, blocked_since_, unsure_since_, headway_at_;
   Pose2 headway_from_;
   Time halted_at_;
