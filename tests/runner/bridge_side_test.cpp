@@ -1,5 +1,7 @@
 // What the bridge asks of the belt.
 #include "pons/runner/bridge_side.hpp"
+#include "pons/brain/dispatcher.hpp"
+#include "pons/perception/perception.hpp"
 
 #include <gtest/gtest.h>
 
