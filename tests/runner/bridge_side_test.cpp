@@ -1,14 +1,14 @@
 // What the bridge asks of the belt.
 #include "pons/runner/bridge_side.hpp"
-#include "pons/brain/dispatcher.hpp"
-#include "pons/perception/perception.hpp"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <optional>
 
+#include "pons/brain/dispatcher.hpp"
 #include "pons/bridge/test_kit.hpp"
+#include "pons/perception/perception.hpp"
 #include "pons/runner/darkroom.hpp"
 
 namespace pons::runner {
