@@ -6,6 +6,7 @@
 
 #include "apps/cell_facts.hpp"
 #include "apps/policies.hpp"
+#include "apps/resources.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/thinker.hpp"
 
@@ -17,18 +18,6 @@ brain::Orders orders_of(const world::Manifest& manifest) {
   brain::Orders orders;
   for (const world::ManifestRow& row : manifest) orders[row.parcel_id] = {row.destination, row.priority};
   return orders;
-}
-
-// What the skills hold must be there to be held; nobody could submit a task otherwise.
-Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
-  for (const auto& [name, type] : skills.all()) {
-    for (const std::string& needed : type.resources) {
-      if (std::ranges::find(world.resources, needed, &world::Resource::name) != world.resources.end()) continue;
-      return fail(fmt::format("resources: there is no '{}', which the skill '{}' holds", needed, name),
-                  (world.folder / "world.yaml").string(), "add it to resources");
-    }
-  }
-  return {};
 }
 
 cerebellum::Settings settings_of(const world::World& world) {
@@ -69,6 +58,17 @@ Expected<std::string> body_in(const bridge::Journal& journal) {
 }
 
 }  // namespace
+
+Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
+  for (const auto& [name, type] : skills.all()) {
+    for (const std::string& needed : type.resources) {
+      if (std::ranges::find(world.resources, needed, &world::Resource::name) != world.resources.end()) continue;
+      return fail(fmt::format("resources: there is no '{}', which the skill '{}' holds", needed, name),
+                  (world.folder / "world.yaml").string(), "add it to resources");
+    }
+  }
+  return {};
+}
 
 // ---- below the link ----
 

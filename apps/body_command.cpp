@@ -89,7 +89,7 @@ int body(const BodyOptions& options) {
       {{"--manifest", options.parcels.manifest}, {"--report", options.report}, {"--log", options.log}}};
   const std::array<fs::path, 2> written{options.report, options.log};
   if (auto possible = check_files(files, written); !possible) return bad_input(possible.error());
-  const auto world = world_named(options.world, "pons body");
+  const auto world = cell_named(options.world, "pons body");
   if (!world) return bad_input(world.error());
   const auto manifest = manifest_of(options.parcels, *world, "pons body");
   if (!manifest) return bad_input(manifest.error());

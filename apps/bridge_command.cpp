@@ -95,7 +95,7 @@ int bridge(const BridgeCommandOptions& options) {
   if (options.journal.empty())
     return bad_input(
         {"no journal is named", "pons bridge", "name a file with --journal: the next bridge goes on from it"});
-  const auto world = world_named(options.world, "pons bridge");
+  const auto world = cell_named(options.world, "pons bridge");
   if (!world) return bad_input(world.error());
   const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
   if (!manifest) return bad_input(manifest.error());

@@ -5,6 +5,7 @@
 #include "apps/paths.hpp"
 #include "apps/policies.hpp"
 #include "pons/model/robot_model.hpp"
+#include "pons/runner/speaker.hpp"
 
 namespace pons::apps {
 
@@ -14,12 +15,18 @@ Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) 
   if (names.empty()) return fail("no worlds", folder.string(), "set PONS_WORLDS to a folder of worlds");
   auto world = world::load(folder, name.empty() ? names.front() : name);
   if (!world) return std::unexpected(world.error());
-  auto model = model::RobotModel::load(world->robot);
-  if (!model) return std::unexpected(model.error());
   auto self = std::make_unique<CellSkills>();
   self->world = *std::move(world);
   self->link = std::make_unique<link::Link>();
   self->end = std::make_unique<link::BridgeEnd>(*self->link);
+  if (self->world.base) {
+    self->chassis = std::make_unique<skills::Chassis>(*self->end, self->world);
+    self->speech = std::make_unique<runner::Speaker>(".", runner::Pace::kLockstep);
+    skills::add_base_skills(self->registry, *self->chassis, *self->speech);
+    return self;
+  }
+  auto model = model::RobotModel::load(self->world.robot);
+  if (!model) return std::unexpected(model.error());
   self->cell = std::make_unique<skills::Cell>(*self->end, self->world, std::move(*model));
   skills::add_skills(self->registry, *self->cell, policy_names());
   return self;

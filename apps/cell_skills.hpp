@@ -1,4 +1,4 @@
-// The skills of a world's cell, for commands that only tell of them: skills are made for a cell, for the places that
+// The skills of a world, for commands that only tell of them: skills are made for a cell or a base, for the places that
 // one may name are those of a world.
 #pragma once
 
@@ -7,8 +7,10 @@
 
 #include "pons/core/error.hpp"
 #include "pons/link/link.hpp"
+#include "pons/skills/base/base_skills.hpp"
 #include "pons/skills/skills.hpp"
 #include "pons/task/skill.hpp"
+#include "pons/task/speech.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::apps {
@@ -20,7 +22,9 @@ struct CellSkills {
   world::World world;
   std::unique_ptr<link::Link> link;
   std::unique_ptr<link::BridgeEnd> end;
-  std::unique_ptr<skills::Cell> cell;
+  std::unique_ptr<skills::Cell> cell;        // of a world with an arm
+  std::unique_ptr<skills::Chassis> chassis;  // of one with a base,
+  std::unique_ptr<task::Speech> speech;      // likewise
   task::SkillRegistry registry;
 };
 

@@ -11,8 +11,11 @@
 #include "apps/commands.hpp"
 #include "apps/doctor.hpp"
 #include "apps/paths.hpp"
+#include "apps/rounds.hpp"
+#include "apps/run_kit.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/sim/simulation.hpp"
+#include "pons/skills/base/way.hpp"
 #include "pons/skills/cell.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
@@ -27,6 +30,8 @@ Finding say(Finding finding, std::string_view what, std::string_view how) {
 }
 
 namespace {
+
+constexpr double kMatched = 0.6;  // of a scan: the rest is what the map does not show
 
 // Where the tool must get: over each mouth, and to the belt at both ends of the pick zone. Empty, or what it does not
 // reach.
@@ -51,10 +56,56 @@ std::string out_of_reach(const world::World& world, model::RobotModel& model) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+// Whether a base finds a way from where it starts to each station.
+std::string no_way_to(const world::World& world) {
+  const skills::Floor floor(*world.map, *world.base);
+  std::vector<std::string> names;
+  for (const world::Station& station : world.base->stations) {
+    skills::WaySearch search(floor, world.base->start.position(), station.map_from_base.position());
+    auto found = search.go_on(world.map->width() * world.map->height() * 8);
+    if (!found || !*found) names.push_back(station.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+Finding try_base(const std::string& what, const world::World& world) {
+  const auto model = model::RobotModel::load(world.robot);
+  if (!model) return say(Finding::kBad, what, model.error().line());
+  if (auto good = cerebellum::check(*model, wheel_settings()); !good)
+    return say(Finding::kBad, what, good.error().line());
+  const auto simulation = sim::BaseSimulation::create(world, 1);
+  if (!simulation) return say(Finding::kBad, what, simulation.error().line());
+  RgbdFrame scan;
+  body::Camera* const lidar = (*simulation)->cameras().front();
+  lidar->begin(Time{});
+  if (auto taken = lidar->finish(scan); !taken) return say(Finding::kBad, what, taken.error().line());
+  perception::Localiser localiser(world);
+  localiser.process(scan, {AxisVector::Zero(2), 0});
+  if (const double matched = localiser.base()->matched; matched < kMatched)
+    return say(Finding::kBad, what, fmt::format("{:.0f} % of a scan is on the map; draw it anew", 100 * matched));
+  if (const std::string names = no_way_to(world); !names.empty())
+    return say(Finding::kBad, what, fmt::format("no way leads to {}; move it, or mend the map", names));
+  return say(Finding::kGood, what,
+             fmt::format("composes, its scan fits the map, and ways lead to {} stations", world.base->stations.size()));
+}
+
+// The same program and way as a run's.
+Finding try_speech() {
+  const TemporaryFolder folder;
+  const auto file = folder.file(".");
+  if (!file) return say(Finding::kBad, "speech", file.error().line());
+  runner::Speaker speaker(*file, runner::Pace::kLockstep);
+  if (auto begun = speaker.begin("good", Time{}); !begun) return say(Finding::kBad, "speech", begun.error().line());
+  const auto spoken = speaker.look(Time(std::chrono::hours(1)));
+  if (!spoken || !*spoken) return say(Finding::kBad, "speech", spoken ? spoken->error().line() : "says nothing");
+  return say(Finding::kGood, "speech", "espeak-ng speaks");
+}
+
 Finding try_world(const std::string& name) {
   const std::string what = "world " + name;
   const auto world = world::load(worlds_folder(), name);
   if (!world) return say(Finding::kBad, what, world.error().line());
+  if (world->base) return std::max(try_base(what, *world), try_speech());
   auto model = model::RobotModel::load(world->robot);
   if (!model) return say(Finding::kBad, what, model.error().line());
   const auto manifest = world::draw_manifest(*world, 1, 1);

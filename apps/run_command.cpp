@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 #include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/assembly.hpp"
 #include "apps/body_setup.hpp"
@@ -12,6 +14,7 @@
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
+#include "apps/rounds_run.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/realtime.hpp"
@@ -26,7 +29,8 @@ struct RunOptions {
   ParcelOptions parcels;
   BodySetupOptions body;
   std::string journal;
-  fs::path report, log, picture, socket;
+  fs::path report, log, picture, socket, speech;
+  std::vector<std::string> tasks;
   bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
 
@@ -42,29 +46,6 @@ Expected<void> check_files_of(const RunOptions& options) {
   const std::array<fs::path, 3> written{options.report, options.log, options.picture};
   return check_files(files, written);
 }
-
-// Where the journal lies when nobody says: in a folder of its own that goes away with the run.
-class TemporaryJournal {
- public:
-  TemporaryJournal() {
-    const char* const wanted = std::getenv("TMPDIR");
-    std::string pattern = fs::path(wanted != nullptr ? wanted : "/tmp") / "pons-XXXXXX";
-    if (mkdtemp(pattern.data()) != nullptr) folder_ = pattern;
-  }
-  ~TemporaryJournal() {
-    std::error_code ignored;
-    if (!folder_.empty()) fs::remove_all(folder_, ignored);
-  }
-  TemporaryJournal(const TemporaryJournal&) = delete;
-  TemporaryJournal& operator=(const TemporaryJournal&) = delete;
-  [[nodiscard]] Expected<std::string> file() const {
-    if (folder_.empty()) return fail("no temporary folder for the journal", "TMPDIR", "set it, or use --journal");
-    return (folder_ / "journal.db").string();
-  }
-
- private:
-  fs::path folder_;
-};
 
 Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
   const auto rgb = cell.body->simulation->picture(kPictureWidth, kPictureHeight);
@@ -125,6 +106,25 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   return result->complete && reckoning->good() ? kExitGood : kExitBadRun;
 }
 
+RoundsOptions rounds_options(const RunOptions& options) {
+  RoundsOptions rounds{.tasks = options.tasks,
+                       .seed = options.parcels.seed,
+                       .journal = options.journal,
+                       .report = options.report,
+                       .log = options.log,
+                       .picture = options.picture,
+                       .socket = options.socket,
+                       .speech = options.speech};
+  rounds.pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
+  rounds.explain = options.explain ? Explain::kFindings : Explain::kNothing;
+  if (options.parcels.parcels_given) rounds.of_a_cell = "--parcels";
+  if (!options.parcels.manifest.empty()) rounds.of_a_cell = "--manifest";
+  if (!options.body.visits.empty()) rounds.of_a_cell = "--visit";
+  if (!options.body.arm_at.empty()) rounds.of_a_cell = "--arm-at";
+  if (options.recover) rounds.of_a_cell = "--recover";
+  return rounds;
+}
+
 int run(const RunOptions& options) {
   // Before anything is opened: what is built is also taken down.
   watch_interrupts();
@@ -132,12 +132,18 @@ int run(const RunOptions& options) {
   if (auto possible = check_files_of(options); !possible) return bad_input(possible.error());
   auto world = world_named(options.world, "pons run");
   if (!world) return bad_input(world.error());
+  if (world->base) return run_rounds(rounds_options(options), std::move(*world));
+  if (!options.tasks.empty() || !options.speech.empty()) {
+    return bad_input({"a cell with an arm gets its tasks from its dispatcher",
+                      options.tasks.empty() ? "--speech" : "--task",
+                      "leave it out; pons task submit sends others to a run"});
+  }
   const auto manifest = manifest_of(options.parcels, *world, "pons run");
   if (!manifest) return bad_input(manifest.error());
 
-  std::optional<TemporaryJournal> temporary;
+  std::optional<TemporaryFolder> temporary;
   Expected<std::string> journal = bridge::named(options.journal, world->name);
-  if (options.journal.empty()) journal = temporary.emplace().file();
+  if (options.journal.empty()) journal = temporary.emplace().file("journal.db");
   if (!journal) return bad_input(journal.error());
   auto setup = body_setup(options.body, options.parcels.seed, *world);
   if (!setup) return bad_input(setup.error());
@@ -159,7 +165,7 @@ int run(const RunOptions& options) {
 
 void add_run(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<RunOptions>();
-  CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted");
+  CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted, or its rounds are made");
   command->add_option("world", options->world, "A world's name; `pons worlds` lists them");
   add_parcel_options(*command, options->parcels);
   auto* lockstep =
@@ -174,6 +180,9 @@ void add_run(CLI::App& app, Chosen& chosen) {
   command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
   command->add_option("--socket", options->socket,
                       "Where `pons task` reaches this run (on by default with --realtime)");
+  command->add_option("--task", options->tasks,
+                      "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
+  command->add_option("--speech", options->speech, "Folder for what a base says, a WAV file each (a temporary one)");
   add_body_setup_options(*command, options->body);
   command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <climits>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 
 #include "apps/commands.hpp"
@@ -106,6 +107,13 @@ Expected<world::World> world_named(const std::string& name, const std::string& c
   return fail("no world is named", command, fmt::format("choose from {}", fmt::join(names, ", ")));
 }
 
+Expected<world::World> cell_named(const std::string& name, const std::string& command) {
+  auto world = world_named(name, command);
+  if (world && world->base)
+    return fail(fmt::format("{} has a base, which runs in one process", name), command, "pons run " + name);
+  return world;
+}
+
 Duration slowest(std::size_t parcels) { return from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(parcels)); }
 
 void refuse_empty(CLI::App& command) {
@@ -137,6 +145,22 @@ Expected<void> check_files(std::span<const FileOption> files, std::span<const fs
   return {};
 }
 
+TemporaryFolder::TemporaryFolder() {
+  const char* const wanted = std::getenv("TMPDIR");
+  std::string pattern = fs::path(wanted != nullptr ? wanted : "/tmp") / "pons-XXXXXX";
+  if (mkdtemp(pattern.data()) != nullptr) folder_ = pattern;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  if (!folder_.empty()) fs::remove_all(folder_, ignored);
+}
+
+Expected<std::string> TemporaryFolder::file(const char* name) const {
+  if (folder_.empty()) return fail("no temporary folder for the journal", "TMPDIR", "set it, or use --journal");
+  return (folder_ / name).string();
+}
+
 Expected<void> LoopLog::open(const fs::path& path) {
   if (path.empty()) return {};
   file_.reset(std::fopen(path.c_str(), "w"));
@@ -154,6 +178,21 @@ std::string degraded_line(std::string_view refused) { return fmt::format("pons: 
 
 bool Reckoning::good() const {
   return verdict.lost == 0 && verdict.missorted == 0 && verdict.duplicated == 0 && report.limits.violations == 0;
+}
+
+void put_loop(const runner::RunResult& result, record::Report& report) {
+  report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
+                 .missed = static_cast<std::int64_t>(result.loop.missed),
+                 .p50_us = result.loop.p50_us,
+                 .p99_us = result.loop.p99_us,
+                 .degraded = result.degraded};
+  if (const auto& late = result.loop.late) {
+    report.loop.late_p50_us = late->p50_us;
+    report.loop.late_p99_us = late->p99_us;
+    report.loop.late_max_us = late->max_us;
+  }
+  if (const auto& bridge = result.bridge) report.bridge = {bridge->p50_ms, bridge->p99_ms, bridge->max_ms};
+  report.sim_seconds = result.end.s();
 }
 
 Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
@@ -185,30 +224,20 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                    .worst_ratio = std::max({verdict->worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
                                             loop.commanded.jerk, loop.commanded.torque}),
                    .saturated = static_cast<std::int64_t>(loop.saturated)};
-  report.loop = {.ticks = static_cast<std::int64_t>(result.loop.ticks),
-                 .missed = static_cast<std::int64_t>(result.loop.missed),
-                 .p50_us = result.loop.p50_us,
-                 .p99_us = result.loop.p99_us,
-                 .degraded = result.degraded};
-  if (const auto& late = result.loop.late) {
-    report.loop.late_p50_us = late->p50_us;
-    report.loop.late_p99_us = late->p99_us;
-    report.loop.late_max_us = late->max_us;
-  }
-  if (const auto& bridge = result.bridge) report.bridge = {bridge->p50_ms, bridge->p99_ms, bridge->max_ms};
-  report.sim_seconds = result.end.s();
+  put_loop(result, report);
   report.wall_seconds = figures.wall_s;
   report.state_hash = state_hash(body, *verdict);
   return Reckoning{std::move(*verdict), std::move(report)};
 }
 
-Expected<void> tell(const Reckoning& reckoning, Explain explain, const fs::path& file) {
-  say(stdout, record::summary(reckoning.report));
+Expected<void> tell(const record::Report& report, const std::vector<std::string>& findings, Explain explain,
+                    const fs::path& file) {
+  say(stdout, record::summary(report));
   if (explain == Explain::kFindings) {
-    for (const std::string& finding : reckoning.verdict.findings) say(stdout, fmt::format("  {}\n", finding));
+    for (const std::string& finding : findings) say(stdout, fmt::format("  {}\n", finding));
   }
   if (file.empty()) return {};
-  if (auto written = record::write(reckoning.report, file); !written) return written;
+  if (auto written = record::write(report, file); !written) return written;
   say(stdout, fmt::format("report: {}\n", file.string()));
   return {};
 }

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "apps/assembly.hpp"
 #include "pons/bridge/journal/journal.hpp"
@@ -45,6 +46,9 @@ void add_parcel_options(CLI::App& command, ParcelOptions& options);
 // Error: none is named, or there is no such world.
 [[nodiscard]] Expected<world::World> world_named(const std::string& name, const std::string& command);
 
+// Likewise, for what only a cell with an arm can do. Error also: it has a base.
+[[nodiscard]] Expected<world::World> cell_named(const std::string& name, const std::string& command);
+
 // The longest that a run of so many parcels takes (run time): one that takes longer hangs.
 [[nodiscard]] Duration slowest(std::size_t parcels);
 
@@ -61,6 +65,20 @@ void refuse_empty(CLI::App& command);
 using FileOption = std::pair<const char*, std::filesystem::path>;
 [[nodiscard]] Expected<void> check_files(std::span<const FileOption> files,
                                          std::span<const std::filesystem::path> written);
+
+// A folder of a run's own that goes away with it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  // Error: it could not be made.
+  [[nodiscard]] Expected<std::string> file(const char* name) const;
+
+ private:
+  std::filesystem::path folder_;
+};
 
 // What the control loop says, line by line, so that a run that dies leaves what led there.
 class LoopLog {
@@ -80,6 +98,8 @@ class LoopLog {
 [[nodiscard]] std::string degraded_line(std::string_view refused);
 
 // ---- the end ----
+
+enum class Explain : std::uint8_t { kNothing, kFindings };
 
 // What a run came to, as far as the referee does not see it.
 struct RunFigures {
@@ -101,9 +121,16 @@ struct Reckoning {
 [[nodiscard]] Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
                                          const RunFigures& figures);
 
+// What the loop and the bridge were like, for the report.
+void put_loop(const runner::RunResult& result, record::Report& report);
+
 // Prints the summary and, explained, a line for each parcel that was not sorted; writes the report unless `file` is
 // empty. Error: it cannot be written.
-enum class Explain : std::uint8_t { kNothing, kFindings };
-[[nodiscard]] Expected<void> tell(const Reckoning& reckoning, Explain explain, const std::filesystem::path& file);
+[[nodiscard]] Expected<void> tell(const record::Report& report, const std::vector<std::string>& findings,
+                                  Explain explain, const std::filesystem::path& file);
+[[nodiscard]] inline Expected<void> tell(const Reckoning& reckoning, Explain explain,
+                                         const std::filesystem::path& file) {
+  return tell(reckoning.report, reckoning.verdict.findings, explain, file);
+}
 
 }  // namespace pons::apps

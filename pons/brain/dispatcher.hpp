@@ -4,21 +4,19 @@
 
 #include <cstdint>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pons/brain/brain.hpp"
 #include "pons/core/belief.hpp"
 #include "pons/core/time.hpp"
 #include "pons/task/task.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::brain {
-
-using task::Json;
 
 struct Order {
   std::string destination;  // a place's name
@@ -28,13 +26,6 @@ using Orders = std::map<std::string, Order, std::less<>>;  // by the label's cod
 
 inline constexpr int kExpressPriority = 80;
 inline constexpr int kOrdinaryPriority = 50;  // among ordinary parcels the one that leaves first goes first
-
-// Something that will not be asked for. `code` is empty when none was read.
-struct Ride {
-  std::uint32_t track = 0;
-  std::string code;
-  std::string reason;  // one of the kRide… texts
-};
 
 inline constexpr std::string_view kRideUnreadable = "label unreadable";
 inline constexpr std::string_view kRideUnknown = "unknown code";
@@ -49,35 +40,23 @@ struct Tally {
   std::int64_t settled = 0;  // sorted, given up, or let ride; one that failed and is asked for again is not
 };
 
-struct Decisions {
-  std::vector<Json> tasks;  // to submit, in this order; an id comes once in the dispatcher's life
-  std::vector<Ride> rides;
-  bool belt_waits = false;  // what is asked for would ride past the pick zone
-};
-
 // Asks for a parcel by its code; for one whose task failed and that turns up again, by code and try ("P000123.2"). What
 // lies on or leans on another is asked for first; express parcels overtake, but nothing is lost for them that need not
 // be. Pure and deterministic; one thread.
-class Dispatcher {
+class Dispatcher final : public Brain {
  public:
   // `world` must outlive it.
   Dispatcher(Orders orders, const world::World& world);
 
-  // `beliefs` are all live tracks, predicted to `now`; the belt does not wait for the tasks `set_aside`, which somebody
-  // has paused before they began: what they are about rides on.
   [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now,
-                                  const std::set<std::string>& set_aside = {});
-  // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
-  bool heard(std::string_view id, task::Outcome outcome);
-  // What an earlier dispatcher asked for in this run, and what became of it, in that order, before the first observe():
-  // nothing when it is still open. Tasks that no dispatcher asked for are passed over.
-  void recall(const task::Task& task, std::optional<task::Outcome> outcome);
-  // What it let ride; `code` may be empty.
-  void recall_ride(std::string_view code);
+                                  const std::set<std::string>& set_aside = {}) override;
+  bool heard(std::string_view id, task::Outcome outcome) override;
+  void recall(const task::Task& task, std::optional<task::Outcome> outcome) override;
+  void recall_ride(std::string_view code) override;
   [[nodiscard]] const Tally& tally() const { return tally_; }
 
   // Orders that nothing was decided about, in their order.
-  [[nodiscard]] std::vector<std::string> unseen() const;
+  [[nodiscard]] std::vector<std::string> unseen() const override;
   // Where, along the belt, labels can no longer be read (m).
   [[nodiscard]] double label_view_end_m() const { return label_view_end_m_; }
 

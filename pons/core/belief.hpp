@@ -1,10 +1,14 @@
 // Something perceived: a value with a frame, a time stamp and an uncertainty. Never the truth.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "pons/core/axes.hpp"
 #include "pons/core/pose.hpp"
+#include "pons/core/pose2.hpp"
 #include "pons/core/time.hpp"
 
 namespace pons {
@@ -25,6 +29,20 @@ struct ObjectBelief {
   bool crowded = false;    // touches, overlaps or leans on a neighbour
   std::string code;        // label text, empty until read
   int label_attempts = 0;  // frames good enough to read a label on it, readable or not
+};
+
+// Where a base is on its map, as of one scan, and what that scan saw beside the map.
+struct BaseBelief {
+  Time stamp;  // of the scan
+  Pose2 map_from_base;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // of x, y (m) and yaw (rad), map axes
+  AxisVector wheels_rad;                                 // measured at the stamp: odometry goes on from there
+  int returns = 0;                                       // rays that came back
+  double matched = 0;                                    // share of them that ends on the map
+  double nearest_m = 0;                                  // the shortest
+  Vector2 eye = Vector2::Zero();                         // where the rays come from, map frame
+  std::vector<Vector2> ends;                             // where those that came back end, likewise
+  std::vector<Vector2> unmapped;                         // of these, those that end far from anything on the map
 };
 
 // Whether `upper` lies or leans on `lower`, as far as can be told: lifted first, the lower one would carry it along.

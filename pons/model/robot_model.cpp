@@ -77,9 +77,13 @@ struct RobotModel::Impl {
       : robot(std::move(robot_in)), model(model_in), data(model) {
     model.gravity.linear() = robot.world_from_base.linear().transpose() * Vector3(0, 0, -kGravity_m_s2);
     model.armature = robot.rotor_inertia_kg_m2;
-    const auto flange = model.getFrameId(robot.flange_link);
-    last_joint = model.frames[flange].parentJoint;
-    last_joint_from_flange = model.frames[flange].placement;
+    if (robot.reflected_inertia_kg_m2.size() > 0) model.armature += robot.reflected_inertia_kg_m2;
+    last_joint_from_flange.setIdentity();
+    if (!robot.flange_link.empty()) {
+      const auto flange = model.getFrameId(robot.flange_link);
+      last_joint = model.frames[flange].parentJoint;
+      last_joint_from_flange = model.frames[flange].placement;
+    }
     last_joint_from_tip = last_joint_from_flange * se3_of(robot.tool.flange_from_tip);
     last_inertia =
         model.inertias[last_joint] + last_joint_from_flange.act(point_mass(robot.tool.mass_kg, robot.tool.com_m));
@@ -141,6 +145,7 @@ struct RobotModel::Impl {
   }
 
   Jacobian tip_jacobian(const AxisVector& at) {
+    if (last_joint == 0) return Jacobian::Zero(6, model.nv);  // no axis moves it
     place_axes(at);
     const pinocchio::SE3 base_from_tip = data.oMi[last_joint] * last_joint_from_tip;
     Jacobian jacobian(6, model.nv);
@@ -194,18 +199,30 @@ RobotModel::~RobotModel() = default;
 
 namespace {
 
-// The first thing about `model` that this program cannot work with.
-Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
+// The same, with every joint that turns without end as one that counts its turns: one number an axis, as encoders have
+// it.
+pinocchio::Model counting_turns(const pinocchio::Model& model) {
+  if (model.nq == model.nv) return model;
+  pinocchio::Model counting;
+  for (std::size_t i = 1; i < static_cast<std::size_t>(model.njoints); ++i) {
+    const std::string kind = model.joints[i].shortname();
+    pinocchio::JointModel joint = model.joints[i];
+    if (kind == "JointModelRUBX") joint = pinocchio::JointModelRX();
+    if (kind == "JointModelRUBY") joint = pinocchio::JointModelRY();
+    if (kind == "JointModelRUBZ") joint = pinocchio::JointModelRZ();
+    if (const auto* turning = boost::get<pinocchio::JointModelRevoluteUnboundedUnaligned>(&model.joints[i]))
+      joint = pinocchio::JointModelRevoluteUnaligned(turning->axis);
+    const auto added = counting.addJoint(model.parents[i], joint, model.jointPlacements[i], model.names[i]);
+    counting.appendBodyToJoint(added, model.inertias[i]);
+  }
+  counting.frames = model.frames;
+  counting.nframes = model.nframes;
+  return counting;
+}
+
+Expected<void> check_flange(const world::Robot& robot, const pinocchio::Model& model) {
   const std::string where = robot.urdf.string();
-  if (model.nv == 0)
-    return fail("the robot has no moving joint", where, "give at least one joint type revolute or prismatic");
-  if (model.nq != model.nv) {
-    return fail("a joint is continuous, floating or spherical", where, "make it revolute with limits, or fixed");
-  }
-  if (model.nv > static_cast<int>(kMaxAxes)) {
-    return fail(fmt::format("{} moving joints, at most {} are supported", model.nv, kMaxAxes), where,
-                "fix some of them");
-  }
+  if (robot.flange_link.empty()) return {};  // a base has none
   if (!model.existFrame(robot.flange_link, pinocchio::BODY)) {
     return fail(fmt::format("no link named '{}'", robot.flange_link), where,
                 "name one of its links as robot.flange_link in world.yaml");
@@ -215,6 +232,22 @@ Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
     return fail(fmt::format("link '{}' does not hang on the last moving joint", robot.flange_link), where,
                 "describe one chain of joints that ends in the flange");
   }
+  return {};
+}
+
+// The first thing about `model` that this program cannot work with.
+Expected<void> check(const world::Robot& robot, const pinocchio::Model& model) {
+  const std::string where = robot.urdf.string();
+  if (model.nv == 0)
+    return fail("the robot has no moving joint", where, "give at least one joint type revolute or prismatic");
+  if (model.nq != model.nv) {
+    return fail("a joint is floating or spherical", where, "make it revolute, continuous or fixed");
+  }
+  if (model.nv > static_cast<int>(kMaxAxes)) {
+    return fail(fmt::format("{} moving joints, at most {} are supported", model.nv, kMaxAxes), where,
+                "fix some of them");
+  }
+  if (auto good = check_flange(robot, model); !good) return good;
   // Without it the controller would reckon with an arm that weighs nothing.
   for (pinocchio::JointIndex i = 1; i < static_cast<pinocchio::JointIndex>(model.njoints); ++i) {
     const auto& inertia = model.inertias[i];
@@ -263,6 +296,7 @@ Expected<RobotModel> RobotModel::load(const world::Robot& robot) {
     return fail(fmt::format("broken URDF: {}", messages.first.empty() ? error.what() : messages.first),
                 robot.urdf.string(), "mend the XML there");
   }
+  model = counting_turns(model);
   if (auto checked = check(robot, model); !checked) return std::unexpected(checked.error());
   return RobotModel(std::make_unique<Impl>(robot, std::move(model)));
 }
@@ -283,6 +317,7 @@ Pose RobotModel::world_from_tip(const AxisVector& q) PONS_NONBLOCKING {
 Jacobian RobotModel::tip_jacobian(const AxisVector& q) PONS_NONBLOCKING { return impl_->tip_jacobian(q); }
 
 Vector6 RobotModel::tip_acceleration(const AxisVector& q, const AxisVector& speed) PONS_NONBLOCKING {
+  if (impl_->last_joint == 0) return Vector6::Zero();
   impl_->place_axes(q);
   const pinocchio::Data& data = impl_->data;
   // Of what hangs on the last joint: twist, and its rate, in base axes about the base's origin.

@@ -37,6 +37,8 @@ struct PlacedCapsule {
 // several calls in a row need of the same q (where links and axes are) is reckoned once.
 class RobotModel {
  public:
+  // A robot without a flange link has no tip: it is taken for standing at the base, and no axis moves it. Joints that
+  // turn without end count their turns.
   // Errors: no file, broken URDF, flange link missing, more than kMaxAxes axes, limits of another length.
   [[nodiscard]] static Expected<RobotModel> load(const world::Robot& robot);
   RobotModel(RobotModel&&) noexcept;

@@ -186,6 +186,28 @@ TEST(RobotModel, ARotorAddsItsInertiaToItsOwnAxisOnly) {
   }
 }
 
+// Two wheels on a base: no chain, no flange, and joints that turn without end.
+TEST(RobotModel, WheelsCountTheirTurnsAndMoveNoTip) {
+  const auto world = world::load("worlds", "rounds");
+  ASSERT_TRUE(world) << world.error().line();
+  auto model = RobotModel::load(world->robot);
+  ASSERT_TRUE(model) << model.error().line();
+  ASSERT_EQ(model->axes(), 2);
+  const AxisVector far = axis_vector({1234.5, -987.6});
+  EXPECT_TRUE(model->tip_jacobian(far).isZero());
+  EXPECT_TRUE(model->world_from_tip(far).isApprox(Pose::Identity()));
+  // Wheel, rotor, and what the drive accelerates of the base; the wheels know nothing of each other.
+  AxisMatrix mass;
+  model->mass_matrix(far, {}, mass);
+  const double each = 0.0075 + 0.01 + 0.01 * (30.0 / 4 + 1.19 / 0.16);
+  EXPECT_NEAR(mass(0, 0), each, 1e-9);
+  EXPECT_NEAR(mass(1, 1), each, 1e-9);
+  EXPECT_NEAR(mass(0, 1), 0, 1e-12);
+  AxisVector torque(2);
+  model->inverse_dynamics(far, axis_vector({5, 3}), axis_vector({2, -4}), {}, torque);
+  EXPECT_TRUE(torque.isApprox(each * axis_vector({2, -4}), 1e-9));
+}
+
 TEST(RobotModel, TheMassMatrixIsWhatInverseDynamicsAskForPerAcceleration) {
   auto model = RobotModel::load(hanging_arm()).value();
   Random random(7);

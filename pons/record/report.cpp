@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string_view>
 
@@ -25,12 +26,10 @@ Report::Throughput throughput(double span_s, std::int64_t sorted) {
   return {.seconds_per_parcel = seconds_per_parcel, .parcels_per_hour = 3600.0 / seconds_per_parcel};
 }
 
-nlohmann::ordered_json to_json(const Report& report) {
+namespace {
+
+void put_parcels(Json& json, const Report& report) {
   const auto& parcels = report.parcels;
-  const auto& loop = report.loop;
-  Json json;
-  json["seed"] = report.seed;
-  json["world"] = report.world;
   json["parcels"] = {
       {"offered", parcels.offered},
       {"sorted", parcels.sorted},
@@ -41,6 +40,31 @@ nlohmann::ordered_json to_json(const Report& report) {
       {"damaged", parcels.damaged}};
   json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
+}
+
+void put_rounds(Json& json, const Report::Rounds& rounds) {
+  json["rounds"] = {{"tasks", rounds.tasks},
+                    {"succeeded", rounds.succeeded},
+                    {"goals", rounds.goals},
+                    {"missed", rounds.missed},
+                    {"worst_goal_m", number(rounds.worst_goal_m)},
+                    {"worst_goal_rad", number(rounds.worst_goal_rad)},
+                    {"collisions", rounds.collisions},
+                    {"fastest_m_s", number(rounds.fastest_m_s)},
+                    {"driven_m", number(rounds.driven_m)}};
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const Report& report) {
+  const auto& loop = report.loop;
+  Json json;
+  json["seed"] = report.seed;
+  json["world"] = report.world;
+  if (report.rounds)
+    put_rounds(json, *report.rounds);
+  else
+    put_parcels(json, report);
   json["retries"] = report.retries;
   json["limits"] = {{"violations", report.limits.violations},
                     {"worst_ratio", number(report.limits.worst_ratio)},
@@ -67,13 +91,12 @@ Expected<void> write(const Report& report, const std::filesystem::path& path) {
   return write_whole(path, to_json(report).dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
-std::string summary(const Report& report) {
+namespace {
+
+using Line = std::function<void(std::string_view name, std::string_view value)>;
+
+void tell_parcels(const Line& line, const Report& report) {
   const auto& parcels = report.parcels;
-  std::string text;
-  const auto line = [&text](std::string_view name, std::string_view value) {
-    text += fmt::format("  {:<14}{}\n", name, value);
-  };
-  line("world", fmt::format("{}, seed {}", report.world, report.seed));
   line("sorted", fmt::format("{} of {} parcels offered", parcels.sorted, parcels.offered));
   line("exceptions",
        fmt::format("{} deserved, {} undeserved", parcels.exceptions.deserved, parcels.exceptions.undeserved));
@@ -86,6 +109,27 @@ std::string summary(const Report& report) {
                          ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",
                                        report.throughput.seconds_per_parcel, report.throughput.parcels_per_hour)
                          : std::string("nothing sorted"));
+}
+
+void tell_rounds(const Line& line, const Report& report) {
+  const Report::Rounds& rounds = *report.rounds;
+  line("tasks", fmt::format("{} of {} succeeded", rounds.succeeded, rounds.tasks));
+  line("goals", fmt::format("{} reached, {} missed, at worst {:.3f} m and {:.3f} rad away", rounds.goals, rounds.missed,
+                            rounds.worst_goal_m, rounds.worst_goal_rad));
+  line("collisions", fmt::format("{}", rounds.collisions));
+  line("driven", fmt::format("{:.1f} m, at most {:.3f} m/s", rounds.driven_m, rounds.fastest_m_s));
+  line("retries", fmt::format("{}", report.retries));
+}
+
+}  // namespace
+
+std::string summary(const Report& report) {
+  std::string text;
+  const Line line = [&text](std::string_view name, std::string_view value) {
+    text += fmt::format("  {:<14}{}\n", name, value);
+  };
+  line("world", fmt::format("{}, seed {}", report.world, report.seed));
+  report.rounds ? tell_rounds(line, report) : tell_parcels(line, report);
   line("limits", fmt::format("{} violations, closest {:.1f} % of a limit{}", report.limits.violations,
                              100 * report.limits.worst_ratio,
                              report.limits.saturated == 0

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "pons/core/error.hpp"
@@ -56,10 +57,24 @@ struct Report {
     double max_ms = p50_ms;
   };
 
+  // Of a base that makes its rounds, by the referee's truth.
+  struct Rounds {
+    std::int64_t tasks = 0;
+    std::int64_t succeeded = 0;
+    std::int64_t goals = 0;   // that the journal says were reached
+    std::int64_t missed = 0;  // of those, where the base was elsewhere
+    double worst_goal_m = 0;
+    double worst_goal_rad = 0;
+    std::int64_t collisions = 0;
+    double fastest_m_s = 0;
+    double driven_m = 0;
+  };
+
   std::uint64_t seed = 0;
   std::string world{};
   Parcels parcels{};
   Throughput throughput{};
+  std::optional<Rounds> rounds{};  // of a world with a base, instead of parcels and throughput
   std::int64_t retries = 0;
   Limits limits{};
   Loop loop{};

@@ -17,10 +17,10 @@ constexpr std::size_t kGoneRemembered = 64;
 
 }  // namespace
 
-BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills,
+BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills,
                        const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
     : bridge_(bridge),
-      dispatcher_(dispatcher),
+      brain_(brain),
       skills_(std::move(skills)),
       arming_(bridge, skills_, zones, recovery),
       visitors_(std::move(visitors)) {}
@@ -29,7 +29,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
-    dispatcher_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
+    brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
   const auto events = journal.notes();
@@ -37,7 +37,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   bool armed_before = false;
   for (const bridge::Event& event : *events) {
     armed_before = armed_before || event.kind == "armed";
-    if (event.kind == "ride") dispatcher_.recall_ride(task::text_of(event.detail, "code"));
+    if (event.kind == "ride") brain_.recall_ride(task::text_of(event.detail, "code"));
     if (event.kind == "person") arming_.recall(task::text_of(event.detail, "asks"));
     if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
@@ -66,7 +66,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   if (!bridge_.uses_resources() && !arming_.settles()) skills_.rest(now);
   if (auto noted = note_carried(now); !noted) return noted;
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
-    if (dispatcher_.heard(report.id, report.outcome)) last_outcome_ = now;
+    if (brain_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
   for (const std::uint32_t track : skills_.take_forgotten()) {
     gone_.push_back(track);
@@ -84,6 +84,7 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
     }
   }
   seen_ = snapshot;
+  if (snapshot.base && skills_.locate) skills_.locate(*snapshot.base);
 }
 
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -100,14 +101,14 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
-  const brain::Decisions decisions = dispatcher_.observe(objects, now, bridge_.parked());
+  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
       const auto id = task.at("id").get<std::string>();
-      const std::string& code = task.at("steps").at(0).at("arguments").at("object").get_ref<const std::string&>();
+      const std::string code = task.value("order", id);
       bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
-      dispatcher_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
+      brain_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
@@ -150,10 +151,10 @@ void BridgeSide::stop(Time now, const std::string& reason) {
   bridge_.stop(now, reason);
 }
 
-bool BridgeSide::idle() const { return bridge_.idle(); }
+bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }
 
 void BridgeSide::close(Time now) {
-  const std::vector<std::string> unseen = dispatcher_.unseen();
+  const std::vector<std::string> unseen = brain_.unseen();
   for (const std::string& code : unseen) {
     bridge_.note("ride",
                  {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "pons/brain/dispatcher.hpp"
+#include "pons/brain/brain.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/runner/arming.hpp"
 #include "pons/runner/observer.hpp"
@@ -25,8 +25,8 @@ class BridgeSide {
  public:
   // All must outlive it. `zones` are the world's. `visitors` is called once a period, before the bridge's tick:
   // requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Dispatcher& dispatcher, SkillPort skills,
-             const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors);
+  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const std::vector<world::Zone>& zones,
+             Recovery recovery, std::function<void(Time)> visitors);
 
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
   // that one told it to, and takes up what is open; nothing starts before the arm was armed anew. Error: the journal.
@@ -54,7 +54,7 @@ class BridgeSide {
   [[nodiscard]] Expected<void> note_carried(Time now);
 
   bridge::Bridge& bridge_;
-  brain::Dispatcher& dispatcher_;
+  brain::Brain& brain_;
   SkillPort skills_;
   Arming arming_;
   std::function<void(Time)> visitors_;

@@ -9,7 +9,7 @@ constexpr timespec kNever{.tv_sec = 1'000'000'000, .tv_nsec = 0};
 
 }  // namespace
 
-Observer::Observer(const world::World& world, perception::Perception& perception, link::Frames& frames,
+Observer::Observer(const world::World& world, perception::Sight& perception, link::Frames& frames,
                    const link::FramePages& pages, std::byte* memory, Pace pace)
     : world_(world), perception_(perception), places_(frames), pace_(pace), frames_(world.cameras.size()) {
   for (std::size_t camera = 0; camera < frames_.size(); ++camera) {
@@ -67,7 +67,8 @@ Snapshot Observer::take_in(std::size_t camera) {
                     perception_.beliefs(shot.stamp, shot.belt_travel_m),
                     perception_.cut(shot.stamp, shot.belt_travel_m),
                     {},
-                    perception_.wants_labels()};
+                    perception_.wants_labels(),
+                    perception_.base()};
   for (const world::CameraSpec& watching : world_.cameras) {
     if (watching.watches != "belt") snapshot.occupancy[watching.watches] = perception_.occupancy(watching.watches);
   }

@@ -15,7 +15,7 @@
 
 #include "pons/core/belief.hpp"
 #include "pons/link/frames.hpp"
-#include "pons/perception/perception.hpp"
+#include "pons/perception/sight.hpp"
 #include "pons/runner/photographer.hpp"
 #include "pons/world/world.hpp"
 
@@ -30,13 +30,14 @@ struct Snapshot {
   std::vector<ObjectBelief> objects, cut;  // Perception::beliefs(), cut()
   std::map<std::string, int> occupancy;    // of watched places
   bool wants_labels = false;               // Perception::wants_labels()
+  std::optional<BaseBelief> base = {};     // where the base is, in a world that has one
 };
 
 class Observer {
  public:
   // All must outlive it; `memory` is what `pages` describe. In lockstep, collect() waits for a frame that is due; in
   // real time a late frame is skipped over. What an earlier observer held of `frames` is given back unseen.
-  Observer(const world::World& world, perception::Perception& perception, link::Frames& frames,
+  Observer(const world::World& world, perception::Sight& perception, link::Frames& frames,
            const link::FramePages& pages, std::byte* memory, Pace pace);
   ~Observer();
   Observer(const Observer&) = delete;
@@ -53,7 +54,7 @@ class Observer {
   [[nodiscard]] Duration latency(std::size_t camera) const;
 
   const world::World& world_;
-  perception::Perception& perception_;
+  perception::Sight& perception_;
   link::Frames& places_;
   Pace pace_;
   std::vector<RgbdFrame> frames_;  // a camera; the perceiver's only,

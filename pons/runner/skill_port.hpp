@@ -17,6 +17,7 @@ struct SkillPort {
   // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
   // the belt was taken that they come from.
   std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
+  std::function<void(const BaseBelief&)> locate;               // with each scan of a base's lidar; may be empty
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
   std::function<void(Time)> arm;                               // one step out of a stop, towards operational

@@ -21,7 +21,10 @@ std::string said(const char* name, const std::function<void(world::World&)>& cha
 }
 
 TEST(CheckScene, TheWorldsAgreeWithTheirScenes) {
-  for (const std::string& name : world::list("worlds")) EXPECT_EQ(said(name.c_str(), [](world::World&) {}), "");
+  for (const std::string& name : world::list("worlds")) {
+    if (world::load("worlds", name)->base) continue;  // no arm, no mouths: base_simulation_test.cpp looks at it
+    EXPECT_EQ(said(name.c_str(), [](world::World&) {}), "");
+  }
 }
 
 TEST(CheckScene, AChuteThatWasMovedInOneFileOnly) {

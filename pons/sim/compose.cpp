@@ -19,24 +19,6 @@ constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; 
 
 constexpr int kArmBits = 4;
 
-// MuJoCo says what and where on lines of their own.
-std::string one_line(std::string text) {
-  while (!text.empty() && text.back() == '\n') text.pop_back();
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
-Expected<SpecPtr> parse(const std::filesystem::path& file) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(file, code)) {
-    return fail("there is no such file", file.string(), "name a file that exists in world.yaml");
-  }
-  char text[1024] = "";
-  SpecPtr spec(mj_parseXML(file.c_str(), nullptr, text, sizeof text));
-  if (!spec) return fail(one_line(text), file.string(), "mend the XML there");
-  return spec;
-}
-
 void set_options(mjSpec* spec, const world::World& world) {
   mjOption& option = spec->option;
   option.timestep = world.physics_step_s;
@@ -64,15 +46,6 @@ void paint_arm(mjsBody* body) {
     for (int i = 0; i < 3; ++i) geom->rgba[i] = shade[i];
     geom->rgba[3] = 1;
   }
-}
-
-// Attaches the first body of `child` at a frame, and keeps child's names under `prefix`.
-Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix, const std::filesystem::path& file) {
-  mjsBody* root = mjs_asBody(mjs_firstChild(mjs_findBody(child, "world"), mjOBJ_BODY, 0));
-  if (root == nullptr) return fail("there is no body", file.string(), "give it one root body");
-  mjsElement* attached = mjs_attach(frame->element, root->element, prefix, "");
-  if (attached == nullptr) return fail(one_line(mjs_getError(mjs_getSpec(frame->element))), file.string(), "mend it");
-  return mjs_asBody(attached);
 }
 
 Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::World& world) {

@@ -1,7 +1,9 @@
 #include "pons/sim/mujoco_kit.hpp"
 
+#include <algorithm>
 #include <span>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "pons/core/digest.hpp"
@@ -23,6 +25,31 @@ void keep(const mjLogMessage* message) {
 void install_message_handler() { mju_setLogHandler(keep); }
 
 std::string take_message() { return std::exchange(last_message, {}); }
+
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+Expected<SpecPtr> parse(const std::filesystem::path& file) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(file, code)) {
+    return fail("there is no such file", file.string(), "name a file that exists in world.yaml");
+  }
+  char text[1024] = "";
+  SpecPtr spec(mj_parseXML(file.c_str(), nullptr, text, sizeof text));
+  if (!spec) return fail(one_line(text), file.string(), "mend the XML there");
+  return spec;
+}
+
+Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix, const std::filesystem::path& file) {
+  mjsBody* root = mjs_asBody(mjs_firstChild(mjs_findBody(child, "world"), mjOBJ_BODY, 0));
+  if (root == nullptr) return fail("there is no body", file.string(), "give it one root body");
+  mjsElement* attached = mjs_attach(frame->element, root->element, prefix, "");
+  if (attached == nullptr) return fail(one_line(mjs_getError(mjs_getSpec(frame->element))), file.string(), "mend it");
+  return mjs_asBody(attached);
+}
 
 void to_mujoco(const Pose& pose, double position[3], double quaternion[4]) {
   const Eigen::Quaterniond q(pose.linear());

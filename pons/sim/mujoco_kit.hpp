@@ -4,9 +4,11 @@
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
+#include "pons/core/error.hpp"
 #include "pons/core/pose.hpp"
 
 namespace pons::sim {
@@ -26,6 +28,14 @@ using DataPtr = std::unique_ptr<mjData, MujocoDelete>;
 void install_message_handler();
 // The newest warning or error of this thread, empty when there was none since the last call.
 [[nodiscard]] std::string take_message();
+
+// MuJoCo says what and where on lines of their own.
+[[nodiscard]] std::string one_line(std::string text);
+// MJCF or URDF. Errors: no such file, broken.
+[[nodiscard]] Expected<SpecPtr> parse(const std::filesystem::path& file);
+// Attaches the first body of `child` at a frame, and keeps child's names under `prefix`.
+[[nodiscard]] Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix,
+                                        const std::filesystem::path& file);
 
 // Pose to MuJoCo's position and quaternion (w first), and back.
 void to_mujoco(const Pose& pose, double position[3], double quaternion[4]);

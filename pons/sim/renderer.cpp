@@ -177,4 +177,20 @@ Expected<void> Renderer::draw(std::vector<std::uint8_t>& rgb, std::vector<float>
   return {};
 }
 
+Expected<std::vector<std::uint8_t>> draw_picture(const mjModel* model, mjData* data, int camera,
+                                                 const LabelStore& labels, int width, int height) {
+  auto renderer = Renderer::create(model, width, height, Look::kPicture);
+  if (!renderer) return std::unexpected(renderer.error());
+  (*renderer)->capture(model, data, camera, labels);
+  std::vector<std::uint8_t> upside_down;
+  std::vector<float> depth;
+  if (auto drawn = (*renderer)->draw(upside_down, depth); !drawn) return std::unexpected(drawn.error());
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(upside_down.size());
+  const auto row = static_cast<std::ptrdiff_t>(3 * width);
+  for (int i = height - 1; i >= 0; --i)
+    rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
+  return rgb;
+}
+
 }  // namespace pons::sim

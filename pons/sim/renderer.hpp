@@ -57,4 +57,8 @@ class Renderer {
   double near_m_ = 0, far_m_ = 0;
 };
 
+// What that camera sees, for people: height × width × 3 bytes, top row first. On the thread that advances the physics.
+[[nodiscard]] Expected<std::vector<std::uint8_t>> draw_picture(const mjModel* model, mjData* data, int camera,
+                                                               const LabelStore& labels, int width, int height);
+
 }  // namespace pons::sim

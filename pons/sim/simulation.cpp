@@ -263,18 +263,8 @@ Expected<void> Simulation::health() const {
 
 Expected<std::vector<std::uint8_t>> Simulation::picture(int width, int height) const {
   const Cell& cell = *cell_;
-  auto renderer = Renderer::create(cell.composed.model.get(), width, height, Look::kPicture);
-  if (!renderer) return std::unexpected(renderer.error());
-  (*renderer)->capture(cell.composed.model.get(), cell.data.get(), cell.composed.picture_camera, cell.labels);
-  std::vector<std::uint8_t> upside_down;
-  std::vector<float> depth;
-  if (auto drawn = (*renderer)->draw(upside_down, depth); !drawn) return std::unexpected(drawn.error());
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(upside_down.size());
-  const auto row = static_cast<std::ptrdiff_t>(3 * width);
-  for (int i = height - 1; i >= 0; --i)
-    rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
-  return rgb;
+  return draw_picture(cell.composed.model.get(), cell.data.get(), cell.composed.picture_camera, cell.labels, width,
+                      height);
 }
 
 }  // namespace pons::sim

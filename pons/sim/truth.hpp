@@ -9,11 +9,13 @@
 #include <vector>
 
 #include "pons/core/pose.hpp"
+#include "pons/core/pose2.hpp"
 #include "pons/core/time.hpp"
 
 namespace pons::sim {
 
 class Simulation;
+class BaseSimulation;
 
 enum class LabelTruth : std::uint8_t { kReadable, kDown, kDamaged, kUnknownCode };
 enum class Whereabouts : std::uint8_t { kNotOffered, kBelt, kHeld, kFalling, kChute, kException, kTray, kFloor };
@@ -76,5 +78,24 @@ class Truth {
  private:
   const Simulation* simulation_;
 };
+
+// ---- a base ----
+
+struct BasePlace {
+  Time stamp;
+  Pose2 map_from_base;
+};
+
+// Where a base really was, and what it ran into, over every physics step so far.
+struct BaseTruth {
+  std::vector<BasePlace> way;  // every 10 ms
+  double fastest_m_s = 0;      // of its frame, along the floor
+  double driven_m = 0;
+  int collisions = 0;   // times it came to touch anything but the floor
+  std::string touched;  // what it touched last
+};
+
+// Valid while the simulation lives; use it on the thread that advances it.
+[[nodiscard]] const BaseTruth& truth_of(const BaseSimulation& simulation);
 
 }  // namespace pons::sim

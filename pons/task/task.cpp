@@ -91,7 +91,12 @@ Expected<Task> task_from(const Json& json) {
     return task;
   }
   for (const Json& step : json.at("steps")) {
-    task.steps.push_back({step.at("skill").get<std::string>(), step.value("arguments", Json::object())});
+    const bool params = step.contains("params");
+    if (params && step.contains("arguments"))
+      return fail("it has both arguments and params", fmt::format("/steps/{}", task.steps.size()),
+                  "they mean the same: give one of them");
+    task.steps.push_back(
+        {step.at("skill").get<std::string>(), step.value(params ? "params" : "arguments", Json::object())});
   }
   return task;
 }

@@ -60,6 +60,10 @@ inline constexpr std::string_view kTaskSchema = R"({
           "arguments": {
             "description": "As the skill's own schema says.",
             "type": "object"
+          },
+          "params": {
+            "description": "Another name of arguments; not both.",
+            "type": "object"
           }
         }
       }

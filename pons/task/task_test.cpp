@@ -42,6 +42,22 @@ TEST(Task, KeepsADeadlineOnEveryWayThroughText) {
   }
 }
 
+TEST(Task, ParamsAreArgumentsByAnotherName) {
+  const auto task = task_from(Json::parse(
+      R"({"id":"a","steps":[{"skill":"navigate","params":{"x":1.5,"y":0.5}},{"skill":"scan","arguments":{"seconds":1}}]})"));
+  ASSERT_TRUE(task) << task.error().line();
+  EXPECT_EQ(task->steps[0].arguments, Json::parse(R"({"x":1.5,"y":0.5})"));
+  EXPECT_EQ(task->steps[1].arguments, Json::parse(R"({"seconds":1})"));
+  // One spelling in the journal: the same task sent in the other one is the same task.
+  EXPECT_EQ(to_json(*task).at("steps").at(0).at("arguments"), task->steps[0].arguments);
+  const auto both =
+      task_from(Json::parse(R"({"id":"a","steps":[{"skill":"scan"},{"skill":"scan","params":{},"arguments":{}}]})"));
+  ASSERT_FALSE(both);
+  EXPECT_EQ(both.error().where, "/steps/1");
+  EXPECT_EQ(both.error().what, "it has both arguments and params");
+  EXPECT_FALSE(task_from(Json::parse(R"({"id":"a","steps":[{"skill":"scan","params":[]}]})")));
+}
+
 TEST(Task, HasDefaults) {
   const auto task = task_from(Json::parse(R"({"id":"a","steps":[{"skill":"home"}]})"));
   ASSERT_TRUE(task);

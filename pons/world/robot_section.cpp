@@ -18,6 +18,9 @@ constexpr double kMaxRotorInertia_kg_m2 = 100;
 // Drives of arms of this size add about so much. Without any, light wrist links make the simulation unstable at 2 ms.
 constexpr double kRotorInertia_kg_m2 = 0.01;
 constexpr std::size_t kMaxCapsules = 64;
+constexpr std::size_t kWheels = 2;
+// What a wheel has turned is told as one number that only grows: 40 km on wheels of 0.1 m, told to a nanometre.
+constexpr double kFarthestTurned_rad = 4e5;
 // Shorter than a few ticks, every hiccup of the loop takes the power off; longer, an arm without a loop goes far.
 constexpr double kShortestWatchdog_s = 0.005, kLongestWatchdog_s = 0.5;
 // So much the control step foresees; a drive that is slower cannot hold an arm at 1 kHz.
@@ -38,25 +41,29 @@ Eigen::Matrix3d looking_at(const YamlValue& value, const Vector3& eye) {
   return axes;
 }
 
+void read_rates(const YamlMap& map, std::size_t count, AxisLimits& limits) {
+  const auto positive = [&](std::string_view key) {
+    const AxisVector values = map[key].axes(count, 0, kMaxRate);
+    if (values.minCoeff() <= 0) map[key].refuse("holds a limit of 0", "every limit is above 0");
+    return values;
+  };
+  limits.speed_rad_s = positive("speed_rad_s");
+  limits.acceleration_rad_s2 = positive("acceleration_rad_s2");
+  limits.jerk_rad_s3 = positive("jerk_rad_s3");
+  limits.torque_nm = positive("torque_nm");
+}
+
 AxisLimits read_limits(const YamlValue& value) {
   const YamlMap map(value,
                     {"position_min", "position_max", "speed_rad_s", "acceleration_rad_s2", "jerk_rad_s3", "torque_nm"});
   AxisLimits limits;
   limits.position_min = map["position_min"].axes(0, -kTurns, kTurns);
   const auto count = static_cast<std::size_t>(limits.position_min.size());
-  const auto positive = [&](std::string_view key) {
-    const AxisVector values = map[key].axes(count, 0, kMaxRate);
-    if (values.minCoeff() <= 0) map[key].refuse("holds a limit of 0", "every limit is above 0");
-    return values;
-  };
   limits.position_max = map["position_max"].axes(count, -kTurns, kTurns);
   if (((limits.position_max - limits.position_min).array() <= 0).any()) {
     map["position_max"].refuse("is not above position_min everywhere", "raise it, or lower position_min");
   }
-  limits.speed_rad_s = positive("speed_rad_s");
-  limits.acceleration_rad_s2 = positive("acceleration_rad_s2");
-  limits.jerk_rad_s3 = positive("jerk_rad_s3");
-  limits.torque_nm = positive("torque_nm");
+  read_rates(map, count, limits);
   return limits;
 }
 
@@ -68,6 +75,12 @@ AxisVector read_rotor_inertia(const YamlMap& robot, std::size_t axes) {
   AxisVector inertia = value.axes(axes, 0, kMaxRotorInertia_kg_m2);
   if (inertia.minCoeff() <= 0) value.refuse("holds a 0", "every rotor has some; without the key it is 0.01");
   return inertia;
+}
+
+void read_drives(const YamlMap& map, std::size_t axes, Robot& robot) {
+  robot.rotor_inertia_kg_m2 = read_rotor_inertia(map, axes);
+  if (map.has("watchdog_s")) robot.watchdog_s = map["watchdog_s"].number(kShortestWatchdog_s, kLongestWatchdog_s);
+  if (map.has("drive_delay_s")) robot.drive_delay_s = map["drive_delay_s"].number(0, kLongestDriveDelay_s);
 }
 
 Tool read_tool(const YamlValue& value, const std::filesystem::path& folder) {
@@ -135,11 +148,9 @@ Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
       ((robot.limits.position_max - robot.home).array() < 0).any()) {
     map["home"].refuse("lies outside limits.position_min … position_max", "move it inside, or widen the limits");
   }
-  robot.rotor_inertia_kg_m2 = read_rotor_inertia(map, count);
+  read_drives(map, count, robot);
   robot.tool = read_tool(map["tool"], folder);
   robot.payload_kg = map["payload_kg"].positive(kMaxMass);
-  if (map.has("watchdog_s")) robot.watchdog_s = map["watchdog_s"].number(kShortestWatchdog_s, kLongestWatchdog_s);
-  if (map.has("drive_delay_s")) robot.drive_delay_s = map["drive_delay_s"].number(0, kLongestDriveDelay_s);
   if (map.has("wrist_sensor")) robot.wrist_sensor = map["wrist_sensor"].boolean();
   if (robot.payload_kg <= robot.tool.mass_kg) {
     map["payload_kg"].refuse(fmt::format("is used up by the tool's {} kg", robot.tool.mass_kg),
@@ -147,6 +158,21 @@ Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
   }
   for (const YamlValue& capsule : map["capsules"].list(1, kMaxCapsules))
     robot.capsules.push_back(read_capsule(capsule));
+  return robot;
+}
+
+Robot read_wheels(const YamlValue& value, const std::filesystem::path& folder) {
+  const YamlMap map(value, {"name", "urdf", "limits"}, {"rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s"});
+  Robot robot;
+  robot.name = map["name"].name();
+  robot.urdf = map["urdf"].existing_file(folder);
+  const YamlMap limits(map["limits"], {"speed_rad_s", "acceleration_rad_s2", "jerk_rad_s3", "torque_nm"});
+  read_rates(limits, kWheels, robot.limits);
+  robot.home = AxisVector::Zero(kWheels);
+  robot.limits.position_min = AxisVector::Constant(kWheels, -kFarthestTurned_rad);
+  robot.limits.position_max = AxisVector::Constant(kWheels, kFarthestTurned_rad);
+  read_drives(map, kWheels, robot);
+  robot.wrist_sensor = false;
   return robot;
 }
 

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "pons/world/world.hpp"
 #include "pons/world/yaml.hpp"
@@ -11,6 +14,17 @@ namespace pons::world {
 [[nodiscard]] Robot read_robot(const YamlValue& value, const std::filesystem::path& folder);
 
 [[nodiscard]] Review read_review(const YamlValue& value);
+
+// The robot of a world with a base: its two wheels. No tool, no flange, no capsules.
+[[nodiscard]] Robot read_wheels(const YamlValue& value, const std::filesystem::path& folder);
+
+// What a world with a base has beside that; `robot` gets what its drives accelerate.
+[[nodiscard]] Base read_base(const YamlValue& value, Robot& robot);
+[[nodiscard]] std::vector<CameraSpec> read_lidars(const YamlValue& value);
+[[nodiscard]] std::vector<Station> read_stations(const YamlValue& value, const Grid& map, const Base& base);
+
+// A name that is new among `taken`.
+[[nodiscard]] std::string new_name(const YamlValue& value, std::set<std::string>& taken);
 
 // {position: [x, y, z]} with rpy_deg (about the fixed axes x, y, z in turn), `look: down` (z down, x along world +x) or
 // look_at: [x, y, z] (z towards that point, y as far down as it can).

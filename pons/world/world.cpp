@@ -28,13 +28,6 @@ constexpr double kSlowest = 0.05;      // share of the speed limits: slower, not
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
-// A name that is new among `taken`.
-std::string new_name(const YamlValue& value, std::set<std::string>& taken) {
-  std::string name = value.name();
-  if (!taken.insert(name).second) value.refuse(fmt::format("'{}' is there twice", name), "give each its own name");
-  return name;
-}
-
 Belt read_belt(const YamlValue& value) {
   const YamlMap map(value,
                     {"x_start_m", "x_end_m", "y_center_m", "width_m", "surface_z_m", "speed_m_s", "speed_variation",
@@ -255,23 +248,51 @@ Arrivals read_arrivals(const YamlValue& value, const Rules& rules) {
   return arrivals;
 }
 
+// What every world has.
+void read_common(const YamlMap& map, World& world) {
+  world.scene_mjcf = map["scene_mjcf"].existing_file(world.folder);
+  world.physics_step_s = map["physics_step_s"].number(1e-5, 0.01);
+  world.resources = read_resources(map["resources"]);
+  if (map.has("schedule")) world.schedule = read_schedule(map["schedule"]);
+  if (map.has("review")) world.review = read_review(map["review"]);
+}
+
+World read_rounds(const YamlValue& file, World world) {
+  const YamlMap map(file, {"scene_mjcf", "physics_step_s", "robot", "base", "map", "lidars", "stations", "resources"},
+                    {"schedule", "review", "tasks"});
+  read_common(map, world);
+  world.robot = read_wheels(map["robot"], world.folder);
+  world.base = read_base(map["base"], world.robot);
+  world.map = Grid::load(map["map"].existing_file(world.folder));
+  world.cameras = read_lidars(map["lidars"]);
+  world.base->stations = read_stations(map["stations"], *world.map, *world.base);
+  if (const Pose2& at = world.base->start; world.map->distance_m(at.position()) < world.base->radius_m)
+    map["base"].refuse("start is where the map has no room for the base", "move it into the open");
+  if (!map.has("tasks")) return world;
+  for (const YamlValue& task : map["tasks"].list(1, 64)) world.tasks.push_back(task.existing_file(world.folder));
+  return world;
+}
+
 World read_world(const std::filesystem::path& folder, std::string_view name) {
-  const YamlMap map(
-      read_yaml(folder / "world.yaml"),
-      {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "review", "zones"});
   World world;
   world.name = name;
   world.folder = folder;
-  world.scene_mjcf = map["scene_mjcf"].existing_file(folder);
-  world.physics_step_s = map["physics_step_s"].number(1e-5, 0.01);
+  const YamlValue file = read_yaml(folder / "world.yaml");
+  if (has_key(file, "base")) {
+    for (const char* of_a_cell : {"belt", "arrivals", "rules", "cameras", "places", "zones"}) {
+      if (has_key(file, of_a_cell))
+        file.refuse(fmt::format("has both 'base' and '{}'", of_a_cell), "a world has a base, or a cell with an arm");
+    }
+    return read_rounds(file, std::move(world));
+  }
+  const YamlMap map(
+      file, {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
+      {"schedule", "review", "zones"});
+  read_common(map, world);
   world.robot = read_robot(map["robot"], folder);
   world.belt = read_belt(map["belt"]);
   world.places = read_places(map["places"]);
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
-  world.resources = read_resources(map["resources"]);
-  if (map.has("schedule")) world.schedule = read_schedule(map["schedule"]);
-  if (map.has("review")) world.review = read_review(map["review"]);
   if (map.has("zones")) world.zones = read_zones(map["zones"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
@@ -294,6 +315,12 @@ std::string_view name(PlaceKind kind) {
       return "obstacle";
   }
   return "";
+}
+
+std::string new_name(const YamlValue& value, std::set<std::string>& taken) {
+  std::string name = value.name();
+  if (!taken.insert(name).second) value.refuse(fmt::format("'{}' is there twice", name), "give each its own name");
+  return name;
 }
 
 const Place* World::place(std::string_view place_name) const {
@@ -338,6 +365,15 @@ Expected<World> load(const std::filesystem::path& root, std::string_view name) {
 }
 
 Intrinsics intrinsics(const CameraSpec& camera) {
+  if (camera.is_lidar()) {
+    const double rays_a_rad = camera.width / camera.fan_rad;
+    return {.width = camera.width,
+            .height = 1,
+            .fx = rays_a_rad,
+            .fy = rays_a_rad,
+            .cx = 0.5 * (camera.width - 1),
+            .cy = 0};
+  }
   const double focal_px = 0.5 * camera.height / std::tan(0.5 * camera.fovy_rad);
   return {.width = camera.width,
           .height = camera.height,

@@ -2,6 +2,7 @@
 // Pure after load(); nothing here changes while a run goes on.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -13,7 +14,9 @@
 #include "pons/core/error.hpp"
 #include "pons/core/image.hpp"
 #include "pons/core/pose.hpp"
+#include "pons/core/pose2.hpp"
 #include "pons/core/time.hpp"
+#include "pons/world/grid.hpp"
 #include "pons/world/review.hpp"
 
 namespace pons::world {
@@ -25,7 +28,8 @@ struct Capsule {
   double radius_m = 0;
 };
 
-// The suction tool. Frames: flange = last link of the URDF; tip = where the cups touch, z pointing out of the tool.
+// The suction tool; a base has none, and its robot no flange. Frames: flange = last link of the URDF; tip = where the
+// cups touch, z pointing out of the tool.
 struct Tool {
   std::filesystem::path mjcf;  // attached to the flange in simulation
   double mass_kg = 0;
@@ -47,10 +51,13 @@ struct Robot {
   AxisVector home;  // rad; also the seed branch of inverse kinematics
   AxisLimits limits;
   AxisVector rotor_inertia_kg_m2;  // one an axis: what the drive's rotor adds about the joint, behind the gears
-  double payload_kg = 0;           // at the flange, tool included
-  double watchdog_s = 0.02;        // without set-points for so long, the body takes the power off
-  double drive_delay_s = 0;        // from a set-point's being sent to its acting: bus and drive
-  bool wrist_sensor = true;        // at the flange; without one, forces are known from the drives' torques alone
+  // One an axis, or none: what a drive accelerates beside its own joint, as the wheels of a base do with all of it. For
+  // the controller's model alone; the simulation has the base itself.
+  AxisVector reflected_inertia_kg_m2;
+  double payload_kg = 0;     // at the flange, tool included
+  double watchdog_s = 0.02;  // without set-points for so long, the body takes the power off
+  double drive_delay_s = 0;  // from a set-point's being sent to its acting: bus and drive
+  bool wrist_sensor = true;  // at the flange; without one, forces are known from the drives' torques alone
   Tool tool;
   std::vector<Capsule> capsules;
 };
@@ -81,9 +88,11 @@ struct Belt {
   [[nodiscard]] double waits_at_m() const { return pick_x_max_m - 0.02; }
 };
 
+// A camera, or, with a fan, a lidar: a camera of one row in polar form, on the base. Its column i looks along the angle
+// (i - cx) / fx of its intrinsics about the lidar's z, from its x; what it measures is the range.
 struct CameraSpec {
   std::string name;
-  std::string watches;  // "belt" or a place's name
+  std::string watches;  // "belt" or a place's name; of a lidar "map"
   Pose world_from_optical = Pose::Identity();
   int width = 0, height = 0;                        // px
   double fovy_rad = 0;                              // vertical
@@ -91,6 +100,11 @@ struct CameraSpec {
   double depth_noise_m = 0;                         // 1 σ at 1 m, growing with the square of the distance
   double depth_dropout = 0;                         // share of pixels without a reading, more at edges
   bool reads_labels = false;
+  double fan_rad = 0;         // of a lidar: from its first ray to one after its last; of a camera 0
+  double range_m = 0;         // of a lidar: what is further away does not come back
+  Pose2 base_from_lidar;      // its place and heading on the base; world_from_optical is not used
+  double lidar_height_m = 0;  // above the floor
+  [[nodiscard]] bool is_lidar() const { return fan_rad > 0; }
 };
 
 // Overweight parcels that are drawn weigh at least this much more than the rule allows.
@@ -148,6 +162,32 @@ struct Schedule {
   OnEmergencyStop on_emergency_stop = OnEmergencyStop::kHold;
 };
 
+// Where a base can be sent by name.
+struct Station {
+  std::string name;
+  Pose2 map_from_base;
+};
+
+// A base on two driven wheels with a common axle, in whose middle its frame stands: x ahead, y left, z up from the
+// floor. Axis 0 is the left wheel, axis 1 the right one, both turning forward when their speed is above 0.
+struct Base {
+  double wheel_radius_m = 0;  // as the drawing has it
+  double track_m = 0;         // between the wheels
+  double mass_kg = 0;         // of all of it
+  double turning_kg_m2 = 0;   // its inertia about the vertical through the axle's middle
+  double radius_m = 0;        // a circle about its frame that all of it keeps inside
+  double speed_m_s = 0, turn_rad_s = 0;
+  Pose2 start;  // where it stands when a run begins
+  // Of the simulated wheels alone: how much larger each radius is than the drawing's, as a share.
+  std::array<double, 2> wheel_error{};
+  std::vector<Station> stations;
+
+  // nullptr when there is none of that name.
+  [[nodiscard]] const Station* station(std::string_view station_name) const;
+};
+
+// A world has a cell's robot (arm and tool, belt, arrivals, rules) or a base with its map. What belongs to the other
+// kind is empty.
 struct World {
   std::string name;
   std::filesystem::path folder;
@@ -163,6 +203,9 @@ struct World {
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;
   Rules rules;
+  std::optional<Base> base;
+  std::optional<Grid> map;                   // of a world with a base, always
+  std::vector<std::filesystem::path> tasks;  // likewise: what is asked of it when nobody asks for anything else
 
   // nullptr when there is none of that name.
   [[nodiscard]] const Place* place(std::string_view place_name) const;
@@ -176,7 +219,7 @@ struct World {
 [[nodiscard]] Expected<World> load(const std::filesystem::path& root, std::string_view name);
 [[nodiscard]] std::vector<std::string> list(const std::filesystem::path& root);
 
-// The pinhole model that a camera of this size and field of view has.
+// The pinhole model that a camera of this size and field of view has; of a lidar its polar one.
 [[nodiscard]] Intrinsics intrinsics(const CameraSpec& camera);
 
 }  // namespace pons::world

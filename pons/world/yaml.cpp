@@ -220,6 +220,10 @@ YamlValue YamlMap::operator[](std::string_view key) const {
 
 bool YamlMap::has(std::string_view key) const { return value_.node()[std::string(key)].IsDefined(); }
 
+bool has_key(const YamlValue& value, std::string_view key) {
+  return value.node().IsMap() && value.node()[std::string(key)].IsDefined();
+}
+
 YamlValue read_yaml(const std::filesystem::path& file) {
   const std::string text = read_bounded(file);
   try {

@@ -74,6 +74,9 @@ class YamlMap {
   YamlValue value_;
 };
 
+// Whether the mapping has that key, whatever else it has; false for what is no mapping.
+[[nodiscard]] bool has_key(const YamlValue& value, std::string_view key);
+
 // The file's one document. Refuses more than 1 MiB, anything but UTF-8, broken YAML, and anchors and aliases (a few
 // lines of them can stand for gigabytes).
 [[nodiscard]] YamlValue read_yaml(const std::filesystem::path& file);

@@ -6,7 +6,9 @@
 #include <memory>
 #include <optional>
 
+#include "pons/brain/dispatcher.hpp"
 #include "pons/bridge/test_kit.hpp"
+#include "pons/perception/perception.hpp"
 #include "pons/runner/darkroom.hpp"
 
 namespace pons::runner {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "pons/core/digest.hpp"
+#include "pons/perception/perception.hpp"
 #include "pons/runner/darkroom.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/runner/photographer.hpp"

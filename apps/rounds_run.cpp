@@ -1,0 +1,188 @@
+#include "apps/rounds_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "apps/commands.hpp"
+#include "apps/paths.hpp"
+#include "apps/png.hpp"
+#include "apps/rounds.hpp"
+#include "apps/task_file.hpp"
+#include "pons/bridge/journal/place.hpp"
+#include "pons/core/digest.hpp"
+#include "pons/referee/rounds.hpp"
+#include "pons/runner/lockstep.hpp"
+#include "pons/runner/realtime.hpp"
+#include "pons/sim/truth.hpp"
+#include "pons/task/json_value.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLongest_s = 1e6;
+constexpr std::chrono::minutes kSlowestTask{20};  // one that takes longer hangs
+constexpr int kPictureWidth = 1280, kPictureHeight = 800;
+
+Expected<brain::Errand> errand_of(const std::string& text) {
+  std::string file = text;
+  Time at;
+  if (const std::size_t sign = text.rfind('@'); sign != std::string::npos) {
+    double seconds = 0;
+    const char* const end = text.data() + text.size();
+    const auto [read, error] = std::from_chars(text.data() + sign + 1, end, seconds);
+    if (error != std::errc() || read != end || !(seconds >= 0) || seconds > kLongest_s)
+      return fail("is no time", "--task " + text, "write FILE@SECONDS, or FILE alone");
+    file = text.substr(0, sign);
+    at = Time(from_s(seconds));
+  }
+  auto task = read_task(file);
+  if (!task) return std::unexpected(task.error());
+  if (auto shape = task::task_from(*task); !shape)
+    return fail(shape.error().line(), file, "docs/schema/task.json says what a task is");
+  return brain::Errand{std::move(*task), at};
+}
+
+// What one run needs beside its parts, and what comes of it.
+class Run {
+ public:
+  Run(const RoundsOptions& options, Rounds& rounds) : options_(options), rounds_(rounds) {}
+
+  int go() {
+    LoopLog log;
+    if (auto opened = log.open(options_.log); !opened) return bad_input(opened.error());
+    runner::Parts parts = rounds_.parts();
+    const runner::Watch watch{.interrupted = [] { return interrupted(); },
+                              .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+                              .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
+                              .limit = Time(kSlowestTask)};
+    const auto began = std::chrono::steady_clock::now();
+    const bool realtime = options_.pace == runner::Pace::kRealTime;
+    const auto result = realtime ? runner::run_realtime(parts, watch) : runner::run_lockstep(parts, watch);
+    const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    if (!result) return bad_run(result.error());
+    return reckon(*result, wall_s);
+  }
+
+ private:
+  int reckon(const runner::RunResult& result, double wall_s) {
+    referee::RoundsRules rules{
+        .speed_m_s = rounds_.world.base->speed_m_s,
+    };
+    for (const world::Station& station : rounds_.world.base->stations)
+      rules.places[station.name] = station.map_from_base;
+    for (const brain::Errand& errand : rounds_.errands.all()) rules.asked.push_back(task::text_of(errand.task, "id"));
+    const sim::BaseTruth& truth = sim::truth_of(*rounds_.simulation);
+    const auto verdict = referee::judge_rounds(truth, *rounds_.journal, rules);
+    if (!verdict) return bad_run(verdict.error());
+    record::Report report = report_of(*verdict, result);
+    report.wall_seconds = wall_s;
+    if (auto told = tell(report, verdict->findings, options_.explain, options_.report); !told)
+      return bad_run(told.error());
+    if (auto taken = take_picture(); !taken) return bad_run(taken.error());
+    if (!options_.log.empty()) say(stdout, fmt::format("log: {}\n", options_.log.string()));
+    if (!options_.speech.empty()) say(stdout, fmt::format("speech: {}\n", options_.speech.string()));
+    if (!options_.journal.empty())
+      say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options_.journal, rounds_.world.name))));
+    if (interrupted()) return kExitInterrupted;
+    if (!result.complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
+    const bool good = verdict->findings.empty() && report.limits.violations == 0;
+    return result.complete && good ? kExitGood : kExitBadRun;
+  }
+
+  record::Report report_of(const referee::RoundsVerdict& verdict, const runner::RunResult& result) {
+    record::Report report;
+    report.seed = options_.seed;
+    report.world = rounds_.world.name;
+    report.rounds = record::Report::Rounds{.tasks = verdict.tasks,
+                                           .succeeded = verdict.succeeded,
+                                           .goals = verdict.goals,
+                                           .missed = verdict.missed,
+                                           .worst_goal_m = verdict.worst_goal_m,
+                                           .worst_goal_rad = verdict.worst_goal_rad,
+                                           .collisions = verdict.collisions,
+                                           .fastest_m_s = verdict.fastest_m_s,
+                                           .driven_m = verdict.driven_m};
+    report.retries = rounds_.bridge->retries();
+    const cerebellum::Statistics& loop = rounds_.cerebellum->statistics();
+    report.limits = {.violations = static_cast<std::int64_t>(loop.violations),
+                     .worst_ratio = std::max({loop.commanded.speed, loop.commanded.acceleration, loop.commanded.jerk,
+                                              loop.commanded.torque}),
+                     .saturated = static_cast<std::int64_t>(loop.saturated)};
+    put_loop(result, report);
+    Digest digest;
+    digest.add(rounds_.simulation->state_digest());
+    digest.add(verdict.succeeded);
+    report.state_hash = digest.value();
+    return report;
+  }
+
+  Expected<void> take_picture() {
+    if (options_.picture.empty()) return {};
+    const auto rgb = rounds_.simulation->picture(kPictureWidth, kPictureHeight);
+    if (!rgb) return std::unexpected(rgb.error());
+    if (auto written = write_png(options_.picture, kPictureWidth, kPictureHeight, *rgb); !written) return written;
+    say(stdout, fmt::format("picture: {}\n", options_.picture.string()));
+    return {};
+  }
+
+  const RoundsOptions& options_;
+  Rounds& rounds_;
+};
+
+}  // namespace
+
+Expected<std::vector<brain::Errand>> errands_of(const std::vector<std::string>& tasks) {
+  std::vector<brain::Errand> errands;
+  for (const std::string& text : tasks) {
+    auto errand = errand_of(text);
+    if (!errand) return std::unexpected(errand.error());
+    const std::string id = task::text_of(errand->task, "id");
+    const auto same = [&](const brain::Errand& other) { return task::text_of(other.task, "id") == id; };
+    if (std::ranges::any_of(errands, same))
+      return fail(fmt::format("the id '{}' is there twice", id), "--task " + text, "give each task its own");
+    errands.push_back(std::move(*errand));
+  }
+  return errands;
+}
+
+int run_rounds(const RoundsOptions& options, world::World world) {
+  if (!options.of_a_cell.empty())
+    return bad_input({"is for a cell with an arm; " + world.name + " has a base", options.of_a_cell, "leave it out"});
+  std::vector<std::string> files = options.tasks;
+  if (files.empty()) {
+    for (const fs::path& task : world.tasks) files.push_back(task.string());
+  }
+  if (files.empty()) return bad_input({"nothing is asked of the base", "--task", "name a file with a task"});
+  auto errands = errands_of(files);
+  if (!errands) return bad_input(errands.error());
+
+  TemporaryFolder temporary;
+  Expected<std::string> journal = bridge::named(options.journal, world.name);
+  if (options.journal.empty()) journal = temporary.file("journal.db");
+  if (!journal) return bad_input(journal.error());
+  const auto speech =
+      options.speech.empty() ? temporary.file("speech") : Expected<std::string>(options.speech.string());
+  if (!speech) return bad_input(speech.error());
+  std::error_code error;
+  fs::create_directories(*speech, error);
+  if (error) return bad_input({error.message(), *speech, "name a folder that can be written for --speech"});
+
+  RoundsSetup setup{.seed = options.seed, .journal = *journal, .socket = {}, .speech = *speech, .pace = options.pace};
+  if (!options.socket.empty()) {
+    setup.socket = options.socket;
+  } else if (options.pace == runner::Pace::kRealTime) {
+    setup.socket = default_socket();
+  }
+  auto rounds = Rounds::build(std::move(world), *errands, setup);
+  if (!rounds) return bad_input(rounds.error());
+  return Run(options, **rounds).go();
+}
+
+}  // namespace pons::apps

@@ -1,0 +1,32 @@
+// pons run of a world with a base: from the first task to the report.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/run_kit.hpp"
+#include "pons/brain/errands.hpp"
+#include "pons/runner/photographer.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::apps {
+
+struct RoundsOptions {
+  std::vector<std::string> tasks;  // FILE or FILE@SECONDS; none: the world's
+  std::uint64_t seed = 1;
+  std::string journal;
+  std::filesystem::path report, log, picture, socket, speech;
+  runner::Pace pace = runner::Pace::kLockstep;
+  Explain explain = Explain::kNothing;
+  std::string of_a_cell = {};  // an option was given that only a cell with an arm knows: its name
+};
+
+// The tasks in those files, each to be asked for at its time. Error: a file that is none, a time that is none.
+[[nodiscard]] Expected<std::vector<brain::Errand>> errands_of(const std::vector<std::string>& tasks);
+
+// Returns the exit code. Bad unless every task succeeded and the referee found nothing.
+[[nodiscard]] int run_rounds(const RoundsOptions& options, world::World world);
+
+}  // namespace pons::apps

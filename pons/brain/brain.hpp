@@ -1,0 +1,53 @@
+// Who decides, as the bridge's side asks it: what is believed goes in, tasks come out. Pure and deterministic; one
+// thread.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/core/time.hpp"
+#include "pons/task/task.hpp"
+
+namespace pons::brain {
+
+using task::Json;
+
+// Something that will not be asked for. `code` is empty when none was read.
+struct Ride {
+  std::uint32_t track = 0;
+  std::string code;
+  std::string reason;  // one of the kRide… texts of dispatcher.hpp
+};
+
+struct Decisions {
+  std::vector<Json> tasks;  // to submit, in this order; an id comes once in a brain's life
+  std::vector<Ride> rides;
+  bool belt_waits = false;  // what is asked for would ride past the pick zone
+};
+
+class Brain {
+ public:
+  virtual ~Brain() = default;
+  // Once a period. `beliefs` are all live tracks, predicted to `now`; the belt does not wait for the tasks `set_aside`,
+  // which somebody has paused before they began: what they are about rides on.
+  [[nodiscard]] virtual Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now,
+                                          const std::set<std::string>& set_aside) = 0;
+  // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
+  virtual bool heard(std::string_view id, task::Outcome outcome) = 0;
+  // What an earlier one asked for in this run, and what became of it, in that order, before the first observe():
+  // nothing when it is still open. Tasks that no brain asked for are passed over.
+  virtual void recall(const task::Task& task, std::optional<task::Outcome> outcome) = 0;
+  // What it let ride; `code` may be empty.
+  virtual void recall_ride(std::string_view code) = 0;
+  // What it was to ask for and decided nothing about, in its order.
+  [[nodiscard]] virtual std::vector<std::string> unseen() const = 0;
+  // Whether it is sure to ask for something yet, whatever it sees: the run goes on until then.
+  [[nodiscard]] virtual bool waits() const { return false; }
+};
+
+}  // namespace pons::brain

@@ -1,0 +1,50 @@
+// What all base skills share: the wheels, where the base is, and the floor around it. One object a bridge, one thread.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "pons/core/belief.hpp"
+#include "pons/model/diff_drive.hpp"
+#include "pons/skills/arm.hpp"
+#include "pons/skills/base/floor.hpp"
+#include "pons/skills/base/steer.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::skills {
+
+class Chassis {
+ public:
+  // `link` and `world` must outlive it; the world has a base. `splice_lead`: see Arm.
+  Chassis(link::BridgeEnd& link, const world::World& world, Duration splice_lead = kSpliceLead);
+
+  // Once a bridge tick, before any skill: the newest state of the wheels; odometry carries the pose on.
+  void refresh(Time now);
+  // What the newest scan said, which is some time old by now.
+  void locate(const BaseBelief& belief);
+
+  // As of the newest scan; nothing before the first.
+  [[nodiscard]] const std::optional<BaseBelief>& belief() const { return belief_; }
+  // Whether it knows where it is well enough to drive.
+  [[nodiscard]] bool sure() const;
+  // Where it is as of the last refresh: the belief, carried on by what the wheels have turned since.
+  [[nodiscard]] const Pose2& map_from_base() const { return map_from_base_; }
+  // Where it will be, and how its wheels turn, if they go on as they were asked to.
+  [[nodiscard]] Rolling expected(Time at) const;
+
+  const world::World& world;
+  const model::DiffDrive drive;
+  Arm wheels;
+  Floor floor;
+
+ private:
+  struct Turned {
+    Time stamp;
+    AxisVector wheels_rad;
+  };
+  std::optional<BaseBelief> belief_;
+  Pose2 map_from_base_;
+  std::deque<Turned> turned_;  // measured, since the newest scan or a little longer
+};
+
+}  // namespace pons::skills
