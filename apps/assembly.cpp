@@ -82,8 +82,9 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   if (!model) return std::unexpected(model.error());
   const cerebellum::Settings settings = settings_of(world);
   if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
-  auto simulation = sim::Simulation::create(world, manifest, setup.seed);
+  auto simulation = sim::Simulation::create(world, manifest, setup.seed, setup.faults);
   if (!simulation) return std::unexpected(simulation.error());
+  self->faults = setup.faults;
   self->simulation = std::move(*simulation);
   self->simulation->expect_visits(setup.visits);
   if (setup.arm_at) self->simulation->set_arm(*setup.arm_at);

@@ -17,6 +17,13 @@ using Json = nlohmann::ordered_json;
 
 [[nodiscard]] std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
+[[nodiscard]] std::string faults_text(const Report& report) {
+  std::string text = report.fault_plan;
+  for (const auto& [fault, times] : report.faults)
+    text += fmt::format("{} {} {}", &fault == &report.faults.front().first ? ":" : ",", times, fault);
+  return text;
+}
+
 }  // namespace
 
 Report::Throughput throughput(double span_s, std::int64_t sorted) {
@@ -42,6 +49,8 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
   json["retries"] = report.retries;
+  json["faults"] = Json::object();
+  for (const auto& [fault, times] : report.faults) json["faults"][fault] = times;
   json["limits"] = {{"violations", report.limits.violations},
                     {"worst_ratio", number(report.limits.worst_ratio)},
                     {"saturated", report.limits.saturated}};
@@ -82,6 +91,7 @@ std::string summary(const Report& report) {
   line("duplicated", fmt::format("{}", parcels.duplicated));
   line("damaged", fmt::format("{}", parcels.damaged));
   line("retries", fmt::format("{}", report.retries));
+  if (report.fault_plan != "none") line("faults", faults_text(report));
   line("throughput", std::isfinite(report.throughput.seconds_per_parcel)
                          ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",
                                        report.throughput.seconds_per_parcel, report.throughput.parcels_per_hour)

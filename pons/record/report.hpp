@@ -6,6 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "pons/core/error.hpp"
 
@@ -61,6 +63,8 @@ struct Report {
   Parcels parcels{};
   Throughput throughput{};
   std::int64_t retries = 0;
+  std::string fault_plan = "none";  // what was injected on purpose; of each fault of the plan, how often
+  std::vector<std::pair<std::string, std::int64_t>> faults{};
   Limits limits{};
   Loop loop{};
   Bridge bridge{};

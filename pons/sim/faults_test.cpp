@@ -1,0 +1,1 @@
+#include "pons/world/faults.hpp"
