@@ -14,6 +14,8 @@ using bridge::Json;
 
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
+// Frames come four times a second and later by what it takes to see what they show.
+constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
@@ -57,8 +59,10 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
   if (auto good = arming_.tick(now); !good) return good;
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
+  // What nobody sees must not ride by unread, nor into the arm.
+  const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
   // What stands beside an arm that is being brought out must not be pushed against it.
-  skills_.belt(belt_waits || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits : link::Belt::kRuns);
+  skills_.belt(belt_waits || blind || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits : link::Belt::kRuns);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
