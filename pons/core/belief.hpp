@@ -22,6 +22,7 @@ struct ObjectBelief {
   double flatness_m = 0;                   // RMS distance of the top's points from their plane
   int frames_seen = 0;
   Time last_seen;          // when a camera last saw it (stamp may be predicted further)
+  int missing = 0;         // in so many frames since, what shows where it should be is not it
   bool crowded = false;    // touches, overlaps or leans on a neighbour
   std::string code;        // label text, empty until read
   int label_attempts = 0;  // frames good enough to read a label on it, readable or not

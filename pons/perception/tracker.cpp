@@ -464,6 +464,7 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   if (track.observations.back().doubtful) belief.position_sigma_m += 0.01;
   belief.frames_seen = track.frames_seen;
   belief.last_seen = track.last_seen;
+  belief.missing = track.missing;
   belief.crowded = track.crowded;
   belief.code = track.code;
   belief.label_attempts = track.label_attempts;

@@ -23,6 +23,7 @@ struct Entry {
   bool succeeded = false;
   bool ride = false;  // let go by on purpose
   std::string last_reason;
+  std::set<std::string> may_be_in;  // places that the last outcome says to look in
 };
 
 // The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
@@ -48,6 +49,12 @@ void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) 
     ++entry.successes;
   }
   entry.last_reason = outcome->reason;
+  entry.may_be_in.clear();
+  for (const Json& step : outcome->detail.value("steps", Json::array())) {
+    const auto detail = step.find("detail");
+    if (detail == step.end() || !detail->is_object()) continue;
+    for (const Json& place : detail->value("may_be_in", Json::array())) entry.may_be_in.insert(place.get<std::string>());
+  }
 }
 
 Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
@@ -101,7 +108,10 @@ class Judge {
 
  private:
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
-    if (parcel.place != parcel.destination) {
+    if (!entry.succeeded && entry.may_be_in.contains(parcel.place)) {
+      ++verdict_.undeserved;
+      find(parcel, entry, "dropped there, as the journal says");
+    } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted");
     } else if (!entry.succeeded) {

@@ -34,7 +34,7 @@ class SimBody final : public body::Body {
 
 struct Cell {
   Cell(const world::World& world, const world::Manifest& manifest, Composed composed, std::uint64_t seed,
-       const world::FaultPlan& plan);
+       const world::FaultPlan& plan = {});
 
   // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
   void step();

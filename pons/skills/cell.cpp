@@ -35,6 +35,7 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
+constexpr int kGoneFrames = 2;        // that looked and did not find it
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
 constexpr double kAside_m = 0.36;     // over the belt, and over what may stand on it
 constexpr double kRise_m = 0.05;
@@ -98,8 +99,32 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
+  look_beside();
   take_in_cut();
   add_unseen();
+}
+
+// Of each that lay beside what is held: has it stayed? A camera that looked where it should be and found the belt bare,
+// twice, says no.
+void Cell::look_beside() {
+  if (!held) came_along_.reset();
+  if (!held || came_along_) return;
+  std::erase_if(held->beside, [&](Beside& other) {
+    const auto now_it = std::ranges::find(objects_, other.track, &ObjectBelief::track);
+    const bool gone = now_it == objects_.end();
+    if (!gone && now_it->last_seen > held->lifted) return true;
+    // A track ends where it rides out of the cell, too.
+    if (gone ? !in_view(other.last_x_m) : now_it->missing < kGoneFrames) {
+      if (!gone) other.last_x_m = now_it->world_from_top.translation().x();
+      return false;
+    }
+    came_along_ = other.name;
+    // Both are one load now, as far as ways for it are concerned.
+    const Vector3 half = 0.5 * held->load.size_m;
+    const double reach_m = other.away_m.head<2>().norm() + other.radius_m;
+    held->load.size_m.head<2>() = (2 * half.head<2>()).cwiseMax(Eigen::Vector2d::Constant(2 * reach_m));
+    return true;
+  });
 }
 
 // What the view's downstream border cuts: its track knows more, unless it was never in view as a whole.
@@ -127,6 +152,21 @@ void Cell::add_unseen() {
   }
   if (hidden_) objects_.push_back(*hidden_);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
+}
+
+bool Cell::may_have_company() const {
+  return held && std::ranges::any_of(held->beside, [this](const Beside& other) { return in_view(other.last_x_m); });
+}
+
+void Cell::let_go_into(std::string_view place) {
+  for (const Beside& other : held->beside) {
+    if (!other.code.empty()) gone_with_[other.code] = place;
+  }
+}
+
+std::string Cell::may_be_in(std::string_view code) const {
+  const auto found = gone_with_.find(code);
+  return found == gone_with_.end() ? std::string() : found->second;
 }
 
 void Cell::weighs(double mass_kg) {

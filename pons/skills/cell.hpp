@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,11 +23,23 @@ namespace pons::skills {
 // What the tip may meet while cups press on a parcel, lift one whose mass is not known yet, or let go of one.
 inline constexpr double kHandling_n = 100;
 
+// What lay close beside a parcel that was lifted, and has not been seen to lie there still.
+struct Beside {
+  std::uint32_t track = 0;
+  Vector3 away_m = Vector3::Zero();  // from the parcel's middle to its own
+  double radius_m = 0;               // of its footprint
+  double last_x_m = 0;               // where its track had got to
+  std::string code;                  // empty: not read yet
+  std::string name;                  // for people
+};
+
 // The parcel on the cups.
 struct Held {
   std::string code;
   Load load;
   double mass_kg = 0;
+  std::vector<Beside> beside{};
+  Time lifted{};  // clear of what stood beside it from then on
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.
@@ -61,6 +74,15 @@ class Cell {
   // What is held weighs so much: the loop is told. It must know of every load before the arm moves with it, for it
   // takes what it does not know for a collision, or throws the arm up.
   void weighs(double mass_kg);
+  // What a camera has found to be gone that lay beside what is held: it clings to it, or hooked on it. Nothing: none is
+  // known to.
+  [[nodiscard]] std::optional<std::string> came_along() const { return came_along_; }
+  // Whether a camera still has to show that what lay beside it has stayed there.
+  [[nodiscard]] bool may_have_company() const;
+  // What is held was let go of over that place; whatever lay beside it and was not seen since may have gone with it.
+  void let_go_into(std::string_view place);
+  // Where that one may have gone with another; empty: nowhere.
+  [[nodiscard]] std::string may_be_in(std::string_view code) const;
   // Nothing is held any longer: likewise.
   void holds_nothing();
 
@@ -140,6 +162,7 @@ class Cell {
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
+  void look_beside();
   void take_in_cut();
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
@@ -147,7 +170,9 @@ class Cell {
   static constexpr Duration kBeltHeldFor = std::chrono::milliseconds(50);
 
   std::optional<Time> belt_held_;
-  std::optional<double> view_end_m_;  // on the belt; none: no camera watches it
+  std::optional<std::string> came_along_;
+  std::map<std::string, std::string, std::less<>> gone_with_;  // a code, and the place
+  std::optional<double> view_end_m_;                           // on the belt; none: no camera watches it
   Time now_, seen_, looked_at_;
   [[nodiscard]] double gain_m(double ahead_s) const;
 

@@ -24,9 +24,11 @@ constexpr double kLater_s = 0.20, kLatest_s = 0.20;  // a step, and the most, wh
 constexpr int kRounds = 8, kStraightRounds = 2;
 constexpr double kUpright = 0.9986, kSteepest = 0.80;  // cosines of 3 and 37 degrees
 constexpr double kLeastLift_m = 0.10, kHighestLift_m = 0.25;
-constexpr double kClose_m = 0.05;      // neighbours within this of the footprint are lifted over
-constexpr double kClear_m = 0.02;      // by this much
-constexpr double kAway_m = 0.02;       // from them, during the lift
+constexpr double kClose_m = 0.05;  // neighbours within this of the footprint are lifted over
+constexpr double kClear_m = 0.02;  // by this much
+constexpr double kAway_m = 0.02;   // from them, during the lift
+constexpr int kSeenOften = 3;
+constexpr double kMayCling_m = 0.03;   // between two that come along with each other
 constexpr double kOneSided = 0.3;      // of the sum of unit vectors
 constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk motion times duration² over length
 constexpr double kThinnest_m = 0.005;  // of what is carried
@@ -157,6 +159,21 @@ std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object)
     if (is_part(other, object)) return "may be two: " + name_of(other);
   }
   return std::nullopt;
+}
+
+std::vector<Beside> beside(const Cell& cell, const ObjectBelief& target) {
+  std::vector<Beside> near;
+  for (const ObjectBelief& other : cell.objects()) {
+    // What was hardly seen, or is not seen any more, tells nothing by being gone.
+    const Vector3 at = other.world_from_top.translation();
+    if (other.track == 0 || other.track == target.track || other.frames_seen < kSeenOften || other.missing > 0)
+      continue;
+    const Vector3 away_m = at - cell.predict(target, other.stamp);
+    const double radius_m = 0.5 * other.size_m.head<2>().norm();
+    if (away_m.head<2>().norm() > 0.5 * target.size_m.head<2>().norm() + radius_m + kMayCling_m) continue;
+    near.push_back({other.track, away_m, radius_m, at.x(), other.code, name_of(other)});
+  }
+  return near;
 }
 
 Vector3 lift_offset(const Cell& cell, const ObjectBelief& target) {

@@ -56,6 +56,9 @@ struct GraspSearch {
 // What would come along with that object, and why; nothing if it lies by itself.
 [[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);
 
+// What lies so close to that object that it may come along with it.
+[[nodiscard]] std::vector<Beside> beside(const Cell& cell, const ObjectBelief& target);
+
 // As seen from the belt: high enough that its underside clears whatever stands close to it, and a little away from
 // that. What touches a load would be dragged up by its flank.
 [[nodiscard]] Vector3 lift_offset(const Cell& cell, const ObjectBelief& target);

@@ -141,7 +141,7 @@ class Pick final : public ArmSkill {
     if (object == nullptr) {
       step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
-      return {Status::kFailed, "lost from sight", {}};
+      return {Status::kFailed, "lost from sight", gone_with_another()};
     }
     seen_ = now;
     const world::Belt& belt = cell_.world.belt;
@@ -322,9 +322,17 @@ class Pick final : public ArmSkill {
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
-      return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
+      give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
+      if (cups.sealed_cups == 0) verdict_.detail = gone_with_another();
+      return {};
     }
     return {};
+  }
+
+  // Where to look for what is not where it should be, and lay beside another that was taken.
+  [[nodiscard]] task::Json gone_with_another() const {
+    const std::string place = cell_.may_be_in(code_);
+    return place.empty() ? task::Json{} : task::Json{{"may_be_in", {place}}};
   }
 
   // Lets go of what is not lifted.
@@ -363,7 +371,10 @@ class Pick final : public ArmSkill {
     }
     lift_end_ = up->top;
     rides_until_ = up->rides_until;
-    cell_.held = Held{.code = code_, .load = load_of(target_, grasp_.orientation)};
+    cell_.held = Held{.code = code_,
+                      .load = load_of(target_, grasp_.orientation),
+                      .beside = beside(cell_, target_),
+                      .lifted = lift_end_};
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
     cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
@@ -386,7 +397,9 @@ class Pick final : public ArmSkill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
-    const bool lopsided = weighed && hangs_beside(cell_.held->load, *weighed);
+    const Eigen::Matrix3d turned = cell_.model.world_from_tip(cell_.arm.state().position).linear();
+    const bool lopsided =
+        weighed && (hangs_beside(cell_.held->load, *weighed) || hangs_towards(*cell_.held, *weighed, turned));
     if ((!weighed || heavy || lopsided) && !at_rest) return {};
     if (target_.crowded && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.

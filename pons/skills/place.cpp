@@ -10,6 +10,7 @@
 #include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
+#include "pons/skills/set_down.hpp"
 #include "pons/world/mouth.hpp"
 
 namespace pons::skills {
@@ -38,10 +39,12 @@ constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr Duration kBlockedFor = std::chrono::milliseconds(400);
 constexpr Duration kLookEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
+constexpr Duration kLookWithin = std::chrono::milliseconds(700);      // two frames, and what they take
+constexpr Duration kNoWayFor = std::chrono::milliseconds(3000);       // back to the belt
 constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
-constexpr double kMiddle = 0.15;  // of the mouth, from its centre
+constexpr double kBounces_m = 0.15;  // beside where it comes down, off a rim
 
 class Place final : public ArmSkill {
  public:
@@ -63,6 +66,8 @@ class Place final : public ArmSkill {
         return carry(now);
       case Phase::kRelease:
         return release(now);
+      case Phase::kSetDown:
+        return set_down(now);
       case Phase::kHold:
         return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
     }
@@ -71,7 +76,8 @@ class Place final : public ArmSkill {
 
   void cancel(Time now) override {
     cancelled_ = true;
-    if (phase_ == Phase::kRelease || phase_ == Phase::kHold) return;  // it is over the mouth already
+    // It is over the mouth already, or on its way out of the hand.
+    if (phase_ == Phase::kRelease || phase_ == Phase::kHold || sets_down_) return;
     if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
     phase_ = Phase::kHold;
   }
@@ -88,9 +94,41 @@ class Place final : public ArmSkill {
   }
 
  private:
-  enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kHold };
+  enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kSetDown, kHold };
+
+  // What came along belongs somewhere else: both go back on the belt, and are asked for again or ride.
+  Progress begin_set_down(Time now, std::string why) {
+    set_down_.emplace(cell_);
+    why_ = std::move(why);
+    noticed_ = now;
+    tried_.reset();
+    (void)cell_.stop(now);
+    phase_ = Phase::kSetDown;
+    return {};
+  }
+
+  Progress set_down(Time now) {
+    if (!sets_down_) {
+      if (tried_ && now - *tried_ < kTryEvery) return {};
+      if (auto begun = set_down_->begin(now); !begun) {
+        if (cell_.router.spent()) return {};
+        tried_ = now;
+        // Whoever comes next lays it down when there is a way.
+        return now < noticed_ + kNoWayFor ? Progress{} : Progress{Status::kFailed, why_ + "; still held", {}};
+      }
+      sets_down_ = true;
+    }
+    const auto laid = set_down_->tick(now);
+    if (!laid) sets_down_ = false;
+    if (!laid || !*laid) return {};
+    return {Status::kFailed, why_, {{"place", name_}}};
+  }
 
   void plan_anew() {
+    if (phase_ == Phase::kSetDown) {
+      sets_down_ = false;
+      return;
+    }
     phase_ = Phase::kPlan;
     search_ = {};
   }
@@ -209,27 +247,53 @@ class Place final : public ArmSkill {
 
   Progress carry(Time now) {
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost) {
-      const std::string code = cell_.held->code;
-      cell_.arm.vacuum(false);
-      cell_.holds_nothing();
-      const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-      const task::Json detail{{"place", name_}, {"object", code}, {"at_m", {tip.x(), tip.y(), tip.z()}}};
-      // Over the middle of its mouth it only fell a little early.
-      const world::Place& target = *cell_.world.place(name_);
-      const Vector3 off = (tip - target.center_m).cwiseAbs();
-      const bool over = off.x() < kMiddle * target.size_m.x() && off.y() < kMiddle * target.size_m.y();
-      return over ? Progress{Status::kSucceeded, "let go early", detail} : Progress{Status::kFailed, "dropped", detail};
+      return dropped();
     }
+    if (const auto other = cell_.came_along()) return begin_set_down(now, "another came along: " + *other);
     look_out(now);
+    if (cell_.may_have_company() && now >= arrives_ - kLetGoEarly && now < arrives_ + kLookWithin) return {};
     const bool level = hangs_level(now);
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
+    cell_.let_go_into(name_);
     let_go_ = cell_.held->code;
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
+  }
+
+  // It goes on as it was carried and falls. What comes down on the belt is seen again, in the tray counted; of what
+  // falls into a mouth nothing will ever be known but where it came down.
+  Progress dropped() {
+    const std::string code = cell_.held->code;
+    const Vector3 at_m = comes_down_m(), size_m = cell_.held->load.size_m;
+    cell_.arm.vacuum(false);
+    cell_.holds_nothing();
+    task::Json detail{{"place", name_}, {"object", code}, {"comes_down_m", {at_m.x(), at_m.y()}}};
+    const world::Place& target = *cell_.world.place(name_);
+    const double half_m = 0.5 * size_m.head<2>().maxCoeff();
+    const Vector3 off = (at_m - target.center_m).cwiseAbs();
+    if ((off.head<2>().array() + half_m < 0.5 * target.size_m.head<2>().array()).all())
+      return {Status::kSucceeded, "let go early", detail};
+    detail["may_be_in"] = world::mouths_near(cell_.world, at_m, kBounces_m);
+    return {Status::kFailed, "dropped", detail};
+  }
+
+  // The middle of what is held, if it came off now: at the height of the mouth's rim.
+  [[nodiscard]] Vector3 comes_down_m() const {
+    const link::State& state = cell_.arm.state();
+    const Load& load = cell_.held->load;
+    const Vector3 from_m =
+        cell_.model.world_from_tip(state.position) * (load.offset_in_tip_m + Vector3(0, 0, 0.5 * load.size_m.z()));
+    const Vector3 speed_m_s = cell_.model.tip_jacobian(state.position).topRows<3>() * state.speed;
+    const double rim_z = cell_.world.place(name_)->center_m.z(), deep_m = std::max(0.0, from_m.z() - rim_z);
+    const double falls_s =
+        (speed_m_s.z() + std::sqrt(speed_m_s.z() * speed_m_s.z() + 2 * kGravity_m_s2 * deep_m)) / kGravity_m_s2;
+    Vector3 at_m = from_m + falls_s * speed_m_s;
+    at_m.z() = rim_z;
+    return at_m;
   }
 
   // From the vertical, in radians, and still fall through the mouth: its lower edges move aside with its height.
@@ -285,6 +349,10 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
+  std::optional<SetDown> set_down_;
+  std::string why_;
+  Time noticed_;
+  bool sets_down_ = false;
   bool cancelled_ = false;
 };
 

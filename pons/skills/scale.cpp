@@ -16,7 +16,9 @@ constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 constexpr double kNearEdge = 0.75;  // of the way from the middle to an edge
-constexpr double kFelt_nm = 0.4;    // a moment below that the cups bear easily
+// Towards a neighbour less is telling: a parcel alone hangs as far to one side as it was gripped beside its middle.
+constexpr double kTowards_m = 0.025, kTowards_nm = 0.12;
+constexpr double kFelt_nm = 0.4;  // a moment below that the cups bear easily
 
 // What pulls the wrist down.
 double pull_n(Cell& cell) {
@@ -48,6 +50,15 @@ bool hangs_beside(const Load& load, const Weight& weight) {
       Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
   const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
   return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
+}
+
+bool hangs_towards(const Held& held, const Weight& weight, const Eigen::Matrix3d& world_from_tip) {
+  const Eigen::Vector2d beside = weight.beside_tip_m - held.load.offset_in_tip_m.head<2>();
+  return std::ranges::any_of(held.beside, [&](const Beside& other) {
+    const Eigen::Vector2d towards = (world_from_tip.transpose() * other.away_m).head<2>().normalized();
+    const double lever_m = beside.dot(towards);
+    return lever_m > kTowards_m && weight.mass_kg * kGravity_m_s2 * lever_m > kTowards_nm;
+  });
 }
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }

@@ -18,6 +18,9 @@ struct Weight {
 // uneven, so another came along.
 [[nodiscard]] bool hangs_beside(const Load& load, const Weight& weight);
 
+// Whether it hangs so far towards one that lay beside it that this one clings to it. `world_from_tip` turns.
+[[nodiscard]] bool hangs_towards(const Held& held, const Weight& weight, const Eigen::Matrix3d& world_from_tip);
+
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same
 // swing, tells where it hangs.

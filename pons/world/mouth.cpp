@@ -32,4 +32,14 @@ std::vector<Entry> ways_in(const Vector3& full_size_m, const Place& mouth, doubl
   return ways;
 }
 
+std::vector<std::string> mouths_near(const World& world, const Vector3& point_m, double reach_m) {
+  std::vector<std::string> names;
+  for (const Place& place : world.places) {
+    if (place.kind != PlaceKind::kChute && place.kind != PlaceKind::kException) continue;
+    const Vector3 beyond = (point_m - place.center_m).cwiseAbs() - 0.5 * place.size_m;
+    if (beyond.head<2>().cwiseMax(0).norm() <= reach_m) names.push_back(place.name);
+  }
+  return names;
+}
+
 }  // namespace pons::world

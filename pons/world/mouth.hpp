@@ -1,6 +1,7 @@
 // How a parcel goes through the mouth of a chute.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "pons/core/pose.hpp"
@@ -20,5 +21,8 @@ struct Entry {
 [[nodiscard]] std::vector<Entry> ways_in(const Vector3& size_m, const Place& mouth, double misjudged_m = 0);
 
 inline constexpr double kMisjudged_m = 0.004;
+
+// The chutes, the exception chute among them, whose mouths are within `reach_m` of that point, seen from above.
+[[nodiscard]] std::vector<std::string> mouths_near(const World& world, const Vector3& point_m, double reach_m);
 
 }  // namespace pons::world
