@@ -211,6 +211,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
                                  {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
+  const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];
+  if (stalls.often > 0)
+    self->above->bridge_side->stall_brain({stalls, world::fault_stream(options.body.seed, world::Fault::kBrainStall)});
   return self;
 }
 

@@ -183,7 +183,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                     .missorted = verdict->missorted,
                     .lost = verdict->lost,
                     .duplicated = verdict->duplicated,
-                    .exceptions = {verdict->deserved, verdict->undeserved},
+                    .exceptions = {verdict->deserved, verdict->undeserved, verdict->astray},
                     .damaged = verdict->damaged};
   Time first = result.end;
   for (const sim::ParcelTruth& parcel : truth.parcels()) {

@@ -129,6 +129,11 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     decided_.insert(belief.track);
     return;
   }
+  if (belief.two_codes) {
+    // They may be two that touch: likewise. Which of the two codes counts, nobody can tell.
+    if (in_reach && x_m < label_view_end_m_) return;
+    return ride(belief, kRideTwoCodes, decisions);
+  }
   if (too_large(belief.size_m, order->second)) {
     // It may be two that touch: as long as a camera looks, they may still be told apart.
     if (in_reach && x_m < label_view_end_m_) return;

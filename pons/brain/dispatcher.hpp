@@ -40,6 +40,7 @@ inline constexpr std::string_view kRideUnreadable = "label unreadable";
 inline constexpr std::string_view kRideUnknown = "unknown code";
 inline constexpr std::string_view kRideTooLarge = "too large";
 inline constexpr std::string_view kRideTwice = "code seen twice";
+inline constexpr std::string_view kRideTwoCodes = "shows two codes";
 inline constexpr std::string_view kRideLate = "identified out of reach";
 inline constexpr std::string_view kRideCovered = "covered by another";
 

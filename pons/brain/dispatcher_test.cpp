@@ -337,5 +337,15 @@ TEST_F(DispatcherTest, WithoutALabelCameraTheReachIsTheEnd) {
   EXPECT_EQ(dispatcher.label_view_end_m(), 2);
 }
 
+// While a camera looks, it may still turn out to be two; afterwards nobody can tell which code counts.
+TEST_F(DispatcherTest, WhatShowsTwoCodesIsNotAskedFor) {
+  ObjectBelief doubtful = parcel(1, 0, "P1");
+  doubtful.two_codes = true;
+  const Decisions waits = dispatcher_.observe({doubtful}, at(10));
+  EXPECT_TRUE(waits.tasks.empty() && waits.rides.empty());
+  doubtful.world_from_top.translation().x() = dispatcher_.label_view_end_m() + 0.1;
+  EXPECT_EQ(only_reason(dispatcher_.observe({doubtful}, at(12))), kRideTwoCodes);
+}
+
 }  // namespace
 }  // namespace pons::brain

@@ -25,6 +25,7 @@ struct ObjectBelief {
   int missing = 0;         // in so many frames since, what shows where it should be is not it
   bool crowded = false;    // touches, overlaps or leans on a neighbour
   std::string code;        // label text, empty until read
+  bool two_codes = false;  // another code was read on it, too
   int label_attempts = 0;  // frames good enough to read a label on it, readable or not
 };
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kAround_m = 0.012;  // beyond the print, so that the quiet zone is in
 constexpr double kLeastPrint_m2 = 3e-4;
+constexpr double kTwoLabels = 2.4;  // sides of a code: wider than one label with what is around it, at any angle
 
 std::optional<cv::Point2d> project(const RgbdFrame& frame, const Vector3& world) {
   const Vector3 p = frame.world_from_optical.inverse() * world;
@@ -67,6 +68,7 @@ std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, cons
     int scale;
     ZXing::Binarizer binarizer;
   };
+  std::vector<Found> found;
   for (const Attempt& attempt :
        {Attempt{1, ZXing::Binarizer::LocalAverage}, Attempt{2, ZXing::Binarizer::LocalAverage},
         Attempt{2, ZXing::Binarizer::GlobalHistogram}, Attempt{3, ZXing::Binarizer::LocalAverage}}) {
@@ -83,16 +85,20 @@ std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, cons
                            .setTryRotate(false)  // finder patterns are found at any angle
                            .setTryDownscale(false)
                            .setBinarizer(attempt.binarizer);
-    std::vector<Found> found;
+    double side = 0;  // of a code, pixels of the source
     for (const auto& result : ZXing::ReadBarcodes(image, hints)) {
       if (!result.isValid()) continue;
       cv::Point2d middle(0, 0);
       for (const auto& corner : result.position()) middle += cv::Point2d(corner.x, corner.y) / 4;
+      const ZXing::PointI across = result.position().topRight() - result.position().topLeft();
+      side = std::max(side, std::hypot(across.x, across.y) / attempt.scale);
+      if (std::ranges::find(found, result.text(), &Found::code) != found.end()) continue;
       found.push_back({result.text(), middle / attempt.scale + cv::Point2d(area.tl())});
     }
-    if (!found.empty()) return found;
+    // Where more is printed than one label, another may be harder to read.
+    if (!found.empty() && std::max(area.width, area.height) < kTwoLabels * side) return found;
   }
-  return {};
+  return found;
 }
 
 std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,

@@ -152,6 +152,7 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
       tracker.label_read(tracks[read.sighting], read.code, middle_m.head<2>());
     } else {
       shared[read.code] = middle_m;
+      tracker.label_doubt(tracks[read.sighting]);
     }
   }
 }

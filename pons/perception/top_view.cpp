@@ -13,7 +13,8 @@ constexpr double kOverhang_m =
     0.06;                           // how far a parcel may stick out over the belt's sides and still be measured whole
 constexpr double kTallest_m = 0.6;  // above the belt; what is higher does not lie on it
 constexpr float kTooHigh_m = 0.8F;  // nothing that rides or is carried gets there
-constexpr double kUnread = 0.35;  // of a tile: far more than noise and edges cost, or the foot of an arm that hangs in view
+constexpr double kUnread =
+    0.35;  // of a tile: far more than noise and edges cost, or the foot of an arm that hangs in view
 constexpr double kFinestCell_m = 0.0025;
 constexpr double kBare_m = 0.006;       // lower readings are of the belt
 constexpr int kSameSurface = 80;        // 8 mm: readings of one cell that far below its highest are of what lies behind

@@ -287,6 +287,7 @@ bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, doubl
   if (resized) track.odd_size_m = o.size_m;
   if (resized && !now_whole && ++track.odd_sizes < enough) return true;
   track.last = sighting;
+  if (resized) track.two_codes = false;
   if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
     // Another object lies here now, on this one or in its place: whose label it was is no longer known.
     track.code.clear();
@@ -383,6 +384,10 @@ void Tracker::label_attempt(std::uint32_t track) {
   if (Track* const found = find(track)) ++found->label_attempts;
 }
 
+void Tracker::label_doubt(std::uint32_t track) {
+  if (Track* const found = find(track)) found->two_codes = true;
+}
+
 bool Tracker::wants_label(std::uint32_t track) const {
   const Track* const found = find(track);
   return found != nullptr && wants_label(*found);
@@ -410,6 +415,7 @@ void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen
     ++found->reads;
     found->other_reads = 0;
   } else {
+    found->two_codes = true;
     found->other_reads = found->other_code == code ? found->other_reads + 1 : 1;
     found->other_code = code;
     if (found->other_reads < 2) return;
@@ -467,6 +473,7 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.missing = track.missing;
   belief.crowded = track.crowded;
   belief.code = track.code;
+  belief.two_codes = track.two_codes;
   belief.label_attempts = track.label_attempts;
   return belief;
 }

@@ -29,6 +29,9 @@ class Tracker {
   // another one replaces it when read twice. No two tracks keep one code, and none keeps the code of a label that turns
   // out to lie beside it.
   void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
+  // In one frame two codes were read on it: two taken for one, or one with two labels. True until it is seen to be of
+  // another size.
+  void label_doubt(std::uint32_t track);
   // False once its code has been read twice; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
   // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
@@ -70,6 +73,7 @@ class Tracker {
     Eigen::Vector2d label_m = Eigen::Vector2d::Zero();  // its middle at `label_stamp`, relative to the belt
     Time label_stamp;
     int reads = 0, other_reads = 0, label_attempts = 0;
+    bool two_codes = false;
     // Seen whole for a while: a bad cut does not come this often.
     [[nodiscard]] bool well_known() const { return observations.size() >= 4 && !observations.back().doubtful; }
     bool forgotten = false;  // only kept to swallow frames from before it was taken

@@ -236,5 +236,26 @@ TEST(TrackerTest, DoesNotStartOnWhatTheRobotTouchesOrTheBorderCuts) {
   EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).empty());
 }
 
+TEST(TrackerTest, TwoCodesOnOneAreDoubtUntilItIsSeenToBeAnother) {
+  Bench bench;
+  const std::uint32_t track = bench.update({Bench::sighting(-0.5, 0)}).at(0);
+  bench.read(track, "P1");
+  EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
+  bench.read(track, "P2", {0.03, 0});
+  EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
+  for (int i = 0; i < 6; ++i) bench.update({Bench::sighting(-0.5, 0, 0, {0.12, 0.10, 0.1})});
+  EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
+}
+
+TEST(TrackerTest, TellsHowOftenItLookedAndFoundNothing) {
+  Bench bench;
+  for (int i = 0; i < 3; ++i) bench.update({Bench::sighting(-0.5, 0)});
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).missing, 0);
+  bench.update({});
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).missing, 1);
+  bench.update({});
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).missing, 2);
+}
+
 }  // namespace
 }  // namespace pons::perception

@@ -38,14 +38,16 @@ nlohmann::ordered_json to_json(const Report& report) {
   Json json;
   json["seed"] = report.seed;
   json["world"] = report.world;
-  json["parcels"] = {
-      {"offered", parcels.offered},
-      {"sorted", parcels.sorted},
-      {"missorted", parcels.missorted},
-      {"lost", parcels.lost},
-      {"duplicated", parcels.duplicated},
-      {"exceptions", {{"deserved", parcels.exceptions.deserved}, {"undeserved", parcels.exceptions.undeserved}}},
-      {"damaged", parcels.damaged}};
+  json["parcels"] = {{"offered", parcels.offered},
+                     {"sorted", parcels.sorted},
+                     {"missorted", parcels.missorted},
+                     {"lost", parcels.lost},
+                     {"duplicated", parcels.duplicated},
+                     {"exceptions",
+                      {{"deserved", parcels.exceptions.deserved},
+                       {"undeserved", parcels.exceptions.undeserved},
+                       {"astray", parcels.exceptions.astray}}},
+                     {"damaged", parcels.damaged}};
   json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
   json["retries"] = report.retries;
@@ -85,7 +87,9 @@ std::string summary(const Report& report) {
   line("world", fmt::format("{}, seed {}", report.world, report.seed));
   line("sorted", fmt::format("{} of {} parcels offered", parcels.sorted, parcels.offered));
   line("exceptions",
-       fmt::format("{} deserved, {} undeserved", parcels.exceptions.deserved, parcels.exceptions.undeserved));
+       fmt::format("{} deserved, {} undeserved{}", parcels.exceptions.deserved, parcels.exceptions.undeserved,
+                   parcels.exceptions.astray == 0 ? std::string()
+                                                  : fmt::format(", {} of them in a chute", parcels.exceptions.astray)));
   line("missorted", fmt::format("{}", parcels.missorted));
   line("lost", fmt::format("{}", parcels.lost));
   line("duplicated", fmt::format("{}", parcels.duplicated));

@@ -19,6 +19,7 @@ struct Report {
   struct Exceptions {
     std::int64_t deserved = 0;    // unreadable, unknown, overweight, too large: nothing could have sorted them
     std::int64_t undeserved = 0;  // sortable, yet not sorted
+    std::int64_t astray = 0;      // of those: in a chute, by a fall, and the journal says in which to look
   };
   struct Parcels {
     std::int64_t offered = 0;

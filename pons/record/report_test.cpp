@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
                       .missorted = 1,
                       .lost = 2,
                       .duplicated = 3,
-                      .exceptions = {.deserved = 4, .undeserved = 5},
+                      .exceptions = {.deserved = 4, .undeserved = 5, .astray = 1},
                       .damaged = 6},
           .throughput = throughput(570, 190),
           .retries = 7,
@@ -66,7 +66,7 @@ TEST(Report, KeepsEveryFigure) {
   EXPECT_EQ(to_json(example()), Json::parse(R"({
     "seed": 18446744073709551615, "world": "parcel_cell",
     "parcels": {"offered": 200, "sorted": 190, "missorted": 1, "lost": 2, "duplicated": 3,
-                "exceptions": {"deserved": 4, "undeserved": 5}, "damaged": 6},
+                "exceptions": {"deserved": 4, "undeserved": 5, "astray": 1}, "damaged": 6},
     "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
     "limits": {"violations": 0, "worst_ratio": 0.985, "saturated": 12},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,

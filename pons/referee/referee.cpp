@@ -53,7 +53,8 @@ void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) 
   for (const Json& step : outcome->detail.value("steps", Json::array())) {
     const auto detail = step.find("detail");
     if (detail == step.end() || !detail->is_object()) continue;
-    for (const Json& place : detail->value("may_be_in", Json::array())) entry.may_be_in.insert(place.get<std::string>());
+    for (const Json& place : detail->value("may_be_in", Json::array()))
+      entry.may_be_in.insert(place.get<std::string>());
   }
 }
 
@@ -110,7 +111,8 @@ class Judge {
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
     if (!entry.succeeded && entry.may_be_in.contains(parcel.place)) {
       ++verdict_.undeserved;
-      find(parcel, entry, "dropped there, as the journal says");
+      ++verdict_.astray;
+      find(parcel, entry, "astray, where the journal says to look");
     } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted");

@@ -26,6 +26,7 @@ struct Verdict {
   int duplicated = 0;  // handled twice by the journal
   int deserved = 0;    // exceptions that had a reason: label, mass, size
   int undeserved = 0;  // exceptions that had none, drops with an entry among them
+  int astray = 0;      // of the undeserved: in a chute that a failed task's outcome says to look in
   int damaged = 0;
   int unfinished = 0;                 // still on the belt or in the hand when the run was broken off
   std::uint64_t violations = 0;       // axis-steps beyond a limit, as the simulator saw the arm

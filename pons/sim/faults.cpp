@@ -50,7 +50,8 @@ void Faults::add_labels(const world::World& world, const world::Manifest& manife
     // A stream of each parcel's own: whether one has room decides nothing about the others.
     Random random = world::fault_stream(seed_, Fault::kDoubleLabel).fork(i);
     if (!(random.uniform() < plan_[Fault::kDoubleLabel].often)) continue;
-    if (arrivals[i].label != LabelState::kReadable || !room_for_two_labels(manifest[i], world.arrivals.label_m)) continue;
+    if (arrivals[i].label != LabelState::kReadable || !room_for_two_labels(manifest[i], world.arrivals.label_m))
+      continue;
     const bool own = manifest.size() < 2 || random.uniform() < 0.5;
     const std::size_t other = (i + 1 + random.below(std::max<std::size_t>(1, manifest.size() - 1))) % manifest.size();
     arrivals[i].second_text = own ? manifest[i].parcel_id : manifest[other].parcel_id;
@@ -63,8 +64,7 @@ void Faults::begin_attempt() {
   attempt_.leaks = draws(Fault::kWeakVacuum);
   attempt_.drops = draws(Fault::kDrop);
   if (attempt_.leaks)
-    attempt_.leak_kpa =
-        streams_[static_cast<std::size_t>(Fault::kWeakVacuum)].uniform(kLeakLeast_kpa, kLeakMost_kpa);
+    attempt_.leak_kpa = streams_[static_cast<std::size_t>(Fault::kWeakVacuum)].uniform(kLeakLeast_kpa, kLeakMost_kpa);
   if (attempt_.drops)
     attempt_.drops_after =
         from_s(streams_[static_cast<std::size_t>(Fault::kDrop)].uniform(kDropsSoonest_s, kDropsLatest_s));
@@ -98,9 +98,8 @@ int Faults::neighbour(const Composed& cell, mjData* data, int slot, const Ledger
   for (int other = 0; other < kSlots; ++other) {
     if (other == slot || !ledger.on_belt(other)) continue;
     double between[6];
-    const double apart_m =
-        mj_geomDistance(cell.model.get(), data, cell.slots[static_cast<std::size_t>(slot)].main,
-                        cell.slots[static_cast<std::size_t>(other)].main, kClings_m, between);
+    const double apart_m = mj_geomDistance(cell.model.get(), data, cell.slots[static_cast<std::size_t>(slot)].main,
+                                           cell.slots[static_cast<std::size_t>(other)].main, kClings_m, between);
     if (apart_m < least_m) least_m = apart_m, nearest = other;
   }
   return nearest;
@@ -151,8 +150,7 @@ Sight Faults::sight(Time now) {
   }
   if (shifts_.on(now)) {
     if (std::exchange(shifted_by_, shifts_.begun()) != shifts_.begun()) {
-      const double angle =
-          streams_[static_cast<std::size_t>(Fault::kShiftedView)].uniform(0, 2 * std::numbers::pi);
+      const double angle = streams_[static_cast<std::size_t>(Fault::kShiftedView)].uniform(0, 2 * std::numbers::pi);
       shift_m_ = plan_[Fault::kShiftedView].by_m * Vector3(std::cos(angle), std::sin(angle), 0);
     }
     sight.shift_m = shift_m_;

@@ -24,8 +24,8 @@ struct Sight {
   struct Patch {
     double left = 0, top = 0, right = 0, bottom = 0;
   };
-  bool black = false;           // and no depth
-  std::optional<Patch> hidden;  // behind something near the camera
+  bool black = false;                 // and no depth
+  std::optional<Patch> hidden;        // behind something near the camera
   Vector3 shift_m = Vector3::Zero();  // of the camera from where it is believed to be, world frame
 };
 
@@ -52,7 +52,7 @@ class Faults {
   struct Attempt {
     bool misses = false, leaks = false, drops = false;
     double leak_kpa = 0;
-    Duration drops_after{0};  // being lifted
+    Duration drops_after{0};                               // being lifted
     bool missed = false, leaked = false, dropped = false;  // has come to pass
     std::optional<Time> lifted;
   };
@@ -67,8 +67,8 @@ class Faults {
   world::FaultCounts counts_;
   std::uint32_t vacuum_on_ = 0;
   Attempt attempt_;
-  int owed_doubles_ = 0;  // of picks that had no neighbour
-  int clings_to_ = -1, clings_ = -1;  // slots
+  int owed_doubles_ = 0;                         // of picks that had no neighbour
+  int clings_to_ = -1, clings_ = -1;             // slots
   std::int64_t hidden_by_ = 0, shifted_by_ = 0;  // the spell that the patch and the shift were drawn for
   Sight::Patch patch_;
   Vector3 shift_m_ = Vector3::Zero();

@@ -202,9 +202,9 @@ Expected<std::unique_ptr<Simulation>> Simulation::create(const world::World& wor
   if (!composed) return std::unexpected(composed.error());
   auto cell = std::make_unique<Cell>(world, manifest, std::move(*composed), seed, faults);
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
-    auto camera = SimCamera::create(world.cameras[i], cell->composed.model.get(), cell->data.get(),
-                                    cell->composed.cameras[i], &cell->labels, seed,
-                                    world.cameras[i].watches == "belt" ? &cell->faults : nullptr);
+    auto camera =
+        SimCamera::create(world.cameras[i], cell->composed.model.get(), cell->data.get(), cell->composed.cameras[i],
+                          &cell->labels, seed, world.cameras[i].watches == "belt" ? &cell->faults : nullptr);
     if (!camera) return std::unexpected(camera.error());
     cell->camera_list.push_back(camera->get());
     cell->cameras.push_back(std::move(*camera));

@@ -31,8 +31,7 @@ class Simulation {
   // Composes scene, arm, tool and parcels, puts the arm at home with its brakes on, and opens the cameras. Errors: a
   // file that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
   [[nodiscard]] static Expected<std::unique_ptr<Simulation>> create(const world::World& world,
-                                                                    const world::Manifest& manifest,
-                                                                    std::uint64_t seed,
+                                                                    const world::Manifest& manifest, std::uint64_t seed,
                                                                     const world::FaultPlan& faults = {});
   ~Simulation();
   Simulation(const Simulation&) = delete;

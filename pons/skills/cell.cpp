@@ -9,6 +9,7 @@
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/grip.hpp"
+#include "pons/world/mouth.hpp"
 #include "pons/world/view.hpp"
 
 namespace pons::skills {
@@ -35,6 +36,7 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;  // the scale's
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
+constexpr double kRisen_m = 0.03;     // what is seen so much higher does not lie any more
 constexpr int kGoneFrames = 2;        // that looked and did not find it
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
 constexpr double kAside_m = 0.36;     // over the belt, and over what may stand on it
@@ -112,9 +114,11 @@ void Cell::look_beside() {
   std::erase_if(held->beside, [&](Beside& other) {
     const auto now_it = std::ranges::find(objects_, other.track, &ObjectBelief::track);
     const bool gone = now_it == objects_.end();
-    if (!gone && now_it->last_seen > held->lifted) return true;
+    const bool seen = !gone && now_it->last_seen > held->lifted;
+    const bool lies = seen && now_it->world_from_top.translation().z() < other.z_m + kRisen_m;
+    if (lies) return true;
     // A track ends where it rides out of the cell, too.
-    if (gone ? !in_view(other.last_x_m) : now_it->missing < kGoneFrames) {
+    if (gone ? !in_view(other.last_x_m) : !seen && now_it->missing < kGoneFrames) {
       if (!gone) other.last_x_m = now_it->world_from_top.translation().x();
       return false;
     }
@@ -158,15 +162,16 @@ bool Cell::may_have_company() const {
   return held && std::ranges::any_of(held->beside, [this](const Beside& other) { return in_view(other.last_x_m); });
 }
 
-void Cell::let_go_into(std::string_view place) {
+void Cell::let_go_into(const world::Place& place) {
   for (const Beside& other : held->beside) {
-    if (!other.code.empty()) gone_with_[other.code] = place;
+    const double reach_m = std::max(0.0, other.away_m.head<2>().norm() + other.radius_m - 0.5 * place.size_m.x());
+    if (!other.code.empty()) gone_with_[other.code] = world::mouths_near(world, place.center_m, reach_m);
   }
 }
 
-std::string Cell::may_be_in(std::string_view code) const {
+task::Json Cell::where_to_look(std::string_view code) const {
   const auto found = gone_with_.find(code);
-  return found == gone_with_.end() ? std::string() : found->second;
+  return found == gone_with_.end() ? task::Json{} : task::Json{{"may_be_in", found->second}};
 }
 
 void Cell::weighs(double mass_kg) {

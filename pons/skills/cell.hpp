@@ -28,6 +28,7 @@ struct Beside {
   std::uint32_t track = 0;
   Vector3 away_m = Vector3::Zero();  // from the parcel's middle to its own
   double radius_m = 0;               // of its footprint
+  double z_m = 0;                    // of its top
   double last_x_m = 0;               // where its track had got to
   std::string code;                  // empty: not read yet
   std::string name;                  // for people
@@ -79,10 +80,11 @@ class Cell {
   [[nodiscard]] std::optional<std::string> came_along() const { return came_along_; }
   // Whether a camera still has to show that what lay beside it has stayed there.
   [[nodiscard]] bool may_have_company() const;
-  // What is held was let go of over that place; whatever lay beside it and was not seen since may have gone with it.
-  void let_go_into(std::string_view place);
-  // Where that one may have gone with another; empty: nowhere.
-  [[nodiscard]] std::string may_be_in(std::string_view code) const;
+  // What is held is let go of over that place: whatever lay beside it and was not seen since may have gone with it, in
+  // there or beside it.
+  void let_go_into(const world::Place& place);
+  // {"may_be_in": places} where that one may have gone with another; else nothing.
+  [[nodiscard]] task::Json where_to_look(std::string_view code) const;
   // Nothing is held any longer: likewise.
   void holds_nothing();
 
@@ -171,8 +173,8 @@ class Cell {
 
   std::optional<Time> belt_held_;
   std::optional<std::string> came_along_;
-  std::map<std::string, std::string, std::less<>> gone_with_;  // a code, and the place
-  std::optional<double> view_end_m_;                           // on the belt; none: no camera watches it
+  std::map<std::string, std::vector<std::string>, std::less<>> gone_with_;  // a code, and the places
+  std::optional<double> view_end_m_;                                        // on the belt; none: no camera watches it
   Time now_, seen_, looked_at_;
   [[nodiscard]] double gain_m(double ahead_s) const;
 

@@ -153,6 +153,7 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
 }
 
 std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {
+  if (object.two_codes) return "another code was read on it, too";
   for (const ObjectBelief& other : cell.objects()) {
     if (other.track == 0) continue;  // only an obstacle
     if (lies_on(other, object)) return "covered by " + name_of(other);
@@ -171,7 +172,7 @@ std::vector<Beside> beside(const Cell& cell, const ObjectBelief& target) {
     const Vector3 away_m = at - cell.predict(target, other.stamp);
     const double radius_m = 0.5 * other.size_m.head<2>().norm();
     if (away_m.head<2>().norm() > 0.5 * target.size_m.head<2>().norm() + radius_m + kMayCling_m) continue;
-    near.push_back({other.track, away_m, radius_m, at.x(), other.code, name_of(other)});
+    near.push_back({other.track, away_m, radius_m, at.z(), at.x(), other.code, name_of(other)});
   }
   return near;
 }

@@ -141,7 +141,7 @@ class Pick final : public ArmSkill {
     if (object == nullptr) {
       step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
-      return {Status::kFailed, "lost from sight", gone_with_another()};
+      return {Status::kFailed, "lost from sight", cell_.where_to_look(code_)};
     }
     seen_ = now;
     const world::Belt& belt = cell_.world.belt;
@@ -323,16 +323,10 @@ class Pick final : public ArmSkill {
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
-      if (cups.sealed_cups == 0) verdict_.detail = gone_with_another();
+      if (cups.sealed_cups == 0) verdict_.detail = cell_.where_to_look(code_);
       return {};
     }
     return {};
-  }
-
-  // Where to look for what is not where it should be, and lay beside another that was taken.
-  [[nodiscard]] task::Json gone_with_another() const {
-    const std::string place = cell_.may_be_in(code_);
-    return place.empty() ? task::Json{} : task::Json{{"may_be_in", {place}}};
   }
 
   // Lets go of what is not lifted.

@@ -256,7 +256,7 @@ class Place final : public ArmSkill {
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
-    cell_.let_go_into(name_);
+    cell_.let_go_into(*cell_.world.place(name_));
     let_go_ = cell_.held->code;
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -190,6 +191,26 @@ TEST_F(ScaleTest, SaysNothingWhileANeighbourBoreHalfOfItInTheFirstHalf) {
     EXPECT_GE(doubtful, 2);
     expect_right(readings, mass_kg, free_s + span_s(mass_kg) + 0.011, 1);
   }
+}
+
+// One that lay to the left of it, seen with the tool turned by a quarter.
+TEST(HangsTowards, OnlyALeverTowardsANeighbourTells) {
+  const Eigen::Matrix3d turned = (Eigen::AngleAxisd(std::numbers::pi / 2, Vector3::UnitZ()) *
+                                  Eigen::AngleAxisd(std::numbers::pi, Vector3::UnitX()))
+                                     .toRotationMatrix();
+  Held held{.code = "P1", .load = {.size_m = {0.3, 0.2, 0.1}}};
+  const Vector3 left(0, 0.2, 0);
+  const auto hanging = [&](double metres, double mass_kg) {
+    return Weight{mass_kg, metres * (turned.transpose() * left.normalized()).head<2>()};
+  };
+  EXPECT_FALSE(hangs_towards(held, hanging(0.05, 2), turned)) << "nothing lay there";
+  held.beside.push_back({.track = 2, .away_m = left, .radius_m = 0.1});
+  EXPECT_TRUE(hangs_towards(held, hanging(0.05, 2), turned));
+  EXPECT_FALSE(hangs_towards(held, hanging(-0.05, 2), turned)) << "the other side";
+  EXPECT_FALSE(hangs_towards(held, hanging(0.015, 2), turned)) << "gripped beside its middle";
+  EXPECT_FALSE(hangs_towards(held, hanging(0.05, 0.1), turned)) << "too little to be felt";
+  held.load.offset_in_tip_m.head<2>() = hanging(0.05, 2).beside_tip_m;
+  EXPECT_FALSE(hangs_towards(held, hanging(0.05, 2), turned)) << "it was taken there";
 }
 
 }  // namespace

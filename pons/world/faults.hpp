@@ -16,16 +16,16 @@
 namespace pons::world {
 
 enum class Fault : std::uint8_t {
-  kMissedGrasp,   // a pick: the cups do not seal in that attempt
-  kWeakVacuum,    // a pick: they seal, but leak
-  kDoublePick,    // a pick: what is lifted drags a neighbour along until it is let go of
-  kDrop,          // a pick: the seal is lost on the way
-  kDoubleLabel,   // a parcel: it shows a second label, its own code or another parcel's
-  kBeltJam,       // an hour: the belt stands although it is told to run
-  kOcclusion,     // an hour: something hangs between the belt's cameras and a part of what they watch
-  kBlackout,      // an hour: the belt's cameras deliver black frames without depth
-  kShiftedView,   // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
-  kBrainStall,    // an hour: the brain is silent
+  kMissedGrasp,  // a pick: the cups do not seal in that attempt
+  kWeakVacuum,   // a pick: they seal, but leak
+  kDoublePick,   // a pick: what is lifted drags a neighbour along until it is let go of
+  kDrop,         // a pick: the seal is lost on the way
+  kDoubleLabel,  // a parcel: it shows a second label, its own code or another parcel's
+  kBeltJam,      // an hour: the belt stands although it is told to run
+  kOcclusion,    // an hour: something hangs between the belt's cameras and a part of what they watch
+  kBlackout,     // an hour: the belt's cameras deliver black frames without depth
+  kShiftedView,  // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
+  kBrainStall,   // an hour: the brain is silent
 };
 inline constexpr std::size_t kFaults = 10;
 // As the file and the report have it: "missed_grasp".

@@ -27,7 +27,8 @@ class FaultsTest : public testing::Test {
 };
 
 void expect_says(const std::string& line, std::initializer_list<std::string_view> words) {
-  for (const std::string_view word : words) EXPECT_NE(line.find(word), std::string::npos) << word << "\nnot in " << line;
+  for (const std::string_view word : words)
+    EXPECT_NE(line.find(word), std::string::npos) << word << "\nnot in " << line;
 }
 
 TEST_F(FaultsTest, NoneIsNoPlanAtAll) {

@@ -52,5 +52,15 @@ TEST(WaysIn, WhatIsTooWideOrTooHighToLeanHasNone) {
   EXPECT_TRUE(ways(0.345, 0.345, 0.30).empty());
 }
 
+TEST(MouthsNear, AreThoseWithinReachOfThePoint) {
+  const auto world = load("worlds", "parcel_cell");
+  ASSERT_TRUE(world);
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(mouths_near(*world, Vector3(0.20, 0.46, 2), 0), Names{"chute_1"});
+  EXPECT_EQ(mouths_near(*world, Vector3(0.03, 0.46, 0.9), 0.05), (Names{"chute_1", "chute_2"}));
+  EXPECT_EQ(mouths_near(*world, Vector3(0.3, 0, 0.9), 0.1), Names{}) << "over the belt";
+  EXPECT_EQ(mouths_near(*world, Vector3(1.2, 0, 0.9), 0), Names{"exception"});
+}
+
 }  // namespace
 }  // namespace pons::world
