@@ -152,7 +152,10 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
       tracker.label_read(tracks[read.sighting], read.code, middle_m.head<2>());
     } else {
       shared[read.code] = middle_m;
-      tracker.label_doubt(tracks[read.sighting]);
+      for (const LabelRead& other : reads) {
+        if (other.sighting == read.sighting && other.code != read.code)
+          tracker.label_doubt(tracks[read.sighting], read.code, other.code);
+      }
     }
   }
 }

@@ -245,6 +245,7 @@ void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double
   track.label_m += before.velocity * to_s(stamp - track.label_stamp);
   track.label_stamp = stamp;
   if (same) {
+    if (usable(sighting) && sighting.complete) pairs_.stays(track.code, stamp);
     const Eigen::Rotation2Dd turned(turn(before.yaw_rad, track.estimate.yaw_rad));
     track.label_m = track.estimate.at(stamp) + turned * (track.label_m - before.at(stamp));
   }
@@ -384,8 +385,15 @@ void Tracker::label_attempt(std::uint32_t track) {
   if (Track* const found = find(track)) ++found->label_attempts;
 }
 
-void Tracker::label_doubt(std::uint32_t track) {
+void Tracker::label_doubt(std::uint32_t track, const std::string& one, const std::string& other) {
+  pairs_.read_together(one, other);
   if (Track* const found = find(track)) found->two_codes = true;
+}
+
+bool Tracker::doubted(const Track& track) const {
+  const std::string* const pair = pairs_.other(track.code);
+  const auto bears_it = [&](const Track& other) { return !other.forgotten && other.code == *pair; };
+  return track.two_codes || (pair != nullptr && std::ranges::none_of(tracks_, bears_it));
 }
 
 bool Tracker::wants_label(std::uint32_t track) const {
@@ -415,7 +423,6 @@ void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen
     ++found->reads;
     found->other_reads = 0;
   } else {
-    found->two_codes = true;
     found->other_reads = found->other_code == code ? found->other_reads + 1 : 1;
     found->other_code = code;
     if (found->other_reads < 2) return;
@@ -436,6 +443,7 @@ void Tracker::forget(std::uint32_t track) {
   // Frames still under way show it on the belt: they must not bring it back.
   found->forgotten = true;
   found->forgotten_until = (passages_.empty() ? found->last_seen : passages_.back().stamp) + kSwallow;
+  pairs_.taken(found->code, found->forgotten_until);
 }
 
 double Tracker::belt_speed(Time now, double travel_m) const {
@@ -473,7 +481,7 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.missing = track.missing;
   belief.crowded = track.crowded;
   belief.code = track.code;
-  belief.two_codes = track.two_codes;
+  belief.two_codes = doubted(track);
   belief.label_attempts = track.label_attempts;
   return belief;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pons/core/belief.hpp"
+#include "pons/perception/code_pairs.hpp"
 #include "pons/perception/segmentation.hpp"
 #include "pons/perception/top_face.hpp"
 #include "pons/world/world.hpp"
@@ -29,9 +30,10 @@ class Tracker {
   // another one replaces it when read twice. No two tracks keep one code, and none keeps the code of a label that turns
   // out to lie beside it.
   void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
-  // In one frame two codes were read on it: two taken for one, or one with two labels. True until it is seen to be of
-  // another size.
-  void label_doubt(std::uint32_t track);
+  // In one frame both codes were read on that track: two taken for one, or one with two labels. Which of them it is
+  // shows when one is taken away and the other stays as it was; until then each is doubted while the other is on no
+  // track.
+  void label_doubt(std::uint32_t track, const std::string& one, const std::string& other);
   // False once its code has been read twice; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
   // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
@@ -105,11 +107,13 @@ class Tracker {
   [[nodiscard]] const Track* find(std::uint32_t track) const;
 
   [[nodiscard]] bool wants_label(const Track& track) const;
+  [[nodiscard]] bool doubted(const Track& track) const;
 
   world::Belt belt_;
   world::Rules rules_;
   std::vector<Track> tracks_;  // by id
   std::deque<Passage> passages_;
+  CodePairs pairs_;
   std::uint32_t next_id_ = 1;
 };
 

@@ -241,7 +241,7 @@ TEST(TrackerTest, TwoCodesOnOneAreDoubtUntilItIsSeenToBeAnother) {
   const std::uint32_t track = bench.update({Bench::sighting(-0.5, 0)}).at(0);
   bench.read(track, "P1");
   EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
-  bench.read(track, "P2", {0.03, 0});
+  bench.tracker.label_doubt(track, "P1", "P2");
   EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
   for (int i = 0; i < 6; ++i) bench.update({Bench::sighting(-0.5, 0, 0, {0.12, 0.10, 0.1})});
   EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);

@@ -117,6 +117,7 @@ void Cell::look_beside() {
     const bool seen = !gone && now_it->last_seen > held->lifted;
     const bool lies = seen && now_it->world_from_top.translation().z() < other.z_m + kRisen_m;
     if (lies) return true;
+    if (other.track == 0) return false;  // no camera will tell
     // A track ends where it rides out of the cell, too.
     if (gone ? !in_view(other.last_x_m) : !seen && now_it->missing < kGoneFrames) {
       if (!gone) other.last_x_m = now_it->world_from_top.translation().x();
@@ -164,7 +165,7 @@ bool Cell::may_have_company() const {
 
 void Cell::let_go_into(const world::Place& place) {
   for (const Beside& other : held->beside) {
-    const double reach_m = std::max(0.0, other.away_m.head<2>().norm() + other.radius_m - 0.5 * place.size_m.x());
+    const double reach_m = other.away_m.head<2>().norm() + other.radius_m;
     if (!other.code.empty()) gone_with_[other.code] = world::mouths_near(world, place.center_m, reach_m);
   }
 }
@@ -190,10 +191,13 @@ std::vector<task::Note> Cell::take_notes() {
   return std::exchange(notes_, {});
 }
 
-void Cell::left_on_belt(const Load& load, const Vector3& position) {
+void Cell::left_on_belt(const Held& laid, const Pose& tip) {
+  const Load& load = laid.load;
   ObjectBelief object;
   object.stamp = now_;
-  object.world_from_top.translation() = position;
+  object.code = laid.code;
+  object.world_from_top = pose_xyz_yaw(tip.translation().x(), tip.translation().y(), tip.translation().z(),
+                                       yaw_of(tip.linear()) - load.yaw_in_tip_rad);
   object.velocity_m_s.x() = belt_speed_m_s();
   object.size_m = load.size_m;
   left_.push_back(object);
@@ -222,8 +226,10 @@ ObjectBelief Cell::across_belt(double from_m, double to_m, double width_m, doubl
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {
-  const auto found =
-      std::find_if(objects_.begin(), objects_.end(), [&](const ObjectBelief& o) { return o.code == code; });
+  // What was laid where no camera looks lies where it was laid.
+  const auto found = std::ranges::find_if(objects_, [&](const ObjectBelief& o) {
+    return o.code == code && (o.track != 0 || !in_view(o.world_from_top.translation().x()));
+  });
   return found == objects_.end() ? nullptr : &*found;
 }
 

@@ -97,9 +97,9 @@ class Cell {
   void hold_belt(Time now) { belt_held_ = now; }
   [[nodiscard]] bool holds_belt(Time now) const { return belt_held_ && now < *belt_held_ + kBeltHeldFor; }
 
-  // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
-  // has ridden off the end.
-  void left_on_belt(const Load& load, const Vector3& position);
+  // Put back on the belt, under the tip: out of the cameras' view it is still known by its code, and an obstacle until
+  // it has ridden off the end.
+  void left_on_belt(const Held& laid, const Pose& tip);
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
   // counts as so high an obstacle, until the tip has left it; so long unseen_end() counts as no higher, either, or it
   // would hold the arm.
@@ -115,7 +115,10 @@ class Cell {
   [[nodiscard]] std::vector<task::Note> take_notes();
 
   // Taken off the belt: perception is told to let go of the track.
-  void forget(std::uint32_t track) { forgotten_.push_back(track); }
+  void taken(const ObjectBelief& object) {
+    if (object.track != 0) forgotten_.push_back(object.track);
+    std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
+  }
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
 
   // Tip pose, tool pointing down, over (x, y, z) with its x axis at `yaw`.

@@ -167,8 +167,9 @@ std::vector<Beside> beside(const Cell& cell, const ObjectBelief& target) {
   for (const ObjectBelief& other : cell.objects()) {
     // What was hardly seen, or is not seen any more, tells nothing by being gone.
     const Vector3 at = other.world_from_top.translation();
-    if (other.track == 0 || other.track == target.track || other.frames_seen < kSeenOften || other.missing > 0)
-      continue;
+    const bool laid = other.track == 0 && !other.code.empty() && other.code != target.code;
+    if (!laid && (other.track == 0 || other.track == target.track || other.frames_seen < kSeenOften)) continue;
+    if (other.missing > 0) continue;
     const Vector3 away_m = at - cell.predict(target, other.stamp);
     const double radius_m = 0.5 * other.size_m.head<2>().norm();
     if (away_m.head<2>().norm() > 0.5 * target.size_m.head<2>().norm() + radius_m + kMayCling_m) continue;

@@ -372,7 +372,7 @@ class Pick final : public ArmSkill {
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
     cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
-    cell_.forget(target_.track);
+    cell_.taken(target_);
     phase_ = Phase::kLift;
     return {};
   }

@@ -94,7 +94,7 @@ TEST(Spells, ComeAsOftenAndLastAsLongAsTheySay) {
   Spells spells(rate, Random(5));
   std::int64_t on_ms = 0;
   constexpr std::int64_t kHours = 200;
-  for (std::int64_t ms = 0; ms < kHours * 3'600'000; ms += 100) on_ms += spells.on(Time(from_s(1e-3 * ms))) ? 100 : 0;
+  for (std::int64_t ms = 0; ms < kHours * 3'600'000; ms += 100) on_ms += spells.on(Time(std::chrono::milliseconds(ms))) ? 100 : 0;
   // A minute's wait and four seconds' spell after one another.
   EXPECT_NEAR(static_cast<double>(spells.begun()), kHours * 3600 / 64.0, 400);
   EXPECT_NEAR(1e-3 * static_cast<double>(on_ms) / static_cast<double>(spells.begun()), 4, 0.1);
