@@ -390,11 +390,7 @@ void Tracker::label_doubt(std::uint32_t track, const std::string& one, const std
   if (Track* const found = find(track)) found->two_codes = true;
 }
 
-bool Tracker::doubted(const Track& track) const {
-  const std::string* const pair = pairs_.other(track.code);
-  const auto bears_it = [&](const Track& other) { return !other.forgotten && other.code == *pair; };
-  return track.two_codes || (pair != nullptr && std::ranges::none_of(tracks_, bears_it));
-}
+bool Tracker::doubted(const Track& track) const { return track.two_codes || pairs_.other(track.code) != nullptr; }
 
 bool Tracker::wants_label(std::uint32_t track) const {
   const Track* const found = find(track);

@@ -31,8 +31,7 @@ class Tracker {
   // out to lie beside it.
   void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
   // In one frame both codes were read on that track: two taken for one, or one with two labels. Which of them it is
-  // shows when one is taken away and the other stays as it was; until then each is doubted while the other is on no
-  // track.
+  // shows when one is taken away and the other stays as it was; until then neither is believed.
   void label_doubt(std::uint32_t track, const std::string& one, const std::string& other);
   // False once its code has been read twice; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;

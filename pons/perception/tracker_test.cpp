@@ -236,14 +236,20 @@ TEST(TrackerTest, DoesNotStartOnWhatTheRobotTouchesOrTheBorderCuts) {
   EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).empty());
 }
 
-TEST(TrackerTest, TwoCodesOnOneAreDoubtUntilItIsSeenToBeAnother) {
+TEST(TrackerTest, TwoCodesReadOnOneAreDoubtedUntilOneIsTakenAndTheOtherStays) {
   Bench bench;
-  const std::uint32_t track = bench.update({Bench::sighting(-0.5, 0)}).at(0);
-  bench.read(track, "P1");
+  const auto both = [] { return std::vector{Bench::sighting(-0.5, 0), Bench::sighting(-0.2, 0)}; };
+  const auto ids = bench.update(both());
+  bench.read(ids.at(0), "P1");
   EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
-  bench.tracker.label_doubt(track, "P1", "P2");
+  bench.tracker.label_doubt(ids.at(0), "P1", "P2");
   EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
-  for (int i = 0; i < 6; ++i) bench.update({Bench::sighting(-0.5, 0, 0, {0.12, 0.10, 0.1})});
+  bench.read(ids.at(1), "P2");
+  EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).at(1).two_codes);
+  bench.tracker.forget(ids.at(0));
+  bench.update({Bench::sighting(-0.2, 0)});
+  EXPECT_TRUE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes) << "so soon it may not be lifted yet";
+  for (int i = 0; i < 4; ++i) bench.update({Bench::sighting(-0.2, 0)});
   EXPECT_FALSE(bench.tracker.beliefs(bench.now, 0).at(0).two_codes);
 }
 

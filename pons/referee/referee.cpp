@@ -23,7 +23,8 @@ struct Entry {
   bool succeeded = false;
   bool ride = false;  // let go by on purpose
   std::string last_reason;
-  std::set<std::string> may_be_in;  // places that the last outcome says to look in
+  std::set<std::string> may_be_in;   // places that the last outcome says to look in,
+  std::set<std::string> company_in;  // and those of parcels that it lay beside
 };
 
 // The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
@@ -58,12 +59,25 @@ void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) 
   }
 }
 
+// What lay beside a parcel that was sorted, and perhaps went with it.
+void take_in_company(std::map<std::string, Entry>& entries, const bridge::OutcomeRecord& outcome) {
+  for (const Json& step : outcome.detail.value("steps", Json::array())) {
+    const auto detail = step.find("detail");
+    if (detail == step.end() || !detail->is_object()) continue;
+    const Json company = detail->value("perhaps_with_it", Json::object());
+    for (const auto& [code, places] : company.items()) {
+      for (const Json& place : places) entries[code].company_in.insert(place.get<std::string>());
+    }
+  }
+}
+
 Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
   std::map<std::string, Entry> entries;
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
     for (const std::string& object : objects_of(record.task)) take_in(entries[object], record.outcome);
+    if (record.outcome) take_in_company(entries, *record.outcome);
   }
   const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
@@ -109,7 +123,7 @@ class Judge {
 
  private:
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
-    if (!entry.succeeded && entry.may_be_in.contains(parcel.place)) {
+    if (!entry.succeeded && (entry.may_be_in.contains(parcel.place) || entry.company_in.contains(parcel.place))) {
       ++verdict_.undeserved;
       ++verdict_.astray;
       find(parcel, entry, "astray, where the journal says to look");

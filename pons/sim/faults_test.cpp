@@ -206,8 +206,8 @@ TEST_F(Sights, WhatHidesAPartIsNearAndTheRestIsAsEver) {
     if (hidden->faults()[Fault::kOcclusion] == 0) continue;
     std::size_t near = 0, same = 0;
     for (std::size_t i = 0; i < one.depth_m.size(); ++i) {
-      near += two.depth_m[i] == 0.5F ? 1 : 0;
-      same += two.depth_m[i] == one.depth_m[i] ? 1 : 0;
+      near += two.depth_m[i] == 0.5F ? 1U : 0U;
+      same += two.depth_m[i] == one.depth_m[i] ? 1U : 0U;
     }
     const double share = static_cast<double>(near) / static_cast<double>(one.depth_m.size());
     EXPECT_GT(share, 0.15 * 0.29);

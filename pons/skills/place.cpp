@@ -257,6 +257,9 @@ class Place final : public ArmSkill {
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
     cell_.let_go_into(*cell_.world.place(name_));
+    for (const Beside& other : cell_.held->beside) {
+      if (!other.code.empty()) perhaps_with_it_[other.code] = cell_.where_to_look(other.code).at("may_be_in");
+    }
     let_go_ = cell_.held->code;
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
@@ -329,7 +332,9 @@ class Place final : public ArmSkill {
   // Let go of over its mouth, whether a stop came then or not.
   Progress gone(Time now) {
     cell_.arm.expect_contact(0);
-    return {Status::kSucceeded, {}, {{"place", name_}, {"object", let_go_}, {"seconds", to_s(now - started_)}}};
+    task::Json detail{{"place", name_}, {"object", let_go_}, {"seconds", to_s(now - started_)}};
+    if (!perhaps_with_it_.empty()) detail["perhaps_with_it"] = perhaps_with_it_;
+    return {Status::kSucceeded, {}, std::move(detail)};
   }
 
   Progress late(Time now) {
@@ -351,6 +356,7 @@ class Place final : public ArmSkill {
   world::Entry entry_;
   std::optional<SetDown> set_down_;
   std::string why_;
+  task::Json perhaps_with_it_;  // what lay beside it and was not seen since: where to look for each, by its code
   Time noticed_;
   bool sets_down_ = false;
   bool cancelled_ = false;
