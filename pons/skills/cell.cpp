@@ -124,10 +124,6 @@ void Cell::look_beside() {
       return false;
     }
     came_along_ = other.name;
-    // Both are one load now, as far as ways for it are concerned.
-    const Vector3 half = 0.5 * held->load.size_m;
-    const double reach_m = other.away_m.head<2>().norm() + other.radius_m;
-    held->load.size_m.head<2>() = (2 * half.head<2>()).cwiseMax(Eigen::Vector2d::Constant(2 * reach_m));
     return true;
   });
 }
