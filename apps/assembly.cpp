@@ -83,8 +83,9 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   if (!model) return std::unexpected(model.error());
   const cerebellum::Settings settings = settings_of(world);
   if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
-  auto simulation = sim::Simulation::create(world, manifest, setup.seed);
+  auto simulation = sim::Simulation::create(world, manifest, setup.seed, setup.faults);
   if (!simulation) return std::unexpected(simulation.error());
+  self->faults = setup.faults;
   self->simulation = std::move(*simulation);
   self->simulation->expect_visits(setup.visits);
   if (setup.arm_at) self->simulation->set_arm(*setup.arm_at);
@@ -214,6 +215,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
                                  {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
+  const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];
+  if (stalls.often > 0)
+    self->above->bridge_side->stall_brain({stalls, world::fault_stream(options.body.seed, world::Fault::kBrainStall)});
   return self;
 }
 

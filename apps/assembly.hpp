@@ -30,6 +30,7 @@
 #include "pons/skills/rest.hpp"
 #include "pons/skills/skills.hpp"
 #include "pons/skills/take_up.hpp"
+#include "pons/world/faults.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
 
@@ -49,6 +50,7 @@ struct BodySetup {
   std::uint64_t seed = 1;
   std::vector<sim::Visit> visits;    // who comes into which zone
   std::optional<AxisVector> arm_at;  // where the arm is found; at home without it
+  world::FaultPlan faults;           // what goes wrong
 };
 
 // Members stand in the order in which they need each other.
@@ -61,6 +63,7 @@ class BodyHalf {
                                                                  const BodySetup& setup, const Meeting& meeting);
   [[nodiscard]] runner::BodyParts parts();
 
+  world::FaultPlan faults;
   std::unique_ptr<sim::Simulation> simulation;
   link::CerebellumEnd end;
   std::unique_ptr<cerebellum::Cerebellum> cerebellum;

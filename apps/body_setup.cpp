@@ -64,10 +64,15 @@ void add_body_setup_options(CLI::App& command, BodySetupOptions& options) {
   command.add_option("--visit", options.visits,
                      "ZONE@FROM+FOR: somebody is in that zone from then on, for so long (s)");
   command.add_option("--arm-at", options.arm_at, "Where the arm is found: an angle an axis, rad, with commas (home)");
+  command.add_option("--faults", options.faults,
+                     "What goes wrong: a plan in the world's folder faults, or a file (none)");
 }
 
 Expected<BodySetup> body_setup(const BodySetupOptions& options, std::uint64_t seed, const world::World& world) {
   BodySetup setup{.seed = seed};
+  auto faults = world::load_faults(world, options.faults);
+  if (!faults) return std::unexpected(faults.error());
+  setup.faults = std::move(*faults);
   for (const std::string& text : options.visits) {
     const auto visit = visit_of(text, world);
     if (!visit) return std::unexpected(visit.error());

@@ -1,5 +1,5 @@
 // What a person says of a simulated body beside its parcels: who comes into which zone when, and where the arm is
-// found.
+// found, and what goes wrong.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -16,10 +16,11 @@ namespace pons::apps {
 struct BodySetupOptions {
   std::vector<std::string> visits;  // ZONE@FROM+FOR, both in seconds
   std::string arm_at;               // Q1,Q2,…, one number an axis, rad; empty: at home
+  std::string faults = "none";      // a plan of the world's, or a file
 };
 void add_body_setup_options(CLI::App& command, BodySetupOptions& options);
 
-// Errors: another form, no such zone in this world, another number of axes.
+// Errors: another form, no such zone in this world, another number of axes, no such plan of faults or a bad one.
 [[nodiscard]] Expected<BodySetup> body_setup(const BodySetupOptions& options, std::uint64_t seed,
                                              const world::World& world);
 

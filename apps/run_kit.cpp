@@ -54,6 +54,17 @@ std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) 
   return digest.value();
 }
 
+// Of those that the plan has.
+std::vector<std::pair<std::string, std::int64_t>> injected(const BodyHalf& body, const RunFigures& figures) {
+  std::vector<std::pair<std::string, std::int64_t>> faults;
+  world::FaultCounts counts = body.simulation->faults();
+  counts[world::Fault::kBrainStall] = figures.brain_stalls;
+  for (std::size_t i = 0; i < world::kFaults; ++i) {
+    if (body.faults.rates[i].often > 0) faults.emplace_back(world::name(static_cast<world::Fault>(i)), counts.of[i]);
+  }
+  return faults;
+}
+
 const CLI::Validator not_empty([](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
 
 // The parser's own conversion clamps what does not fit.
@@ -219,6 +230,8 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   }
   report.throughput = record::throughput(to_s(figures.last_outcome - first), verdict->sorted);
   report.retries = figures.retries;
+  report.fault_plan = body.faults.name;
+  report.faults = injected(body, figures);
   const cerebellum::Statistics& loop = body.cerebellum->statistics();
   report.limits = {.violations = static_cast<std::int64_t>(verdict->violations + loop.violations),
                    .worst_ratio = std::max({verdict->worst_ratio, loop.commanded.speed, loop.commanded.acceleration,

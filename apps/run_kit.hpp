@@ -108,6 +108,7 @@ struct RunFigures {
   Time last_outcome;  // of a task that the brain asked for
   std::int64_t retries = 0;
   double wall_s = 0;
+  std::int64_t brain_stalls = 0;
 };
 
 struct Reckoning {

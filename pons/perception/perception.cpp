@@ -42,6 +42,7 @@ struct Perception::Impl {
   std::map<std::string, TrayWatch, std::less<>> watches;  // by place
   std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
   std::vector<ObjectBelief> cut;                          // relative to the belt
+  bool sees_belt = true;
 
   Impl(const world::World& the_world, model::RobotModel model, Both the_both)
       : world(the_world), both(std::move(the_both)), self_filter(std::move(model)), tracker(the_world) {
@@ -95,6 +96,7 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   }
   const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
   const TopView& view = viewer->second.build(frame, robot);
+  sees_belt = view.clear;
   const Segments& segments =
       segmenter.segment(view, marks(view, moment.belt_travel_m), known(view, frame.stamp, moment.belt_travel_m));
   const std::vector<Sighting> sightings = measure(view, segments);
@@ -187,6 +189,8 @@ std::vector<ObjectBelief> Perception::cut(Time now, double belt_travel_m) const 
   }
   return beliefs;
 }
+
+bool Perception::sees_belt() const { return impl_->sees_belt; }
 
 bool Perception::wants_labels() const { return impl_->tracker.wants_labels(); }
 

@@ -35,6 +35,10 @@ class Perception final : public Sight {
   // the robot touches in the picture, for that may be what it carries.
   [[nodiscard]] std::vector<ObjectBelief> cut(Time now, double belt_travel_m) const override;
 
+  // Whether the newest frame of the belt showed all of it that the camera watches, but for what the robot hides: not a
+  // black one, and nothing hung before the camera.
+  [[nodiscard]] bool sees_belt() const;
+
   // Whether a frame of a camera that reads labels could teach anything: the newest frame showed something whole and
   // bare whose code was read less than twice, in fewer than ten attempts, or that seems too large for one parcel.
   [[nodiscard]] bool wants_labels() const override;

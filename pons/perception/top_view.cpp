@@ -12,6 +12,9 @@ namespace {
 constexpr double kOverhang_m =
     0.06;                           // how far a parcel may stick out over the belt's sides and still be measured whole
 constexpr double kTallest_m = 0.6;  // above the belt; what is higher does not lie on it
+constexpr float kTooHigh_m = 0.8F;  // nothing that rides or is carried gets there
+constexpr double kUnread =
+    0.35;  // of a tile: far more than noise and edges cost, or the foot of an arm that hangs in view
 constexpr double kFinestCell_m = 0.0025;
 constexpr double kBare_m = 0.006;       // lower readings are of the belt
 constexpr int kSameSurface = 80;        // 8 mm: readings of one cell that far below its highest are of what lies behind
@@ -110,7 +113,7 @@ void TopViewer::project(const RgbdFrame& frame, int row, Strip& strip) const {
     const float y = from_y + depth[i] * (shared.y() + u * along.y()) * inverse_cell;
     const float z = from_z + depth[i] * (shared.z() + u * along.z());
     const bool outside =
-        (depth[i] <= 0) | (x < 0) | (y < 0) | (x >= limit_x) | (y >= limit_y) | (z <= -0.4F) | (z >= 3.0F);
+        (depth[i] <= 0) | (x < 0) | (y < 0) | (x >= limit_x) | (y >= limit_y) | (z <= -0.4F) | (z >= kTooHigh_m);
     const int column_of = static_cast<int>(std::min(std::max(x, 0.0F), limit_x));
     const int row_of = static_cast<int>(std::min(std::max(y, 0.0F), limit_y));
     cell[i] = outside ? -1 : row_of * columns + column_of;
@@ -124,12 +127,28 @@ void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to, Strip& st
   auto* const flags = strip.flags.ptr<std::uint8_t>();
   for (int column = from; column < to; ++column) {
     int& cell = strip.cell_row[static_cast<std::size_t>(column - window_.x)];
-    if (seen[column] == 0 || cell < 0) continue;
-    if (seen[column] == SelfFilter::kRobot) {
-      cell = -1;
-    } else {
+    if (seen[column] == 0) continue;
+    if (seen[column] != SelfFilter::kRobot && cell >= 0) {
       flags[cell] |= TopView::kNearRobot;
+      continue;
     }
+    cell = -1;
+    // That the robot hides what is below is no fault of the camera's.
+    strip.height_row[static_cast<std::size_t>(column - window_.x)] = TopView::kLevel;
+  }
+}
+
+// No reading has the camera's own height.
+void TopViewer::count_readings(Strip& strip) const {
+  const int tile = std::max(1, window_.width / static_cast<int>(kTiles));
+  constexpr int kTooHigh = TopView::kLevel + static_cast<int>(kTooHigh_m * 1e4F);
+  const int* const height = strip.height_row.data();
+  for (std::size_t t = 0; t < kTiles; ++t) {
+    const int from = static_cast<int>(t) * tile, to = std::min(from + tile, window_.width);
+    int unread = 0;
+    for (int i = from; i < to; ++i) unread += height[i] >= kTooHigh ? 1 : 0;
+    strip.unread[t] += unread;
+    strip.read[t] += std::max(0, to - from) - unread;
   }
 }
 
@@ -137,12 +156,14 @@ void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to, Strip& st
 // matters. The robot is within `near`.
 void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const {
   strip.highest.setTo(0), strip.flags.setTo(0);
+  strip.read.fill(0), strip.unread.fill(0);
   auto* const highest = strip.highest.ptr<std::uint16_t>();
   const std::uint16_t bare = TopView::steps(kBare_m);
   std::size_t count = 0;
   for (int row = strip.begin; row < strip.end; ++row) {
     project(frame, row, strip);
     if (row >= near.y && row < near.br().y) drop_robot(robot.ptr<std::uint8_t>(row), near.x, near.br().x, strip);
+    count_readings(strip);
     for (int i = 0; i < window_.width; ++i) {
       const int cell = strip.cell_row[static_cast<std::size_t>(i)];
       if (cell < 0) continue;
@@ -233,6 +254,13 @@ const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) 
   const cv::Rect near = cv::boundingRect(robot) & window_;
   auto& [first, second] = strips_;
   both_([&] { find_highest(frame, robot, near, first); }, [&] { find_highest(frame, robot, near, second); });
+  const auto is_read = [](const Strip& strip) {
+    const auto hidden = [&](std::size_t t) { return strip.unread[t] > kUnread * (strip.read[t] + strip.unread[t]); };
+    std::size_t t = 0;
+    while (t < kTiles && !hidden(t)) ++t;
+    return t == kTiles;
+  };
+  view_.clear = is_read(first) && is_read(second);
   const cv::_InputArray one(first.highest);  // else std::max is meant
   cv::max(one, second.highest, highest_);
   both_([&] { accumulate(frame, first); }, [&] { accumulate(frame, second); });

@@ -31,6 +31,8 @@ struct TopView {
   cv::Mat3b colour;                    // red, green, blue; black where nothing stands on the belt
   cv::Mat1b flags;
 
+  bool clear = true;  // no part of the window is without readings but where the robot hides it
+
   [[nodiscard]] static double metres(std::uint16_t height) { return 1e-4 * (height - kLevel); }
   [[nodiscard]] static std::uint16_t steps(double height_m) {
     return static_cast<std::uint16_t>(kLevel + static_cast<int>(height_m * 1e4));
@@ -65,6 +67,8 @@ class TopViewer {
     std::int16_t column = 0, row = 0;  // sample
     std::uint16_t height = 0;
   };
+  // What hangs before the camera, or a camera without light, leaves whole tiles of the window without readings.
+  static constexpr std::size_t kTiles = 16;
   // Some rows of samples, and the map as they alone would make it.
   struct Strip {
     int begin = 0, end = 0;
@@ -74,6 +78,7 @@ class TopViewer {
     std::vector<Reading> raised;  // above bare belt; the first raised_count
     std::size_t raised_count = 0;
     cv::Mat1w highest;
+    std::array<int, kTiles> read{}, unread{};  // samples, by tile along the belt
     cv::Mat1i sum, count;
     cv::Mat3b colour;
     cv::Mat1b flags;
@@ -81,6 +86,7 @@ class TopViewer {
 
   void project(const RgbdFrame& frame, int row, Strip& strip) const;
   void drop_robot(const std::uint8_t* seen, int from, int to, Strip& strip) const;
+  void count_readings(Strip& strip) const;
   void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const;
   void accumulate(const RgbdFrame& frame, Strip& strip) const;
   // Of the map's rows from `begin` to `end`:

@@ -18,6 +18,13 @@ using Json = nlohmann::ordered_json;
 
 [[nodiscard]] std::string hex(std::uint64_t value) { return fmt::format("{:016x}", value); }
 
+[[nodiscard]] std::string faults_text(const Report& report) {
+  std::string text = report.fault_plan;
+  for (const auto& [fault, times] : report.faults)
+    text += fmt::format("{} {} {}", &fault == &report.faults.front().first ? ":" : ",", times, fault);
+  return text;
+}
+
 }  // namespace
 
 Report::Throughput throughput(double span_s, std::int64_t sorted) {
@@ -66,6 +73,8 @@ nlohmann::ordered_json to_json(const Report& report) {
   else
     put_parcels(json, report);
   json["retries"] = report.retries;
+  json["faults"] = Json::object();
+  for (const auto& [fault, times] : report.faults) json["faults"][fault] = times;
   json["limits"] = {{"violations", report.limits.violations},
                     {"worst_ratio", number(report.limits.worst_ratio)},
                     {"saturated", report.limits.saturated}};
@@ -105,6 +114,7 @@ void tell_parcels(const Line& line, const Report& report) {
   line("duplicated", fmt::format("{}", parcels.duplicated));
   line("damaged", fmt::format("{}", parcels.damaged));
   line("retries", fmt::format("{}", report.retries));
+  if (report.fault_plan != "none") line("faults", faults_text(report));
   line("throughput", std::isfinite(report.throughput.seconds_per_parcel)
                          ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",
                                        report.throughput.seconds_per_parcel, report.throughput.parcels_per_hour)

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "pons/core/error.hpp"
 
@@ -76,6 +78,8 @@ struct Report {
   Throughput throughput{};
   std::optional<Rounds> rounds{};  // of a world with a base, instead of parcels and throughput
   std::int64_t retries = 0;
+  std::string fault_plan = "none";  // what was injected on purpose; of each fault of the plan, how often
+  std::vector<std::pair<std::string, std::int64_t>> faults{};
   Limits limits{};
   Loop loop{};
   Bridge bridge{};

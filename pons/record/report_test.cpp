@@ -30,6 +30,8 @@ using Json = nlohmann::ordered_json;
                       .damaged = 6},
           .throughput = throughput(570, 190),
           .retries = 7,
+          .fault_plan = "robin",
+          .faults = {{"missed_grasp", 3}},
           .limits = {.violations = 0, .worst_ratio = 0.985, .saturated = 12},
           .loop = {.ticks = 600000,
                    .missed = 0,
@@ -68,6 +70,7 @@ TEST(Report, KeepsEveryFigure) {
     "parcels": {"offered": 200, "sorted": 190, "missorted": 1, "lost": 2, "duplicated": 3,
                 "exceptions": {"deserved": 4, "undeserved": 5}, "damaged": 6},
     "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
+    "faults": {"missed_grasp": 3},
     "limits": {"violations": 0, "worst_ratio": 0.985, "saturated": 12},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,
              "late_p50_us": 14.0, "late_p99_us": 60.0, "late_max_us": 880.0, "degraded": "SCHED_FIFO refused"},
@@ -94,7 +97,8 @@ TEST(Report, WritesWhatItSays) {
 
 TEST(Report, SummaryIsAligned) {
   const std::string text = summary(example());
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 16);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 17);
+  EXPECT_THAT(text, HasSubstr("  faults        robin: 3 missed_grasp\n"));
   EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
   EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));
   EXPECT_THAT(text, HasSubstr("  begins late   14 µs median, 60 µs p99, 880 µs at worst\n"));

@@ -14,6 +14,9 @@ using bridge::Json;
 
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
+constexpr Duration kBrainSilent = std::chrono::milliseconds(300);
+// Frames come four times a second and later by what it takes to see what they show.
+constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
@@ -57,8 +60,11 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
   if (auto good = arming_.tick(now); !good) return good;
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
+  // What nobody sees must not ride by unread, nor into the arm.
+  const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
   // What stands beside an arm that is being brought out must not be pushed against it.
-  skills_.belt(belt_waits || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits : link::Belt::kRuns);
+  skills_.belt(belt_waits || blind || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits
+                                                                                   : link::Belt::kRuns);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
@@ -101,6 +107,9 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
+  // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
+  if (stalls_ && stalls_->on(now)) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
+  brain_heard_ = now;
   const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
@@ -115,6 +124,7 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now, ride.code);
   }
+  brain_holds_belt_ = decisions.belt_waits;
   return decisions.belt_waits;
 }
 

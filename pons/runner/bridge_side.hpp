@@ -15,6 +15,7 @@
 #include "pons/runner/arming.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/runner/skill_port.hpp"
+#include "pons/world/faults.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::runner {
@@ -39,6 +40,10 @@ class BridgeSide {
   // Writes what became of orders that were never identified. Once, at the end of a run.
   void close(Time now);
 
+  // From now on the brain is silent in these spells.
+  void stall_brain(world::Spells stalls) { stalls_ = std::move(stalls); }
+  [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
+
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
   [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const { return arming_.stops(); }
@@ -62,7 +67,9 @@ class BridgeSide {
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   bridge::Json carried_;                  // as last noted
-  Time last_outcome_;
+  Time last_outcome_, brain_heard_;
+  bool brain_holds_belt_ = false;  // as it last said
+  std::optional<world::Spells> stalls_;
   std::int64_t unlabelled_ = 0;
   bool stopping_ = false;
 };

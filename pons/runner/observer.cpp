@@ -1,5 +1,6 @@
 #include "pons/runner/observer.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace pons::runner {
@@ -25,6 +26,10 @@ Observer::Observer(const world::World& world, perception::Sight& perception, lin
 Observer::~Observer() {
   perceiver_.request_stop();
   places_.handed_over().bump();
+}
+
+bool Observer::watches_belt() const {
+  return std::ranges::any_of(world_.cameras, [](const world::CameraSpec& camera) { return camera.watches == "belt"; });
 }
 
 Duration Observer::latency(std::size_t camera) const { return from_s(world_.cameras[camera].latency_s); }
@@ -59,9 +64,13 @@ Snapshot Observer::take_in(std::size_t camera) {
   RgbdFrame& frame = frames_[camera];
   frame.stamp = shot.stamp;
   perception_.process(frame, {shot.joint_position, shot.belt_travel_m});
-  if (world_.cameras[camera].watches == "belt") belt_seen_ = shot.stamp;
+  if (world_.cameras[camera].watches == "belt") {
+    belt_seen_ = shot.stamp;
+    if (perception_.sees_belt()) belt_clear_ = shot.stamp;
+  }
   Snapshot snapshot{shot.stamp,
                     belt_seen_,
+                    belt_clear_,
                     shot.stamp + latency(camera),
                     shot.belt_travel_m,
                     perception_.beliefs(shot.stamp, shot.belt_travel_m),

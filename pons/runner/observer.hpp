@@ -24,7 +24,8 @@ namespace pons::runner {
 // What perception believed once a frame was taken in.
 struct Snapshot {
   Time stamp;                              // of the frame
-  Time belt_seen;                          // stamp of the newest frame of the belt so far
+  Time belt_seen;                          // stamp of the newest frame of the belt so far,
+  Time belt_clear;                         // and of the newest that showed all of it
   Time due;                                // stamp plus the camera's latency
   double belt_travel_m = 0;                // at the stamp
   std::vector<ObjectBelief> objects, cut;  // Perception::beliefs(), cut()
@@ -47,6 +48,9 @@ class Observer {
   // tracks before the next frame that is taken after `now`.
   [[nodiscard]] std::optional<Snapshot> collect(Time now, const std::vector<std::uint32_t>& forgotten);
 
+  // Whether any camera watches the belt.
+  [[nodiscard]] bool watches_belt() const;
+
  private:
   void perceive(const std::stop_token& stop);
   [[nodiscard]] Snapshot take_in(std::size_t camera);
@@ -58,7 +62,7 @@ class Observer {
   link::Frames& places_;
   Pace pace_;
   std::vector<RgbdFrame> frames_;  // a camera; the perceiver's only,
-  Time belt_seen_;                 // and so is this
+  Time belt_seen_, belt_clear_;    // and so are these
 
   std::mutex mutex_;
   std::deque<Snapshot> snapshots_;                        // taken in, by stamp

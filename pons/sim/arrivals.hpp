@@ -22,6 +22,7 @@ struct Arrival {
   bool touching = false;
   LabelState label = LabelState::kReadable;
   std::string label_text;
+  std::string second_text;               // of a second label beside it; empty: it has none
   std::array<double, 2> label_offset{};  // -1 … 1 of the room on the top face
   int label_turn = 0;                    // quarter turns
   std::array<float, 3> color{};

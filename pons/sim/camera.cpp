@@ -13,6 +13,8 @@ namespace {
 constexpr float kEdge_m = 0.012f;    // neighbours further apart in depth make an edge
 constexpr double kEdgeDropout = 25;  // times the usual share there
 constexpr double kMostEdgeDropout = 0.5;
+constexpr float kBefore_m = 0.5F;  // so far before the camera hangs what covers its view
+constexpr std::uint8_t kGrey = 110;
 
 // The finalizer of SplitMix64.
 inline std::uint64_t mix(std::uint64_t z) {
@@ -64,7 +66,7 @@ struct Chance {
 
 Expected<std::unique_ptr<SimCamera>> SimCamera::create(const world::CameraSpec& spec, const mjModel* model,
                                                        mjData* data, int camera_id, const LabelStore* labels,
-                                                       std::uint64_t seed) {
+                                                       std::uint64_t seed, Faults* faults) {
   auto renderer = Renderer::create(model, spec.width, spec.height, Look::kSensor);
   if (!renderer) return std::unexpected(renderer.error());
   std::unique_ptr<SimCamera> camera(new SimCamera);
@@ -74,6 +76,7 @@ Expected<std::unique_ptr<SimCamera>> SimCamera::create(const world::CameraSpec& 
   camera->data_ = data;
   camera->camera_id_ = camera_id;
   camera->labels_ = labels;
+  camera->faults_ = faults;
   camera->seed_ = Random(seed).fork(static_cast<std::uint64_t>(camera_id)).next();
   camera->renderer_ = std::move(*renderer);
   return camera;
@@ -82,7 +85,12 @@ Expected<std::unique_ptr<SimCamera>> SimCamera::create(const world::CameraSpec& 
 void SimCamera::begin(Time now) {
   stamp_ = now;
   open_ = true;
+  if (faults_ != nullptr) sight_ = faults_->sight(now);
+  Eigen::Map<Vector3> stands(data_->cam_xpos + 3 * camera_id_);
+  const Vector3 believed = stands;
+  stands += sight_.shift_m;
   renderer_->capture(model_, data_, camera_id_, *labels_);
+  stands = believed;
 }
 
 Expected<void> SimCamera::finish(RgbdFrame& frame) {
@@ -100,7 +108,26 @@ Expected<void> SimCamera::finish(RgbdFrame& frame) {
     std::memcpy(frame.rgb.data() + row * row_bytes, rgb_.data() + (rows - 1 - row) * row_bytes, row_bytes);
   }
   measure_depth(frame.depth_m);
+  spoil(frame);
   return {};
+}
+
+// What hangs before the camera is near, grey and without any pattern.
+void SimCamera::spoil(RgbdFrame& frame) const {
+  if (sight_.black) {
+    std::fill_n(frame.rgb.data(), frame.rgb.size(), std::uint8_t{0});
+    std::fill_n(frame.depth_m.data(), frame.depth_m.size(), 0.0F);
+    return;
+  }
+  if (!sight_.hidden) return;
+  const auto pixel = [](double share, int count) { return static_cast<std::size_t>(share * count); };
+  const std::size_t left = pixel(sight_.hidden->left, spec_.width), right = pixel(sight_.hidden->right, spec_.width);
+  const auto width = static_cast<std::size_t>(spec_.width);
+  for (std::size_t row = pixel(sight_.hidden->top, spec_.height); row < pixel(sight_.hidden->bottom, spec_.height);
+       ++row) {
+    std::fill_n(frame.depth_m.data() + row * width + left, right - left, kBefore_m);
+    std::fill_n(frame.rgb.data() + 3 * (row * width + left), 3 * (right - left), kGrey);
+  }
 }
 
 void SimCamera::measure_depth(PixelArray<float>& depth_m) const {

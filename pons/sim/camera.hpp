@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pons/body/body.hpp"
+#include "pons/sim/faults.hpp"
 #include "pons/sim/renderer.hpp"
 #include "pons/world/world.hpp"
 
@@ -17,7 +18,8 @@ class SimCamera final : public body::Camera {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<SimCamera>> create(const world::CameraSpec& spec, const mjModel* model,
                                                                    mjData* data, int camera_id,
-                                                                   const LabelStore* labels, std::uint64_t seed);
+                                                                   const LabelStore* labels, std::uint64_t seed,
+                                                                   Faults* faults = nullptr);
 
   [[nodiscard]] const Intrinsics& intrinsics() const override { return intrinsics_; }
   void begin(Time now) override;
@@ -26,6 +28,7 @@ class SimCamera final : public body::Camera {
  private:
   SimCamera() = default;
   void measure_depth(PixelArray<float>& depth_m) const;
+  void spoil(RgbdFrame& frame) const;
 
   world::CameraSpec spec_;
   Intrinsics intrinsics_;
@@ -35,6 +38,8 @@ class SimCamera final : public body::Camera {
   const LabelStore* labels_ = nullptr;
   std::uint64_t seed_ = 0;
   std::unique_ptr<Renderer> renderer_;
+  Faults* faults_ = nullptr;  // that come over it; none: null
+  Sight sight_;               // of the open shutter
   Time stamp_;
   bool open_ = false;
   std::vector<std::uint8_t> rgb_;  // bottom row first

@@ -10,6 +10,7 @@
 #include "pons/sim/bus.hpp"
 #include "pons/sim/camera.hpp"
 #include "pons/sim/compose.hpp"
+#include "pons/sim/faults.hpp"
 #include "pons/sim/feeder.hpp"
 #include "pons/sim/gripper.hpp"
 #include "pons/sim/ledger.hpp"
@@ -32,7 +33,8 @@ class SimBody final : public body::Body {
 };
 
 struct Cell {
-  Cell(const world::World& world, const world::Manifest& manifest, Composed composed, std::uint64_t seed);
+  Cell(const world::World& world, const world::Manifest& manifest, Composed composed, std::uint64_t seed,
+       const world::FaultPlan& plan = {});
 
   // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
   void step();
@@ -42,6 +44,7 @@ struct Cell {
   world::World world;
   Composed composed;
   DataPtr data;
+  Faults faults;
   std::vector<Arrival> arrivals;
   BeltDrive belt;
   Gripper gripper;

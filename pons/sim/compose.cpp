@@ -108,7 +108,26 @@ mjsGeom* add_parcel_geom(mjsBody* body, const std::string& name, mjtGeom type, i
   return geom;
 }
 
-void add_slot(mjSpec* scene, int index) {
+// A square that shows a texture of its own: what is printed on it changes from parcel to parcel.
+void add_label(mjSpec* scene, mjsBody* body, const std::string& label) {
+  mjsTexture* texture = mjs_addTexture(scene, nullptr);
+  mjs_setName(texture->element, label.c_str());
+  texture->type = mjTEXTURE_2D;
+  texture->builtin = mjBUILTIN_FLAT;
+  for (double& channel : texture->rgb1) channel = 1;
+  texture->width = texture->height = kLabelPixels;
+  texture->nchannel = 3;
+  mjsMaterial* material = mjs_addMaterial(scene, nullptr);
+  mjs_setName(material->element, label.c_str());
+  mjs_setInStringVec(material->textures, mjTEXROLE_RGB, label.c_str());
+  material->specular = 0;
+  material->shininess = 0;
+  mjs_setString(add_parcel_geom(body, label, mjGEOM_BOX, 0)->material, label.c_str());
+}
+
+enum class Labels : std::uint8_t { kOne, kTwo };
+
+void add_slot(mjSpec* scene, int index, Labels labels) {
   mjsBody* body = mjs_addBody(mjs_findBody(scene, "world"), nullptr);
   const std::string name = fmt::format("parcel_{}", index);
   mjs_setName(body->element, name.c_str());
@@ -124,23 +143,21 @@ void add_slot(mjSpec* scene, int index) {
   body->sleep = mjSLEEP_ALLOWED;
   mjs_addFreeJoint(body);
 
-  mjsTexture* texture = mjs_addTexture(scene, nullptr);
-  mjs_setName(texture->element, (name + "_label").c_str());
-  texture->type = mjTEXTURE_2D;
-  texture->builtin = mjBUILTIN_FLAT;
-  for (double& channel : texture->rgb1) channel = 1;
-  texture->width = texture->height = kLabelPixels;
-  texture->nchannel = 3;
-  mjsMaterial* material = mjs_addMaterial(scene, nullptr);
-  mjs_setName(material->element, (name + "_label").c_str());
-  mjs_setInStringVec(material->textures, mjTEXROLE_RGB, (name + "_label").c_str());
-  material->specular = 0;
-  material->shininess = 0;
-
   add_parcel_geom(body, name + "_main", mjGEOM_BOX, 2);
   add_parcel_geom(body, name + "_rim", mjGEOM_BOX, 2);
-  mjsGeom* label = add_parcel_geom(body, name + "_label", mjGEOM_BOX, 0);
-  mjs_setString(label->material, (name + "_label").c_str());
+  add_label(scene, body, name + "_label");
+  if (labels == Labels::kTwo) add_label(scene, body, name + "_second_label");
+}
+
+// Between which two, and how they lie to each other, is written when two cling.
+void add_cling(mjSpec* scene) {
+  mjsEquality* weld = mjs_addEquality(scene, nullptr);
+  mjs_setName(weld->element, "cling");
+  weld->type = mjEQ_WELD;
+  weld->objtype = mjOBJ_BODY;
+  weld->active = 0;
+  mjs_setString(weld->name1, "parcel_0");
+  mjs_setString(weld->name2, "parcel_1");
 }
 
 void add_cameras(mjSpec* scene, const world::World& world) {
@@ -210,6 +227,8 @@ void find_slots(Composed& cell) {
     slot.rim = mj_name2id(model, mjOBJ_GEOM, (name + "_rim").c_str());
     slot.label = mj_name2id(model, mjOBJ_GEOM, (name + "_label").c_str());
     slot.texture = mj_name2id(model, mjOBJ_TEXTURE, (name + "_label").c_str());
+    slot.second_label = mj_name2id(model, mjOBJ_GEOM, (name + "_second_label").c_str());
+    slot.second_texture = mj_name2id(model, mjOBJ_TEXTURE, (name + "_second_label").c_str());
     cell.slots.push_back(slot);
   }
 }
@@ -225,7 +244,8 @@ void classify(Composed& cell) {
   cell.parts[static_cast<std::size_t>(cell.belt_geom)] = Part::kBelt;
   for (int i = 0; i < kSlots; ++i) {
     const Slot& slot = cell.slots[static_cast<std::size_t>(i)];
-    for (const int geom : {slot.main, slot.rim, slot.label}) {
+    for (const int geom : {slot.main, slot.rim, slot.label, slot.second_label}) {
+      if (geom < 0) continue;
       cell.parts[static_cast<std::size_t>(geom)] = Part::kParcel;
       cell.slot_of_geom[static_cast<std::size_t>(geom)] = i;
     }
@@ -250,6 +270,7 @@ Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
   find_arm(cell);
   if (auto found = find_tool(cell, world); !found) return std::unexpected(found.error());
   find_slots(cell);
+  cell.cling = mj_name2id(model, mjOBJ_EQUALITY, "cling");
   classify(cell);
   if (auto good = check_scene(cell, world); !good) return std::unexpected(good.error());
   return cell;
@@ -257,7 +278,7 @@ Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
 
 }  // namespace
 
-Expected<Composed> compose(const world::World& world) {
+Expected<Composed> compose(const world::World& world, const world::FaultPlan& faults) {
   install_message_handler();
   try {
     auto scene = parse(world.scene_mjcf);
@@ -270,7 +291,9 @@ Expected<Composed> compose(const world::World& world) {
     if (auto added = add_robot(scene->get(), arm->get(), tool->get(), world); !added) {
       return std::unexpected(added.error());
     }
-    for (int i = 0; i < kSlots; ++i) add_slot(scene->get(), i);
+    const Labels labels = faults[world::Fault::kDoubleLabel].often > 0 ? Labels::kTwo : Labels::kOne;
+    for (int i = 0; i < kSlots; ++i) add_slot(scene->get(), i, labels);
+    if (faults[world::Fault::kDoublePick].often > 0) add_cling(scene->get());
     add_cameras(scene->get(), world);
     return compile_and_find(scene->get(), world);
   } catch (const std::exception& error) {

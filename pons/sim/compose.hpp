@@ -7,6 +7,7 @@
 
 #include "pons/core/error.hpp"
 #include "pons/sim/mujoco_kit.hpp"
+#include "pons/world/faults.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::sim {
@@ -20,8 +21,8 @@ enum class Part : unsigned char { kFixed, kBelt, kParcel, kArm, kCup };
 // One recycled parcel: a free body with a main shape, a rim (bags) and a label patch.
 struct Slot {
   int body = 0, qpos = 0, dof = 0;
-  int main = 0, rim = 0, label = 0;
-  int texture = 0;
+  int main = 0, rim = 0, label = 0, second_label = -1;  // the last only where a plan has double labels
+  int texture = 0, second_texture = -1;
 };
 
 struct Cup {
@@ -40,8 +41,10 @@ struct Composed {
   std::vector<int> slot_of_geom;  // -1 when it is no parcel
   std::vector<int> cameras;       // ids in the order of world.cameras
   int picture_camera = 0;
+  int cling = -1;  // an equality between two parcels, off; only where a plan has double picks
 };
 
-[[nodiscard]] Expected<Composed> compose(const world::World& world);
+// With what the faults need beside the world's parts, and nothing else.
+[[nodiscard]] Expected<Composed> compose(const world::World& world, const world::FaultPlan& faults = {});
 
 }  // namespace pons::sim

@@ -131,6 +131,11 @@ void Feeder::put_down(const Composed& cell, mjModel* model, mjData* data, Ledger
     label.pixels = draw_label(arrival.label_text);
     if (arrival.label == LabelState::kDamaged) spoil_label(label.pixels, Random(next_).fork(kSpoilStream));
     ++label.version;
+    if (!arrival.second_text.empty()) {
+      LabelStore::Entry& second = labels.entries[static_cast<std::size_t>(kSlots + free)];
+      second.pixels = draw_label(arrival.second_text);
+      ++second.version;
+    }
     ledger.offered(next_, free, now);
   }
 }

@@ -6,7 +6,7 @@
 namespace pons::sim {
 namespace {
 
-constexpr double kSealed_kpa = 60, kOpen_kpa = 8, kHolding_kpa = 20;
+constexpr double kFull_kpa = 60, kOpen_kpa = 8, kHolding_kpa = 20;
 constexpr double kOn_s = 0.020, kOff_s = 0.012;
 constexpr double kTouch_m = 0.001;
 constexpr double kFacing = 0.77;  // cosine of 40 degrees: a lip that meets an edge leaks
@@ -22,8 +22,10 @@ bool is_cup(const Composed& cell, int geom) { return cell.parts[static_cast<std:
 
 }  // namespace
 
-void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, double step_s) {
+void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, const Suction& suction,
+                     double step_s) {
   count_ = cell.cups.size();
+  touched_ = -1;
   for (std::size_t i = 0; i < count_; ++i) cups_[i].slot = -1;
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
@@ -33,16 +35,18 @@ void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on
       const int slot = cell.slot_of_geom[static_cast<std::size_t>(contact.geom[1 - side])];
       const double* axes = data->geom_xmat + 9 * contact.geom[side];
       const double facing = contact.frame[0] * axes[2] + contact.frame[1] * axes[5] + contact.frame[2] * axes[8];
-      if (slot >= 0 && std::abs(facing) > kFacing) cups_[cup_of(cell, contact.geom[side])].slot = slot;
+      if (slot < 0 || std::abs(facing) <= kFacing) continue;
+      touched_ = slot;
+      if (suction.seals) cups_[cup_of(cell, contact.geom[side])].slot = slot;
     }
   }
   for (std::size_t i = 0; i < count_; ++i) {
     Cup& cup = cups_[i];
     const bool on = ((vacuum_on >> i) & 1U) != 0;
-    const double target = !on ? 0 : (cup.slot >= 0 ? kSealed_kpa : kOpen_kpa);
+    const double target = !on ? 0 : (cup.slot >= 0 ? suction.sealed_kpa : kOpen_kpa);
     const double rate = target > cup.pressure_kpa ? kOn_s : kOff_s;
     cup.pressure_kpa += (target - cup.pressure_kpa) * (1 - std::exp(-step_s / rate));
-    data->ctrl[cell.cups[i].actuator] = cup.slot >= 0 ? std::min(1.0, cup.pressure_kpa / kSealed_kpa) : 0;
+    data->ctrl[cell.cups[i].actuator] = cup.slot >= 0 ? std::min(1.0, cup.pressure_kpa / kFull_kpa) : 0;
   }
 }
 

@@ -9,16 +9,24 @@
 
 namespace pons::sim {
 
+// How well the cups seal on what they touch.
+struct Suction {
+  bool seals = true;
+  double sealed_kpa = 60;  // that a sealed cup is evacuated to
+};
+
 // A cup that is switched on and whose lip lies on a parcel, facing it, is evacuated to about 60 kPa with a time
 // constant of 20 ms; an open one draws 8 kPa; switched off, air returns with 12 ms. The adhesion follows the pressure.
 class Gripper {
  public:
   // Before each step; looks at the contacts of the last one.
-  void update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, double step_s);
+  void update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, const Suction& suction, double step_s);
 
   [[nodiscard]] double pressure_kpa(std::size_t cup) const { return cups_[cup].pressure_kpa; }
   // The slot that the cup holds, -1 for none.
   [[nodiscard]] int holds(std::size_t cup) const { return cups_[cup].slot; }
+  // A slot that a lip lies on, facing it, whether it seals there or not; -1 for none.
+  [[nodiscard]] int touched() const { return touched_; }
   // How many cups hold the slot with more than a third of the full vacuum.
   [[nodiscard]] int grip(int slot) const;
   // Adhesion that pulls on each of the cup's contacts in the step just done, N.
@@ -36,6 +44,7 @@ class Gripper {
   };
   std::array<Cup, kMaxCups> cups_{};
   std::size_t count_ = 0;
+  int touched_ = -1;
 };
 
 }  // namespace pons::sim

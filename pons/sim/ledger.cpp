@@ -81,6 +81,8 @@ Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const
     parcel.parcel_id = manifest[i].parcel_id;
     parcel.destination = manifest[i].destination;
     parcel.label = static_cast<LabelTruth>(arrivals[i].label);
+    if (!arrivals[i].second_text.empty() && arrivals[i].second_text != arrivals[i].label_text)
+      parcel.label = LabelTruth::kTwoCodes;
     parcel.touching = arrivals[i].touching;
     parcel.mass_kg = arrivals[i].mass_kg;
     parcel.size_m = manifest[i].size_m;
@@ -309,6 +311,7 @@ bool Ledger::on_belt(int slot) const {
   const Track& track = impl_->tracks[static_cast<std::size_t>(slot)];
   return track.parcel >= 0 && impl_->parcels[static_cast<std::size_t>(track.parcel)].where == Whereabouts::kBelt;
 }
+bool Ledger::lifted(int slot) const { return impl_->tracks[static_cast<std::size_t>(slot)].lifted; }
 std::size_t Ledger::size() const { return impl_->parcels.size(); }
 int Ledger::in_transit() const { return impl_->in_transit; }
 const std::vector<ParcelTruth>& Ledger::parcels() const { return impl_->parcels; }

@@ -32,6 +32,7 @@ class Ledger {
   [[nodiscard]] int parcel_in(int slot) const;          // -1 when the slot is free
   [[nodiscard]] int slot_of(std::size_t parcel) const;  // -1 when it is not in the cell
   [[nodiscard]] bool on_belt(int slot) const;           // lies on the belt, unheld
+  [[nodiscard]] bool lifted(int slot) const;            // hangs on the cups, free of what it stood on
   [[nodiscard]] int in_transit() const;                 // on the belt, held or falling
   [[nodiscard]] std::size_t size() const;               // parcels of the manifest
 

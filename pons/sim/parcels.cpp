@@ -108,17 +108,37 @@ void set_shape(mjModel* model, const Slot& slot, const world::ManifestRow& row, 
   set_bounds(model, slot, half);
 }
 
-void set_label(mjModel* model, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
-               double label_m) {
+double half_label_m(const world::ManifestRow& row, double label_m) {
+  return std::min(0.5 * label_m, 0.96 * 0.5 * row.size_m.head<2>().minCoeff());
+}
+
+// Along the top, how far from its middle a label's middle may lie.
+double label_room_m(const world::ManifestRow& row, double label_m) {
+  const double edge =
+      kLabelMargin_m + half_label_m(row, label_m) + (row.kind == world::ParcelKind::kBag ? kRimStep_m : 0);
+  return std::max(0.0, 0.5 * row.size_m.x() - edge);
+}
+
+void set_label(mjModel* model, int geom, const world::ManifestRow& row, const Arrival& arrival, double label_m,
+               const std::array<double, 2>& offset) {
   const Vector3 half = 0.5 * row.size_m;
-  const double half_label = std::min(0.5 * label_m, 0.96 * half.head<2>().minCoeff());
+  const double half_label = half_label_m(row, label_m);
   const double edge = kLabelMargin_m + half_label + (row.kind == world::ParcelKind::kBag ? kRimStep_m : 0);
   const double room_x = std::max(0.0, half.x() - edge), room_y = std::max(0.0, half.y() - edge);
-  const double y = row.kind == world::ParcelKind::kTube ? 0 : arrival.label_offset[1] * room_y;
-  const Vector3 position(arrival.label_offset[0] * room_x, y, half.z() + kLabelLift_m);
+  const double y = row.kind == world::ParcelKind::kTube ? 0 : offset[1] * room_y;
+  const Vector3 position(offset[0] * room_x, y, half.z() + kLabelLift_m);
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(arrival.label_turn * std::numbers::pi / 2, Vector3::UnitZ()));
-  set_geom(model, slot.label, mjGEOM_BOX, Vector3(half_label, half_label, kLabelHalf_m), position, turn);
-  model->geom_rgba[4 * slot.label + 3] = 1;
+  set_geom(model, geom, mjGEOM_BOX, Vector3(half_label, half_label, kLabelHalf_m), position, turn);
+  model->geom_rgba[4 * geom + 3] = 1;
+}
+
+// Two share the top's length, one at each end.
+void set_labels(mjModel* model, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
+                double label_m) {
+  if (slot.second_label >= 0) model->geom_rgba[4 * slot.second_label + 3] = 0;
+  if (arrival.second_text.empty()) return set_label(model, slot.label, row, arrival, label_m, arrival.label_offset);
+  set_label(model, slot.label, row, arrival, label_m, {-1, arrival.label_offset[1]});
+  set_label(model, slot.second_label, row, arrival, label_m, {1, arrival.label_offset[1]});
 }
 
 void set_state(mjData* data, const Slot& slot, const Pose& pose, double speed_m_s) {
@@ -134,10 +154,14 @@ void set_state(mjData* data, const Slot& slot, const Pose& pose, double speed_m_
 void activate(mjModel* model, mjData* data, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
               double label_m, const Pose& world_from_middle, double speed_m_s) {
   set_shape(model, slot, row, arrival);
-  set_label(model, slot, row, arrival, label_m);
+  set_labels(model, slot, row, arrival, label_m);
   set_mass(model, slot, arrival.mass_kg, even_inertia(row.kind, row.size_m, arrival.mass_kg));
   model->body_gravcomp[slot.body] = 0;
   set_state(data, slot, world_from_middle, std::max(speed_m_s, kWake_m_s));
+}
+
+bool room_for_two_labels(const world::ManifestRow& row, double label_m) {
+  return label_room_m(row, label_m) >= half_label_m(row, label_m) + kLabelMargin_m;
 }
 
 void wake(mjData* data, const Slot& slot) {
@@ -146,7 +170,8 @@ void wake(mjData* data, const Slot& slot) {
 }
 
 void park(mjModel* model, mjData* data, const Slot& slot, int index) {
-  for (const int geom : {slot.main, slot.rim, slot.label}) {
+  for (const int geom : {slot.main, slot.rim, slot.label, slot.second_label}) {
+    if (geom < 0) continue;
     model->geom_contype[geom] = model->geom_conaffinity[geom] = 0;
     model->geom_rgba[4 * geom + 3] = 0;
   }

@@ -15,6 +15,8 @@ namespace pons::sim {
 // `world_from_middle` with the belt's speed along x.
 void activate(mjModel* model, mjData* data, const Slot& slot, const world::ManifestRow& row, const Arrival& arrival,
               double label_m, const Pose& world_from_middle, double speed_m_s);
+// Whether its top has room for two labels side by side.
+[[nodiscard]] bool room_for_two_labels(const world::ManifestRow& row, double label_m);
 // So that it feels what moves below it: the surface of a belt wakes nothing that sleeps on it.
 void wake(mjData* data, const Slot& slot);
 

@@ -19,13 +19,22 @@ constexpr double kBrake = 1.5;                                 // holding torque
 constexpr double kBrakeStiffness = 3600, kBrakeDamping = 120;  // 1/s², 1/s: 60 rad/s, critically damped
 constexpr double kBrakeHolds_rad_s = 0.02;
 
+std::vector<Arrival> arriving(const world::World& world, const world::Manifest& manifest, std::uint64_t seed,
+                              Faults& faults) {
+  std::vector<Arrival> arrivals = plan_arrivals(world, manifest, seed);
+  faults.add_labels(world, manifest, arrivals);
+  return arrivals;
+}
+
 }  // namespace
 
-Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Composed the_composed, std::uint64_t seed)
+Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Composed the_composed, std::uint64_t seed,
+           const world::FaultPlan& plan)
     : world(the_world),
       composed(std::move(the_composed)),
       data(mj_makeData(composed.model.get())),
-      arrivals(plan_arrivals(world, manifest, seed)),
+      faults(plan, seed),
+      arrivals(arriving(world, manifest, seed, faults)),
       belt(world.belt, seed),
       ledger(world, manifest, arrivals),
       feeder(world, manifest, arrivals),
@@ -41,6 +50,9 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
     park(composed.model.get(), data.get(), slot, i);
     labels.entries.push_back({slot.texture, 0, {}});
   }
+  for (const Slot& slot : composed.slots) {
+    if (slot.second_texture >= 0) labels.entries.push_back({slot.second_texture, 0, {}});
+  }
 }
 
 void Cell::step() {
@@ -49,7 +61,9 @@ void Cell::step() {
   for (; const Bus::Told* told = bus.next(stepped + step_length); bus.drop_oldest()) hear(told->set_points, told->acts);
   watch_loop();
   drive_belt();
-  gripper.update(composed, data.get(), set_points.vacuum_on, world.physics_step_s);
+  const Suction suction = faults.suction(set_points.vacuum_on, gripper, ledger, stepped);
+  gripper.update(composed, data.get(), set_points.vacuum_on, suction, world.physics_step_s);
+  faults.cling(composed, data.get(), gripper, ledger);
   drive();
   push();
   mj_step(model, data.get());
@@ -60,7 +74,7 @@ void Cell::step() {
 }
 
 void Cell::drive_belt() {
-  set_points.belt_runs ? belt.let_run() : belt.stop();
+  set_points.belt_runs && !faults.belt_jams(stepped) ? belt.let_run() : belt.stop();
   if (belt.starts()) {
     for (int i = 0; i < kSlots; ++i) {
       if (ledger.on_belt(i)) wake(data.get(), composed.slots[static_cast<std::size_t>(i)]);
@@ -183,13 +197,14 @@ Simulation::Simulation(std::unique_ptr<Cell> cell) : cell_(std::move(cell)) {}
 Simulation::~Simulation() = default;
 
 Expected<std::unique_ptr<Simulation>> Simulation::create(const world::World& world, const world::Manifest& manifest,
-                                                         std::uint64_t seed) {
-  auto composed = compose(world);
+                                                         std::uint64_t seed, const world::FaultPlan& faults) {
+  auto composed = compose(world, faults);
   if (!composed) return std::unexpected(composed.error());
-  auto cell = std::make_unique<Cell>(world, manifest, std::move(*composed), seed);
+  auto cell = std::make_unique<Cell>(world, manifest, std::move(*composed), seed, faults);
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
-    auto camera = SimCamera::create(world.cameras[i], cell->composed.model.get(), cell->data.get(),
-                                    cell->composed.cameras[i], &cell->labels, seed);
+    auto camera =
+        SimCamera::create(world.cameras[i], cell->composed.model.get(), cell->data.get(), cell->composed.cameras[i],
+                          &cell->labels, seed, world.cameras[i].watches == "belt" ? &cell->faults : nullptr);
     if (!camera) return std::unexpected(camera.error());
     cell->camera_list.push_back(camera->get());
     cell->cameras.push_back(std::move(*camera));
@@ -237,6 +252,13 @@ int Simulation::offered() const { return cell_->feeder.offered(); }
 
 bool Simulation::finished() const {
   return static_cast<std::size_t>(offered()) == cell_->ledger.size() && cell_->ledger.in_transit() == 0;
+}
+
+world::FaultCounts Simulation::faults() const {
+  world::FaultCounts counts = cell_->faults.counts();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(offered()); ++i)
+    counts[world::Fault::kDoubleLabel] += cell_->arrivals[i].second_text.empty() ? 0 : 1;
+  return counts;
 }
 
 std::uint64_t Simulation::state_digest() const { return digest_of(cell_->composed.model.get(), cell_->data.get()); }

@@ -9,6 +9,7 @@
 #include "pons/body/body.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
+#include "pons/world/faults.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
 
@@ -30,8 +31,8 @@ class Simulation {
   // Composes scene, arm, tool and parcels, puts the arm at home with its brakes on, and opens the cameras. Errors: a
   // file that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
   [[nodiscard]] static Expected<std::unique_ptr<Simulation>> create(const world::World& world,
-                                                                    const world::Manifest& manifest,
-                                                                    std::uint64_t seed);
+                                                                    const world::Manifest& manifest, std::uint64_t seed,
+                                                                    const world::FaultPlan& faults = {});
   ~Simulation();
   Simulation(const Simulation&) = delete;
   Simulation& operator=(const Simulation&) = delete;
@@ -59,6 +60,9 @@ class Simulation {
   // gripper or falling any more.
   [[nodiscard]] int offered() const;
   [[nodiscard]] bool finished() const;
+
+  // How often each fault has come to pass so far.
+  [[nodiscard]] world::FaultCounts faults() const;
 
   // Digest of every position and speed: two runs of one seed agree.
   [[nodiscard]] std::uint64_t state_digest() const;

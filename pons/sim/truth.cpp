@@ -9,7 +9,7 @@
 namespace pons::sim {
 
 std::string_view name(LabelTruth label) {
-  static constexpr std::array<std::string_view, 4> kNames{"readable", "down", "damaged", "unknown_code"};
+  static constexpr std::array<std::string_view, 5> kNames{"readable", "down", "damaged", "unknown_code", "two_codes"};
   return kNames[static_cast<std::size_t>(label)];
 }
 

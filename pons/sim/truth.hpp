@@ -17,7 +17,7 @@ namespace pons::sim {
 class Simulation;
 class BaseSimulation;
 
-enum class LabelTruth : std::uint8_t { kReadable, kDown, kDamaged, kUnknownCode };
+enum class LabelTruth : std::uint8_t { kReadable, kDown, kDamaged, kUnknownCode, kTwoCodes };
 enum class Whereabouts : std::uint8_t { kNotOffered, kBelt, kHeld, kFalling, kChute, kException, kTray, kFloor };
 [[nodiscard]] std::string_view name(LabelTruth label);
 [[nodiscard]] std::string_view name(Whereabouts where);

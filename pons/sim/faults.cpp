@@ -1,0 +1,170 @@
+#include "pons/sim/faults.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "pons/sim/parcels.hpp"
+
+namespace pons::sim {
+namespace {
+
+using world::Fault;
+
+// A leak leaves so much of the full vacuum: some too little to count as sealed, some too little for what is heavy.
+constexpr double kLeakLeast_kpa = 20, kLeakMost_kpa = 45;
+constexpr double kDropsSoonest_s = 0.05, kDropsLatest_s = 1.2;  // after it was lifted; a carry takes about so long
+constexpr double kClings_m = 0.03;                              // what lies nearer may cling
+constexpr double kPatchLeast = 0.15, kPatchMost = 0.45;         // of the picture's width and height
+constexpr int kSteadyCups = 3;                                  // hold what something clings to
+
+template <std::size_t... fault>
+std::array<Random, sizeof...(fault)> streams(std::uint64_t seed, std::index_sequence<fault...>) {
+  return {world::fault_stream(seed, static_cast<Fault>(fault))...};
+}
+
+world::Spells spells(const world::FaultPlan& plan, std::uint64_t seed, Fault fault) {
+  return {plan[fault], world::fault_stream(seed, fault).fork(0)};
+}
+
+}  // namespace
+
+Faults::Faults(const world::FaultPlan& plan, std::uint64_t seed)
+    : plan_(plan),
+      seed_(seed),
+      streams_(streams(seed, std::make_index_sequence<world::kFaults>())),
+      jams_(spells(plan, seed, Fault::kBeltJam)),
+      occlusions_(spells(plan, seed, Fault::kOcclusion)),
+      blackouts_(spells(plan, seed, Fault::kBlackout)),
+      shifts_(spells(plan, seed, Fault::kShiftedView)) {}
+
+bool Faults::draws(Fault fault) {
+  const double share = plan_[fault].often;
+  return share > 0 && streams_[static_cast<std::size_t>(fault)].uniform() < share;
+}
+
+void Faults::add_labels(const world::World& world, const world::Manifest& manifest,
+                        std::vector<Arrival>& arrivals) const {
+  for (std::size_t i = 0; i < arrivals.size(); ++i) {
+    // A stream of each parcel's own: whether one has room decides nothing about the others.
+    Random random = world::fault_stream(seed_, Fault::kDoubleLabel).fork(i);
+    if (!(random.uniform() < plan_[Fault::kDoubleLabel].often)) continue;
+    if (arrivals[i].label != LabelState::kReadable || !room_for_two_labels(manifest[i], world.arrivals.label_m))
+      continue;
+    const bool own = manifest.size() < 2 || random.uniform() < 0.5;
+    const std::size_t other = (i + 1 + random.below(std::max<std::size_t>(1, manifest.size() - 1))) % manifest.size();
+    arrivals[i].second_text = own ? manifest[i].parcel_id : manifest[other].parcel_id;
+  }
+}
+
+void Faults::begin_attempt() {
+  attempt_ = {};
+  attempt_.misses = draws(Fault::kMissedGrasp);
+  attempt_.leaks = draws(Fault::kWeakVacuum);
+  attempt_.drops = draws(Fault::kDrop);
+  if (attempt_.leaks)
+    attempt_.leak_kpa = streams_[static_cast<std::size_t>(Fault::kWeakVacuum)].uniform(kLeakLeast_kpa, kLeakMost_kpa);
+  if (attempt_.drops)
+    attempt_.drops_after =
+        from_s(streams_[static_cast<std::size_t>(Fault::kDrop)].uniform(kDropsSoonest_s, kDropsLatest_s));
+  if (draws(Fault::kDoublePick)) ++owed_doubles_;
+}
+
+Suction Faults::suction(std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger, Time now) {
+  if (vacuum_on_ == 0 && vacuum_on != 0) begin_attempt();
+  vacuum_on_ = vacuum_on;
+  if (vacuum_on == 0) return {};
+  const int slot = gripper.touched();
+  if (attempt_.misses) {
+    if (slot >= 0 && !std::exchange(attempt_.missed, true)) ++counts_[Fault::kMissedGrasp];
+    return {.seals = false};
+  }
+  if (slot >= 0 && ledger.lifted(slot)) {
+    if (!attempt_.lifted) attempt_.lifted = now;
+    if (attempt_.drops && now >= *attempt_.lifted + attempt_.drops_after && !std::exchange(attempt_.dropped, true))
+      ++counts_[Fault::kDrop];
+  }
+  if (attempt_.dropped) return {.seals = false};
+  if (!attempt_.leaks) return {};
+  if (slot >= 0 && !std::exchange(attempt_.leaked, true)) ++counts_[Fault::kWeakVacuum];
+  return {.sealed_kpa = attempt_.leak_kpa};
+}
+
+// The nearest that lies on the belt beside it; -1: none is near.
+int Faults::neighbour(const Composed& cell, mjData* data, int slot, const Ledger& ledger) const {
+  int nearest = -1;
+  double least_m = kClings_m;
+  for (int other = 0; other < kSlots; ++other) {
+    if (other == slot || !ledger.on_belt(other)) continue;
+    double between[6];
+    const double apart_m = mj_geomDistance(cell.model.get(), data, cell.slots[static_cast<std::size_t>(slot)].main,
+                                           cell.slots[static_cast<std::size_t>(other)].main, kClings_m, between);
+    if (apart_m < least_m) least_m = apart_m, nearest = other;
+  }
+  return nearest;
+}
+
+// Tape, a flap or film that hooks: the two stay as they lie to each other, until the first is let go of.
+void Faults::cling(Composed& cell, mjData* data, const Gripper& gripper, const Ledger& ledger) {
+  if (cell.cling < 0) return;
+  if (clings_to_ >= 0) {
+    if (gripper.grip(clings_to_) > 0 && ledger.parcel_in(clings_) >= 0) return;
+    data->eq_active[cell.cling] = 0;
+    wake(data, cell.slots[static_cast<std::size_t>(clings_)]);
+    clings_to_ = clings_ = -1;
+    return;
+  }
+  const int held = gripper.touched();
+  if (owed_doubles_ == 0 || held < 0 || gripper.grip(held) < kSteadyCups || ledger.lifted(held)) return;
+  const int beside = neighbour(cell, data, held, ledger);
+  if (beside < 0) return;
+  --owed_doubles_;
+  ++counts_[Fault::kDoublePick];
+  clings_to_ = held, clings_ = beside;
+  mjModel* const model = cell.model.get();
+  const Slot &one = cell.slots[static_cast<std::size_t>(held)], &two = cell.slots[static_cast<std::size_t>(beside)];
+  const Pose one_from_two = from_mujoco(data->qpos + one.qpos, data->qpos + one.qpos + 3).inverse() *
+                            from_mujoco(data->qpos + two.qpos, data->qpos + two.qpos + 3);
+  model->eq_obj1id[cell.cling] = one.body;
+  model->eq_obj2id[cell.cling] = two.body;
+  mjtNum* const weld = model->eq_data + mjNEQDATA * cell.cling;
+  std::fill_n(weld, 3, 0.0);  // the second body's own origin is what is held
+  to_mujoco(one_from_two, weld + 3, weld + 6);
+  weld[10] = 1;
+  data->eq_active[cell.cling] = 1;
+  wake(data, two);
+}
+
+Sight Faults::sight(Time now) {
+  Sight sight;
+  sight.black = blackouts_.on(now);
+  if (occlusions_.on(now)) {
+    if (std::exchange(hidden_by_, occlusions_.begun()) != occlusions_.begun()) {
+      Random& random = streams_[static_cast<std::size_t>(Fault::kOcclusion)];
+      const double width = random.uniform(kPatchLeast, kPatchMost), height = random.uniform(2 * kPatchLeast, 1);
+      const double left = random.uniform(0, 1 - width), top = random.uniform(0, 1 - height);
+      patch_ = {left, top, left + width, top + height};
+    }
+    sight.hidden = patch_;
+  }
+  if (shifts_.on(now)) {
+    if (std::exchange(shifted_by_, shifts_.begun()) != shifts_.begun()) {
+      const double angle = streams_[static_cast<std::size_t>(Fault::kShiftedView)].uniform(0, 2 * std::numbers::pi);
+      shift_m_ = plan_[Fault::kShiftedView].by_m * Vector3(std::cos(angle), std::sin(angle), 0);
+    }
+    sight.shift_m = shift_m_;
+  }
+  return sight;
+}
+
+world::FaultCounts Faults::counts() const {
+  world::FaultCounts counts = counts_;
+  counts[Fault::kBeltJam] = jams_.begun();
+  counts[Fault::kOcclusion] = occlusions_.begun();
+  counts[Fault::kBlackout] = blackouts_.begun();
+  counts[Fault::kShiftedView] = shifts_.begun();
+  return counts;
+}
+
+}  // namespace pons::sim

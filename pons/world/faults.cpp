@@ -1,0 +1,169 @@
+#include "pons/world/faults.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "pons/world/csv.hpp"
+#include "pons/world/yaml.hpp"
+
+namespace pons::world {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Unit : std::uint8_t { kPick, kParcel, kHour };
+
+struct Kind {
+  std::string_view name;
+  Unit unit;
+};
+
+constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick},
+                                            {"weak_vacuum", Unit::kPick},
+                                            {"double_pick", Unit::kPick},
+                                            {"drop", Unit::kPick},
+                                            {"double_label", Unit::kParcel},
+                                            {"belt_jam", Unit::kHour},
+                                            {"occlusion", Unit::kHour},
+                                            {"blackout", Unit::kHour},
+                                            {"shifted_view", Unit::kHour},
+                                            {"brain_stall", Unit::kHour}}};
+
+constexpr std::uint64_t kFaultStream = 0x6661756c;
+constexpr double kMostAnHour = 3600, kMostTimes = 1000;
+constexpr double kLongest_s = 600;
+constexpr double kFarthest_m = 0.2;
+constexpr double kNever_s = 1e7;  // longer than any run
+
+FaultRate read_rate(const YamlValue& value, std::size_t fault) {
+  FaultRate rate;
+  switch (kKinds[fault].unit) {
+    case Unit::kPick:
+      rate.often = YamlMap(value, {"a_pick"})["a_pick"].number(0, 1);
+      return rate;
+    case Unit::kParcel:
+      rate.often = YamlMap(value, {"a_parcel"})["a_parcel"].number(0, 1);
+      return rate;
+    case Unit::kHour:
+      break;
+  }
+  const bool shifts = static_cast<Fault>(fault) == Fault::kShiftedView;
+  const YamlMap map = shifts ? YamlMap(value, {"an_hour", "lasts_s", "by_m"}) : YamlMap(value, {"an_hour", "lasts_s"});
+  rate.often = map["an_hour"].number(0, kMostAnHour);
+  const auto bounds = map["lasts_s"].list(2, 2);
+  rate.shortest_s = bounds[0].positive(kLongest_s);
+  rate.longest_s = bounds[1].number(rate.shortest_s, kLongest_s);
+  if (shifts) rate.by_m = map["by_m"].positive(kFarthest_m);
+  return rate;
+}
+
+// Each as often as that many times.
+void multiply(FaultPlan& plan, double times, const YamlValue& where) {
+  for (std::size_t fault = 0; fault < kFaults; ++fault) {
+    double& often = plan.rates[fault].often;
+    often *= times;
+    const double most = kKinds[fault].unit == Unit::kHour ? kMostAnHour : 1;
+    if (often > most)
+      where.refuse(fmt::format("makes {} {}, more than {}", kKinds[fault].name, often, most), "write a smaller number");
+  }
+}
+
+FaultPlan read_plan(const fs::path& file);
+
+// The plan that another one multiplies lies beside it, and stands for itself.
+FaultPlan read_base(const YamlMap& map, const fs::path& file) {
+  const std::string base = map["base"].name();
+  const fs::path beside = file.parent_path() / (base + ".yaml");
+  std::error_code code;
+  if (!fs::is_regular_file(beside, code))
+    map["base"].refuse(fmt::format("there is no plan '{}' beside this one", base), "name a file here, without .yaml");
+  if (read_yaml(beside).node()["base"].IsDefined())
+    map["base"].refuse(fmt::format("'{}' has a base of its own", base), "name that one");
+  return read_plan(beside);
+}
+
+FaultPlan read_plan(const fs::path& file) {
+  const YamlValue value = read_yaml(file);
+  const YamlMap map(value, {},
+                    {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
+                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name});
+  FaultPlan plan;
+  if (map.has("base")) plan = read_base(map, file);
+  if (map.has("times")) {
+    if (!map.has("base")) map["times"].refuse("multiplies nothing", "name a base, too");
+    multiply(plan, map["times"].positive(kMostTimes), map["times"]);
+  }
+  for (std::size_t fault = 0; fault < kFaults; ++fault) {
+    if (map.has(kKinds[fault].name)) plan.rates[fault] = read_rate(map[kKinds[fault].name], fault);
+  }
+  plan.name = file.stem().string();
+  return plan;
+}
+
+std::vector<std::string> plans_in(const fs::path& folder) {
+  std::vector<std::string> names{"none"};
+  std::error_code code;
+  for (fs::directory_iterator entry(folder, code), end; !code && entry != end; entry.increment(code)) {
+    if (entry->path().extension() == ".yaml") names.push_back(entry->path().stem().string());
+  }
+  std::ranges::sort(names.begin() + 1, names.end());
+  return names;
+}
+
+}  // namespace
+
+std::string_view name(Fault fault) { return kKinds[static_cast<std::size_t>(fault)].name; }
+
+bool FaultPlan::any() const {
+  return std::ranges::any_of(rates, [](const FaultRate& rate) { return rate.often > 0; });
+}
+
+Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
+  if (named == "none") return FaultPlan{};
+  const fs::path folder = world.folder / "faults";
+  const std::vector<std::string> names = plans_in(folder);
+  const bool known = std::ranges::find(names, named) != names.end();
+  const fs::path file = known ? folder / (named + ".yaml") : fs::path(named);
+  std::error_code code;
+  if (!fs::is_regular_file(file, code)) {
+    return fail(fmt::format("there is no plan '{}'", printable(named)), folder.string(),
+                fmt::format("the plans are {}; or name a file", fmt::join(names, ", ")));
+  }
+  try {
+    return read_plan(file);
+  } catch (LoadError& refused) {
+    return std::unexpected(std::move(refused.error));
+  }
+}
+
+Random fault_stream(std::uint64_t seed, Fault fault) {
+  return Random(seed).fork(kFaultStream).fork(static_cast<std::uint64_t>(fault));
+}
+
+Spells::Spells(const FaultRate& rate, Random random) : rate_(rate), random_(random) { draw(Time{}); }
+
+void Spells::draw(Time after) {
+  if (!(rate_.often > 0)) return;
+  const double wait_s = std::min(kNever_s, -std::log(1 - random_.uniform()) * 3600 / rate_.often);
+  from_ = after + from_s(wait_s);
+  until_ = from_ + from_s(random_.uniform(rate_.shortest_s, rate_.longest_s));
+  counted_ = false;
+}
+
+bool Spells::on(Time now) {
+  if (!(rate_.often > 0)) return false;
+  while (now >= until_) draw(until_);
+  if (now < from_) return false;
+  if (!counted_) ++begun_;
+  counted_ = true;
+  return true;
+}
+
+}  // namespace pons::world

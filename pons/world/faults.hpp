@@ -1,0 +1,80 @@
+// What goes wrong on purpose in a simulated run: shares of picks, parcels and tasks, events an hour. Data like the
+// world, in worlds/NAME/faults/; docs/worlds.md has the keys.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "pons/core/error.hpp"
+#include "pons/core/random.hpp"
+#include "pons/core/time.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::world {
+
+enum class Fault : std::uint8_t {
+  kMissedGrasp,  // a pick: the cups do not seal in that attempt
+  kWeakVacuum,   // a pick: they seal, but leak
+  kDoublePick,   // a pick: what is lifted drags a neighbour along until it is let go of
+  kDrop,         // a pick: the seal is lost on the way
+  kDoubleLabel,  // a parcel: it shows a second label, its own code or another parcel's
+  kBeltJam,      // an hour: the belt stands although it is told to run
+  kOcclusion,    // an hour: something hangs between the belt's cameras and a part of what they watch
+  kBlackout,     // an hour: the belt's cameras deliver black frames without depth
+  kShiftedView,  // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
+  kBrainStall,   // an hour: the brain is silent
+};
+inline constexpr std::size_t kFaults = 10;
+// As the file and the report have it: "missed_grasp".
+[[nodiscard]] std::string_view name(Fault fault);
+
+// How often, in the fault's own unit: a share of picks or parcels, or events an hour.
+struct FaultRate {
+  double often = 0;
+  double shortest_s = 0, longest_s = 0;  // of an event
+  double by_m = 0;                       // of kShiftedView
+};
+
+struct FaultPlan {
+  std::string name = "none";
+  std::array<FaultRate, kFaults> rates{};
+
+  [[nodiscard]] const FaultRate& operator[](Fault fault) const { return rates[static_cast<std::size_t>(fault)]; }
+  [[nodiscard]] bool any() const;
+};
+
+// How often each was injected.
+struct FaultCounts {
+  std::array<std::int64_t, kFaults> of{};
+  std::int64_t& operator[](Fault fault) { return of[static_cast<std::size_t>(fault)]; }
+};
+
+// `named` is "none", a plan of the world's folder faults/ by its name, or a file's path. Errors name file, line and key
+// as those of world.yaml; no such plan, with the names that exist.
+[[nodiscard]] Expected<FaultPlan> load_faults(const World& world, const std::string& named);
+
+// A stream of random numbers for one fault, so that none reshuffles another, nor anything else that the run draws.
+[[nodiscard]] Random fault_stream(std::uint64_t seed, Fault fault);
+
+// When events of one kind are on: the waits between them are exponential, what they last is even between its bounds.
+class Spells {
+ public:
+  Spells(const FaultRate& rate, Random random);
+  // Whether one is on; times must not go back.
+  [[nodiscard]] bool on(Time now);
+  [[nodiscard]] std::int64_t begun() const { return begun_; }
+
+ private:
+  void draw(Time after);
+
+  FaultRate rate_;
+  Random random_;
+  Time from_, until_;
+  bool counted_ = false;
+  std::int64_t begun_ = 0;
+};
+
+}  // namespace pons::world

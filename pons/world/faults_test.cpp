@@ -1,0 +1,111 @@
+#include "pons/world/faults.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pons/world/test_folder.hpp"
+
+namespace pons::world {
+namespace {
+
+World load_cell() {
+  auto world = load("worlds", "parcel_cell");
+  if (!world) throw std::runtime_error(world.error().line());
+  return *world;
+}
+
+class FaultsTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::string refusal(std::string_view text) {
+    const auto plan = load_faults(world_, folder_.write("plan.yaml", text).string());
+    return plan ? "accepted" : plan.error().line();
+  }
+
+  TestFolder folder_;
+  World world_ = load_cell();
+};
+
+void expect_says(const std::string& line, std::initializer_list<std::string_view> words) {
+  for (const std::string_view word : words)
+    EXPECT_NE(line.find(word), std::string::npos) << word << "\nnot in " << line;
+}
+
+TEST_F(FaultsTest, NoneIsNoPlanAtAll) {
+  const auto plan = load_faults(world_, "none");
+  ASSERT_TRUE(plan);
+  EXPECT_FALSE(plan->any());
+  EXPECT_EQ(plan->name, "none");
+}
+
+TEST_F(FaultsTest, StormIsTenTimesRobin) {
+  const auto robin = load_faults(world_, "robin"), storm = load_faults(world_, "storm");
+  ASSERT_TRUE(robin) << robin.error().line();
+  ASSERT_TRUE(storm) << storm.error().line();
+  EXPECT_EQ(storm->name, "storm");
+  for (std::size_t i = 0; i < kFaults; ++i) {
+    EXPECT_GT(robin->rates[i].often, 0) << name(static_cast<Fault>(i));
+    EXPECT_DOUBLE_EQ(storm->rates[i].often, 10 * robin->rates[i].often);
+    EXPECT_DOUBLE_EQ(storm->rates[i].longest_s, robin->rates[i].longest_s);
+  }
+  // What Amazon has published of Robin.
+  EXPECT_NEAR((*robin)[Fault::kMissedGrasp].often, 0.020, 0.002);
+  EXPECT_NEAR((*robin)[Fault::kDoublePick].often, 0.00865, 0.00025);
+}
+
+TEST_F(FaultsTest, AFileOfOnesOwnStandsForItselfOrChangesItsBase) {
+  folder_.write("calm.yaml", "missed_grasp: {a_pick: 0.01}\nbelt_jam: {an_hour: 2, lasts_s: [1, 3]}\n");
+  const auto plan = load_faults(
+      world_, folder_.write("mine.yaml", "base: calm\ntimes: 3\nbelt_jam: {an_hour: 1, lasts_s: [4, 4]}\n").string());
+  ASSERT_TRUE(plan) << plan.error().line();
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kMissedGrasp].often, 0.03);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kBeltJam].often, 1);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kBeltJam].shortest_s, 4);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kDrop].often, 0);
+}
+
+TEST_F(FaultsTest, WhatIsWrongIsToldByFileLineAndKey) {
+  expect_says(refusal("missed_grasp: {a_pick: 0.1}\nmised: {a_pick: 1}\n"), {"plan.yaml:2:mised", "unknown key"});
+  expect_says(refusal("drop: {a_pick: 1.5}\n"), {"plan.yaml:1:drop.a_pick", "1.5", "0 to 1"});
+  expect_says(refusal("drop: {an_hour: 1}\n"), {"plan.yaml:1:drop.an_hour", "unknown key", "a_pick"});
+  expect_says(refusal("belt_jam: {an_hour: 1}\n"), {"belt_jam", "lasts_s", "missing"});
+  expect_says(refusal("belt_jam: {an_hour: 1, lasts_s: [3, 1]}\n"), {"belt_jam.lasts_s[1]", "3 to"});
+  expect_says(refusal("shifted_view: {an_hour: 1, lasts_s: [1, 2], by_m: 7}\n"), {"shifted_view.by_m"});
+  expect_says(refusal("times: 10\n"), {"times", "base"});
+  expect_says(refusal("base: nobody\n"), {"base", "nobody"});
+  expect_says(refusal("[1, 2]\n"), {"plan.yaml:1", "not a mapping"});
+}
+
+TEST_F(FaultsTest, SharesBeyondOneAndBasesOfBasesAreRefused) {
+  folder_.write("high.yaml", "drop: {a_pick: 0.5}\n");
+  expect_says(refusal("base: high\ntimes: 3\n"), {"times", "drop", "1.5"});
+  folder_.write("second.yaml", "base: high\n");
+  expect_says(refusal("base: second\n"), {"second", "base of its own"});
+}
+
+TEST_F(FaultsTest, AnUnknownNameIsAnsweredWithThoseThereAre) {
+  const auto plan = load_faults(world_, "hurricane");
+  ASSERT_FALSE(plan);
+  expect_says(plan.error().line(), {"hurricane", "none, robin, storm"});
+}
+
+TEST(Spells, ComeAsOftenAndLastAsLongAsTheySay) {
+  const FaultRate rate{.often = 60, .shortest_s = 2, .longest_s = 6};
+  Spells spells(rate, Random(5));
+  std::int64_t on_ms = 0;
+  constexpr std::int64_t kHours = 200;
+  for (std::int64_t ms = 0; ms < kHours * 3'600'000; ms += 100)
+    on_ms += spells.on(Time(std::chrono::milliseconds(ms))) ? 100 : 0;
+  // A minute's wait and four seconds' spell after one another.
+  EXPECT_NEAR(static_cast<double>(spells.begun()), kHours * 3600 / 64.0, 400);
+  EXPECT_NEAR(1e-3 * static_cast<double>(on_ms) / static_cast<double>(spells.begun()), 4, 0.1);
+}
+
+TEST(Spells, OfNoRateNeverCome) {
+  Spells spells({}, Random(5));
+  for (int s = 0; s < 100'000; ++s) ASSERT_FALSE(spells.on(Time(from_s(s))));
+  EXPECT_EQ(spells.begun(), 0);
+}
+
+}  // namespace
+}  // namespace pons::world

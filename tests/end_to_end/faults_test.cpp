@@ -1,0 +1,108 @@
+// Each fault many times more often than any day has it: every parcel still ends where its order or the journal says.
+
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/outcomes.hpp"
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using nlohmann::json;
+
+struct Faulty {
+  json report;
+  std::string said;  // with a line for each parcel that was not sorted
+  [[nodiscard]] int injected(const char* fault) const { return report["faults"].value(fault, 0); }
+};
+
+Faulty run_with(const std::string& plan, int parcels, int seed) {
+  const Folder folder;
+  write_text(folder / "plan.yaml", plan);
+  const Finished run =
+      run_pons({"run", "parcel_cell", "--parcels", std::to_string(parcels), "--seed", std::to_string(seed), "--quiet",
+                "--explain", "--faults", folder / "plan.yaml", "--report", folder / "report.json"});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  Faulty faulty{read_json(folder / "report.json"), run.out};
+  expect_accounted_for(faulty.report);
+  EXPECT_EQ(faulty.report["parcels"]["offered"], parcels) << run.out;
+  EXPECT_EQ(faulty.report["parcels"]["missorted"], 0) << run.out;
+  return faulty;
+}
+
+TEST(Faults, WhatIsMissedIsTriedAgain) {
+  const Faulty run = run_with("missed_grasp: {a_pick: 0.3}\n", 20, 1);
+  EXPECT_GE(run.injected("missed_grasp"), 3);
+  EXPECT_GE(run.report["retries"], run.injected("missed_grasp"));
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
+}
+
+TEST(Faults, CupsThatLeakHoldOrAreTriedAgain) {
+  const Faulty run = run_with("weak_vacuum: {a_pick: 0.5}\n", 20, 1);
+  EXPECT_GE(run.injected("weak_vacuum"), 5);
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
+}
+
+TEST(Faults, ABeltThatJamsCostsTimeOnly) {
+  const Faulty run = run_with("belt_jam: {an_hour: 300, lasts_s: [2, 6]}\n", 20, 1);
+  EXPECT_GE(run.injected("belt_jam"), 1);
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
+}
+
+// The belt waits for its cameras: nothing rides by unread.
+TEST(Faults, NothingRidesByInTheDark) {
+  const Faulty run = run_with("blackout: {an_hour: 300, lasts_s: [4, 8]}\n", 20, 1);
+  EXPECT_GE(run.injected("blackout"), 2);
+  EXPECT_EQ(run.report["parcels"]["exceptions"]["undeserved"], 0) << run.said;
+}
+
+TEST(Faults, NothingRidesByBehindWhatHangsBeforeTheCamera) {
+  const Faulty run = run_with("occlusion: {an_hour: 300, lasts_s: [4, 8]}\n", 20, 1);
+  EXPECT_GE(run.injected("occlusion"), 2);
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
+}
+
+TEST(Faults, AViewThatIsShiftedCostsTriesOnly) {
+  const Faulty run = run_with("shifted_view: {an_hour: 300, lasts_s: [1, 3], by_m: 0.03}\n", 20, 1);
+  EXPECT_GE(run.injected("shifted_view"), 2);
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
+}
+
+TEST(Faults, NothingRidesByWhileTheBrainIsSilent) {
+  const Faulty run = run_with("brain_stall: {an_hour: 400, lasts_s: [6, 12]}\n", 20, 1);
+  EXPECT_GE(run.injected("brain_stall"), 2);
+  EXPECT_EQ(run.report["parcels"]["exceptions"]["undeserved"], 0) << run.said;
+}
+
+// All of them at once, and the same again by the same seed.
+TEST(Faults, AStormOfOneSeedIsOneResult) {
+  const Folder folder;
+  const auto storm = [&](const std::string& name) {
+    const Finished run = run_pons({"run", "parcel_cell", "--parcels", "20", "--seed", "4", "--quiet", "--explain",
+                                   "--faults", "storm", "--report", folder / name});
+    EXPECT_NE(run.out.find("storm: "), std::string::npos) << run.out;
+    return read_json(folder / name);
+  };
+  const json one = storm("one.json"), two = storm("two.json");
+  EXPECT_EQ(one["state_hash"], two["state_hash"]);
+  EXPECT_EQ(one["faults"], two["faults"]);
+  EXPECT_EQ(one["faults"].size(), 10U);
+}
+
+TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {
+  const Finished run = run_pons({"run", "parcel_cell", "--faults", "hurricane"});
+  EXPECT_EQ(run.code, 2);
+  EXPECT_NE(run.err.find("none, robin, storm"), std::string::npos) << run.err;
+}
+
+TEST(Faults, WithoutAPlanTheReportHasNone) {
+  const Folder folder;
+  const Finished run =
+      run_pons({"run", "parcel_cell", "--parcels", "2", "--seed", "1", "--quiet", "--report", folder / "report.json"});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  EXPECT_TRUE(read_json(folder / "report.json")["faults"].empty());
+  EXPECT_EQ(run.out.find("faults"), std::string::npos) << run.out;
+}
+
+}  // namespace
+}  // namespace pons::tests
