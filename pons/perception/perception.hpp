@@ -37,7 +37,7 @@ class Perception final : public Sight {
 
   // Whether the newest frame of the belt showed all of it that the camera watches, but for what the robot hides: not a
   // black one, and nothing hung before the camera.
-  [[nodiscard]] bool sees_belt() const;
+  [[nodiscard]] bool sees_belt() const override;
 
   // Whether a frame of a camera that reads labels could teach anything: the newest frame showed something whole and
   // bare whose code was read less than twice, in fewer than ten attempts, or that seems too large for one parcel.

@@ -27,6 +27,7 @@ class Sight {
 
   [[nodiscard]] virtual std::vector<ObjectBelief> beliefs(Time, double /*belt_travel_m*/) const { return {}; }
   [[nodiscard]] virtual std::vector<ObjectBelief> cut(Time, double /*belt_travel_m*/) const { return {}; }
+  [[nodiscard]] virtual bool sees_belt() const { return true; }
   [[nodiscard]] virtual bool wants_labels() const { return false; }
   virtual void forget(std::uint32_t /*track*/) {}
   [[nodiscard]] virtual int occupancy(std::string_view /*place*/) const { return 0; }
