@@ -8,8 +8,6 @@ constexpr Duration kLookPeriod = std::chrono::milliseconds(100);
 // What one bridge has claimed no other can run: it takes little more than it can begin.
 constexpr std::size_t kAhead = 4;
 
-constexpr std::string_view kOrderRefusedEvent = "order_refused";  // {"id","reason"}
-
 }  // namespace
 
 void Bridge::take_orders(Time now) {
@@ -32,9 +30,7 @@ void Bridge::take_order(const Order& order, Time now) {
   const auto admitted = admit_one(order.body, now);
   if (fault_) return;
   if (!admitted) {
-    const std::string why = admitted.error().line();
-    keep(journal_.close_order(order.id, task::Outcome::kFailed, why));
-    note(kOrderRefusedEvent, {{"id", order.id}, {"reason", why}}, now, order.id);
+    keep(journal_.close_order(order.id, task::Outcome::kFailed, admitted.error().line()));
     return;
   }
   if (admitted->accepted == Accepted::kNew) return;

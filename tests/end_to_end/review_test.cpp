@@ -27,6 +27,7 @@ class HostileBrain : public ::testing::Test {
       text.insert(at, line);
     };
     insert("    - {name: hard_press", "    - {name: lookout, skills: [detect], approve: operator}\n");
+    insert("    - {name: one_way", "    - {name: one_path, skills: [move_to], same: [place], differ: [path]}\n");
     insert("    - {name: senders", "    - {name: lookouts, skills: [detect], at_most: 1, per_s: 3600}\n");
     write_text(file, text);
   }
@@ -66,10 +67,13 @@ TEST_F(HostileBrain, IsRefusedInWordsThatItCanActOn) {
       if (lie.err.find("(ordered_place): it is ordered elsewhere") != std::string::npos) ++refused;
     }
     EXPECT_GE(refused, 2) << "one of them is right";
-    const Finished reply =
-        submit(fmt::format(R"({{"tasks":[{},{}]}})", place("a", "X", "exception"), place("b", "X", "tray")));
+    const auto home = [](const std::string& id, const std::string& path) {
+      return fmt::format(R"({{"id":"{}","steps":[{{"skill":"move_to","arguments":{{"place":"home","path":"{}"}}}}]}})",
+                         id, path);
+    };
+    const Finished reply = submit(fmt::format(R"({{"tasks":[{},{}]}})", home("a", "joints"), home("b", "line")));
     EXPECT_EQ(reply.code, 2);
-    EXPECT_THAT(reply.err, AllOf(HasSubstr("/tasks/1/steps/0: against the rules of this world (one_way)"),
+    EXPECT_THAT(reply.err, AllOf(HasSubstr("/tasks/1/steps/0: against the rules of this world (one_path)"),
                                  HasSubstr("leave it out, or cancel the other task")));
     EXPECT_THAT(submit(place("nobody", "X", "north")).err, HasSubstr("(ordered_place): it is ordered elsewhere"));
     EXPECT_EQ(submit(fmt::format(R"({{"tasks":[{},{}]}})",

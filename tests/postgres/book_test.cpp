@@ -198,7 +198,7 @@ TEST_F(BookTest, WhatTheBridgeRefusesFailsWithTheReason) {
   EXPECT_EQ(found("same").reason, "not wanted");
   const auto told = journal->history("odd").value();
   ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0].kind, "order_refused");
+  EXPECT_EQ(told[0].kind, "refused");
   EXPECT_EQ(audit(*journal), std::vector<std::string>{});
 }
 
