@@ -121,6 +121,7 @@ RoundsOptions rounds_options(const RunOptions& options) {
   if (!options.parcels.manifest.empty()) rounds.of_a_cell = "--manifest";
   if (!options.body.visits.empty()) rounds.of_a_cell = "--visit";
   if (!options.body.arm_at.empty()) rounds.of_a_cell = "--arm-at";
+  if (options.body.faults != world::FaultPlan{}.name) rounds.of_a_cell = "--faults";
   if (options.recover) rounds.of_a_cell = "--recover";
   return rounds;
 }

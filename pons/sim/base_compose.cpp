@@ -15,18 +15,6 @@ constexpr int kBaseBits = 4;
 constexpr double kSlippery = 0.002;  // a caster turns with whatever it is pushed along
 constexpr double kWheelFriction = 0.8;
 
-void set_options(mjSpec* spec, const world::World& world) {
-  mjOption& option = spec->option;
-  option.timestep = world.physics_step_s;
-  option.integrator = mjINT_IMPLICITFAST;
-  option.cone = mjCONE_ELLIPTIC;
-  option.solver = mjSOL_NEWTON;
-  option.iterations = 30;
-  option.ls_iterations = 30;
-  option.impratio = 3;  // friction is a constraint that gives way a little: wheels creep under load, as tyres do
-  spec->compiler.fusestatic = 0;
-}
-
 // The joint that a body hangs on, if any.
 mjsJoint* joint_of(mjsBody* body) { return mjs_asJoint(mjs_firstChild(body, mjOBJ_JOINT, 0)); }
 
@@ -117,7 +105,8 @@ Expected<ComposedBase> compose_base(const world::World& world) {
     if (!scene) return std::unexpected(scene.error());
     auto urdf = parse(world.robot.urdf);
     if (!urdf) return std::unexpected(urdf.error());
-    set_options(scene->get(), world);
+    // Friction is a constraint that gives way a little: wheels creep under load, as tyres do.
+    set_solver(scene->get(), world.physics_step_s);
     if (auto added = add_base(scene->get(), urdf->get(), world); !added) return std::unexpected(added.error());
     return compile_and_find(scene->get(), world);
   } catch (const std::exception& error) {

@@ -20,18 +20,10 @@ constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; 
 constexpr int kArmBits = 4;
 
 void set_options(mjSpec* spec, const world::World& world) {
-  mjOption& option = spec->option;
-  option.timestep = world.physics_step_s;
-  option.integrator = mjINT_IMPLICITFAST;
-  option.cone = mjCONE_ELLIPTIC;
-  option.solver = mjSOL_NEWTON;
-  option.iterations = 30;
-  option.ls_iterations = 30;
-  option.impratio = 3;
-  option.enableflags |= mjENBL_SLEEP;
-  option.sleep_tolerance = 1e-3;
+  set_solver(spec, world.physics_step_s);
+  spec->option.enableflags |= mjENBL_SLEEP;
+  spec->option.sleep_tolerance = 1e-3;
   spec->memory = kArenaBytes;
-  spec->compiler.fusestatic = 0;
 }
 
 void paint_arm(mjsBody* body) {

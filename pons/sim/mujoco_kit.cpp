@@ -51,6 +51,18 @@ Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix, co
   return mjs_asBody(attached);
 }
 
+void set_solver(mjSpec* spec, double step_s) {
+  mjOption& option = spec->option;
+  option.timestep = step_s;
+  option.integrator = mjINT_IMPLICITFAST;
+  option.cone = mjCONE_ELLIPTIC;
+  option.solver = mjSOL_NEWTON;
+  option.iterations = 30;
+  option.ls_iterations = 30;
+  option.impratio = 3;
+  spec->compiler.fusestatic = 0;
+}
+
 void to_mujoco(const Pose& pose, double position[3], double quaternion[4]) {
   const Eigen::Quaterniond q(pose.linear());
   for (int i = 0; i < 3; ++i) position[i] = pose.translation()[i];

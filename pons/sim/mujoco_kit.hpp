@@ -37,6 +37,9 @@ void install_message_handler();
 [[nodiscard]] Expected<mjsBody*> attach(mjsFrame* frame, mjSpec* child, const char* prefix,
                                         const std::filesystem::path& file);
 
+// Step, integrator and contact solver, the same in every scene.
+void set_solver(mjSpec* spec, double step_s);
+
 // Pose to MuJoCo's position and quaternion (w first), and back.
 void to_mujoco(const Pose& pose, double position[3], double quaternion[4]);
 [[nodiscard]] Pose from_mujoco(const double position[3], const double quaternion[4]);

@@ -109,6 +109,7 @@ TEST_F(RoundsProgram, WhatNobodyCanDoIsRefusedBeforeTheRun) {
 TEST_F(RoundsProgram, OptionsOfTheOtherKindOfWorldAreRefused) {
   expect_refused({"run", "rounds", "--parcels", "5"}, {"--parcels", "rounds has a base"});
   expect_refused({"run", "rounds", "--arm-at", "0,0"}, {"--arm-at"});
+  expect_refused({"run", "rounds", "--faults", "storm"}, {"--faults", "rounds has a base"});
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--task", folder_ / "inspect.json"},
                  {"--task", "dispatcher"});
   expect_refused({"body", "rounds"}, {"pons body", "has a base"});
