@@ -110,6 +110,8 @@ class Run {
                                            .fastest_m_s = verdict.fastest_m_s,
                                            .driven_m = verdict.driven_m};
     report.retries = rounds_.bridge->retries();
+    report.interventions = rounds_.bridge_side->arming().interventions();
+    report.findings = verdict.findings;
     const cerebellum::Statistics& loop = rounds_.cerebellum->statistics();
     report.limits = {.violations = static_cast<std::int64_t>(loop.violations),
                      .worst_ratio = std::max({loop.commanded.speed, loop.commanded.acceleration, loop.commanded.jerk,

@@ -86,9 +86,10 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   progress.finish();
   if (!result) return bad_run(result.error());
 
-  const auto reckoning = reckon(cell.world, *cell.body, *cell.above->journal,
-                                {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(),
-                                 cell.above->bridge->retries(), wall_s, cell.above->bridge_side->brain_stalls()});
+  const auto reckoning =
+      reckon(cell.world, *cell.body, *cell.above->journal,
+             {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(), cell.above->bridge->retries(),
+              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->arming().interventions()});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());

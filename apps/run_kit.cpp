@@ -222,8 +222,12 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                     .missorted = verdict->missorted,
                     .lost = verdict->lost,
                     .duplicated = verdict->duplicated,
-                    .exceptions = {verdict->deserved, verdict->undeserved},
+                    .exceptions = {verdict->deserved, verdict->undeserved, {}},
                     .damaged = verdict->damaged};
+  for (const auto& [reason, counts] : verdict->reasons)
+    report.parcels.exceptions.reasons[reason] = {counts.deserved, counts.undeserved};
+  report.interventions = figures.interventions;
+  report.findings = verdict->findings;
   Time first = result.end;
   for (const sim::ParcelTruth& parcel : truth.parcels()) {
     if (parcel.where != sim::Whereabouts::kNotOffered) first = std::min(first, parcel.offered);

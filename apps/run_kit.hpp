@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -109,6 +110,7 @@ struct RunFigures {
   std::int64_t retries = 0;
   double wall_s = 0;
   std::int64_t brain_stalls = 0;
+  std::optional<std::int64_t> interventions = std::nullopt;
 };
 
 struct Reckoning {

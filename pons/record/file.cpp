@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <system_error>
 
@@ -111,6 +113,18 @@ Expected<void> write_whole(const fs::path& path, std::string_view bytes) {
   }
   if (const int error = sync_folder(folder_of(target)); error != 0) return cannot("sync the folder", path, error);
   return {};
+}
+
+Expected<nlohmann::ordered_json> read_json(const fs::path& path) {
+  std::error_code error;
+  std::ifstream in(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in || !fs::is_regular_file(path, error))
+    return fail("cannot be read", path.string(), "see that it is there and may be read");
+  auto json = nlohmann::ordered_json::parse(text, nullptr, false);
+  if (json.is_discarded())
+    return fail("is cut or no JSON", path.string(), "let what writes it write it again; it is written whole");
+  return json;
 }
 
 }  // namespace pons::record

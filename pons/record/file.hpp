@@ -1,7 +1,8 @@
-// Files that are written whole or not at all.
+// Files that are written whole or not at all, and read again.
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "pons/core/error.hpp"
@@ -17,5 +18,8 @@ namespace pons::record {
 // Errors: those of check_writable; the disk is full or broken. The old file is untouched then, and nothing is left
 // over.
 [[nodiscard]] Expected<void> write_whole(const std::filesystem::path& path, std::string_view bytes);
+
+// A file that write_whole left and nobody else. Errors: it cannot be read, or is cut or no JSON.
+[[nodiscard]] Expected<nlohmann::ordered_json> read_json(const std::filesystem::path& path);
 
 }  // namespace pons::record

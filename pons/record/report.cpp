@@ -37,14 +37,19 @@ namespace {
 
 void put_parcels(Json& json, const Report& report) {
   const auto& parcels = report.parcels;
-  json["parcels"] = {
-      {"offered", parcels.offered},
-      {"sorted", parcels.sorted},
-      {"missorted", parcels.missorted},
-      {"lost", parcels.lost},
-      {"duplicated", parcels.duplicated},
-      {"exceptions", {{"deserved", parcels.exceptions.deserved}, {"undeserved", parcels.exceptions.undeserved}}},
-      {"damaged", parcels.damaged}};
+  Json reasons = Json::object();
+  for (const auto& [reason, counts] : parcels.exceptions.reasons)
+    reasons[reason] = {{"deserved", counts.deserved}, {"undeserved", counts.undeserved}};
+  json["parcels"] = {{"offered", parcels.offered},
+                     {"sorted", parcels.sorted},
+                     {"missorted", parcels.missorted},
+                     {"lost", parcels.lost},
+                     {"duplicated", parcels.duplicated},
+                     {"exceptions",
+                      {{"deserved", parcels.exceptions.deserved},
+                       {"undeserved", parcels.exceptions.undeserved},
+                       {"reasons", std::move(reasons)}}},
+                     {"damaged", parcels.damaged}};
   json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                         {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
 }
@@ -66,6 +71,7 @@ void put_rounds(Json& json, const Report::Rounds& rounds) {
 nlohmann::ordered_json to_json(const Report& report) {
   const auto& loop = report.loop;
   Json json;
+  json["version"] = kReportVersion;
   json["seed"] = report.seed;
   json["world"] = report.world;
   if (report.rounds)
@@ -73,6 +79,8 @@ nlohmann::ordered_json to_json(const Report& report) {
   else
     put_parcels(json, report);
   json["retries"] = report.retries;
+  json["interventions"] = report.interventions ? Json(*report.interventions) : Json(nullptr);
+  json["fault_plan"] = report.fault_plan;
   json["faults"] = Json::object();
   for (const auto& [fault, times] : report.faults) json["faults"][fault] = times;
   json["limits"] = {{"violations", report.limits.violations},
@@ -92,6 +100,11 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["sim_seconds"] = number(report.sim_seconds);
   json["wall_seconds"] = number(report.wall_seconds);
   json["state_hash"] = hex(report.state_hash);
+  json["findings"] = Json::array();
+  for (const std::string& finding : report.findings) {
+    if (json["findings"].size() == kMostFindings) break;
+    json["findings"].push_back(finding);
+  }
   return json;
 }
 
@@ -114,6 +127,7 @@ void tell_parcels(const Line& line, const Report& report) {
   line("duplicated", fmt::format("{}", parcels.duplicated));
   line("damaged", fmt::format("{}", parcels.damaged));
   line("retries", fmt::format("{}", report.retries));
+  if (report.interventions.value_or(0) > 0) line("a person", fmt::format("needed {} times", *report.interventions));
   if (report.fault_plan != "none") line("faults", faults_text(report));
   line("throughput", std::isfinite(report.throughput.seconds_per_parcel)
                          ? fmt::format("{:.2f} s a parcel, {:.0f} parcels an hour",

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -17,9 +18,14 @@ namespace pons::record {
 // Counts are of parcels, from the referee's truth compared with the journal; times are simulated unless named
 // otherwise.
 struct Report {
+  struct Counts {
+    std::int64_t deserved = 0, undeserved = 0;
+    bool operator==(const Counts&) const = default;
+  };
   struct Exceptions {
     std::int64_t deserved = 0;    // unreadable, unknown, overweight, too large: nothing could have sorted them
     std::int64_t undeserved = 0;  // sortable, yet not sorted
+    std::map<std::string, Counts> reasons{};  // of both, by what the journal says, its numbers left out
   };
   struct Parcels {
     std::int64_t offered = 0;
@@ -78,15 +84,20 @@ struct Report {
   Throughput throughput{};
   std::optional<Rounds> rounds{};  // of a world with a base, instead of parcels and throughput
   std::int64_t retries = 0;
-  std::string fault_plan = "none";  // what was injected on purpose; of each fault of the plan, how often
+  std::optional<std::int64_t> interventions{};  // times the arm came to need a person; unknown to pons body
+  std::string fault_plan = "none";              // what was injected on purpose; of each fault of the plan, how often
   std::vector<std::pair<std::string, std::int64_t>> faults{};
   Limits limits{};
   Loop loop{};
   Bridge bridge{};
   double sim_seconds = 0;
   double wall_seconds = 0;
-  std::uint64_t state_hash = 0;  // sixteen hexadecimal digits in the file; equal for equal runs of one seed
+  std::uint64_t state_hash = 0;         // sixteen hexadecimal digits in the file; equal for equal runs of one seed
+  std::vector<std::string> findings{};  // the referee's, a line each; the file has the first kMostFindings
 };
+
+inline constexpr int kReportVersion = 1;  // grows when a field changes its meaning or goes
+inline constexpr std::size_t kMostFindings = 100;
 
 // `span_s` from the first parcel offered to the last outcome; nothing sorted gives NaN and 0.
 [[nodiscard]] Report::Throughput throughput(double span_s, std::int64_t sorted);
@@ -96,6 +107,10 @@ struct Report {
 
 // Puts the report at `path`, whole or not at all (see write_whole).
 [[nodiscard]] Expected<void> write(const Report& report, const std::filesystem::path& path);
+
+// What write() wrote. Errors, by the file's name: it cannot be read, is cut, is of another version, lacks a field or
+// has one of another kind.
+[[nodiscard]] Expected<Report> read(const std::filesystem::path& path);
 
 // A dozen aligned lines for a terminal, each ended by a newline.
 [[nodiscard]] std::string summary(const Report& report);

@@ -1,5 +1,6 @@
 #include "pons/record/report.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <string>
 
+#include "pons/record/file.hpp"
 #include "pons/record/test_schema.hpp"
 
 namespace pons::record {
@@ -26,10 +28,13 @@ using Json = nlohmann::ordered_json;
                       .missorted = 1,
                       .lost = 2,
                       .duplicated = 3,
-                      .exceptions = {.deserved = 4, .undeserved = 5},
+                      .exceptions = {.deserved = 4,
+                                     .undeserved = 5,
+                                     .reasons = {{"label unreadable", {4, 1}}, {"lost from sight", {0, 4}}}},
                       .damaged = 6},
           .throughput = throughput(570, 190),
           .retries = 7,
+          .interventions = 2,
           .fault_plan = "robin",
           .faults = {{"missed_grasp", 3}},
           .limits = {.violations = 0, .worst_ratio = 0.985, .saturated = 12},
@@ -44,7 +49,8 @@ using Json = nlohmann::ordered_json;
           .bridge = {.p50_ms = 0.25, .p99_ms = 9, .max_ms = 22.5},
           .sim_seconds = 600,
           .wall_seconds = 41.25,
-          .state_hash = 0x00f0e0d0c0b0a090};
+          .state_hash = 0x00f0e0d0c0b0a090,
+          .findings = {"P000007: missorted"}};
 }
 
 TEST(Report, SatisfiesItsSchema) {
@@ -66,16 +72,19 @@ TEST(Report, SchemaRefusesWhatIsNotAReport) {
 
 TEST(Report, KeepsEveryFigure) {
   EXPECT_EQ(to_json(example()), Json::parse(R"({
-    "seed": 18446744073709551615, "world": "parcel_cell",
+    "version": 1, "seed": 18446744073709551615, "world": "parcel_cell",
     "parcels": {"offered": 200, "sorted": 190, "missorted": 1, "lost": 2, "duplicated": 3,
-                "exceptions": {"deserved": 4, "undeserved": 5}, "damaged": 6},
+                "exceptions": {"deserved": 4, "undeserved": 5,
+                               "reasons": {"label unreadable": {"deserved": 4, "undeserved": 1},
+                                           "lost from sight": {"deserved": 0, "undeserved": 4}}}, "damaged": 6},
     "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
-    "faults": {"missed_grasp": 3},
+    "interventions": 2, "fault_plan": "robin", "faults": {"missed_grasp": 3},
     "limits": {"violations": 0, "worst_ratio": 0.985, "saturated": 12},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,
              "late_p50_us": 14.0, "late_p99_us": 60.0, "late_max_us": 880.0, "degraded": "SCHED_FIFO refused"},
     "bridge": {"p50_ms": 0.25, "p99_ms": 9.0, "max_ms": 22.5},
-    "sim_seconds": 600.0, "wall_seconds": 41.25, "state_hash": "00f0e0d0c0b0a090"})"));
+    "sim_seconds": 600.0, "wall_seconds": 41.25, "state_hash": "00f0e0d0c0b0a090",
+    "findings": ["P000007: missorted"]})"));
 }
 
 TEST(Report, NothingSortedHasNoSecondsPerParcel) {
@@ -95,9 +104,79 @@ TEST(Report, WritesWhatItSays) {
   EXPECT_THAT(written["world"].get<std::string>(), HasSubstr("UTF-8"));
 }
 
+TEST(Report, HasTheFirstHundredFindings) {
+  Report report = example();
+  report.findings.assign(101, "P000001: lost");
+  EXPECT_THAT(departures(to_json(report)), IsEmpty());
+  EXPECT_EQ(to_json(report)["findings"].size(), 100U);
+}
+
+class ReadReport : public ::testing::Test {
+ protected:
+  ~ReadReport() override { std::filesystem::remove(path_); }
+  void expect_refused(const std::string& text, const std::string& what) {
+    ASSERT_TRUE(write_whole(path_, text));
+    const auto report = read(path_);
+    ASSERT_FALSE(report) << text;
+    EXPECT_EQ(report.error().where.rfind(path_.string(), 0), 0U);
+    EXPECT_THAT(report.error().line(), HasSubstr(what));
+    EXPECT_FALSE(report.error().mend.empty());
+  }
+  const std::filesystem::path path_ =
+      std::filesystem::temp_directory_path() / fmt::format("pons_read_report_{}.json", ::getpid());
+};
+
+TEST_F(ReadReport, ReadsWhatWasWritten) {
+  Report base{.seed = 3, .world = "rounds", .throughput = throughput(0, 0)};
+  base.rounds = Report::Rounds{.tasks = 2,
+                               .succeeded = 1,
+                               .goals = 4,
+                               .missed = 1,
+                               .worst_goal_m = 0.5,
+                               .worst_goal_rad = 0.25,
+                               .collisions = 1,
+                               .fastest_m_s = 0.5,
+                               .driven_m = 16};
+  for (const Report& written : {example(), base, Report{.world = "empty", .throughput = throughput(0, 0)}}) {
+    ASSERT_TRUE(write(written, path_));
+    const auto report = read(path_);
+    ASSERT_TRUE(report) << report.error().line();
+    EXPECT_EQ(to_json(*report), to_json(written));
+  }
+}
+
+TEST_F(ReadReport, RefusesByNameWhatIsNone) {
+  std::filesystem::remove(path_);
+  EXPECT_THAT(read(path_).error().line(), HasSubstr("cannot be read"));
+  const std::string whole = to_json(example()).dump();
+  expect_refused("", "is cut or no JSON");
+  expect_refused(whole.substr(0, whole.size() / 2), "is cut or no JSON");
+  expect_refused("[]", "is no report");
+  const auto changed = [&](const char* pointer, const Json& value) {
+    Json json = to_json(example());
+    json[Json::json_pointer(pointer)] = value;
+    return json.dump();
+  };
+  expect_refused(changed("/version", 2), "is of version 2");
+  expect_refused(changed("/parcels/lost", "two"), "/parcels/lost");
+  expect_refused(changed("/parcels/lost", -1), "/parcels/lost");
+  expect_refused(changed("/parcels/lost", 1.5), "/parcels/lost");
+  expect_refused(changed("/wall_seconds", "long"), "/wall_seconds");
+  expect_refused(changed("/state_hash", "F0"), "/state_hash");
+  expect_refused(changed("/findings", 3), "/findings");
+  expect_refused(changed("/faults", {{"missed_grasp", -1}}), "/faults/missed_grasp");
+  Json old = to_json(example());
+  old.erase("version");
+  expect_refused(old.dump(), "is of version 0");
+  Json lacking = to_json(example());
+  lacking["limits"].erase("violations");
+  expect_refused(lacking.dump(), "/limits/violations");
+}
+
 TEST(Report, SummaryIsAligned) {
   const std::string text = summary(example());
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 17);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 18);
+  EXPECT_THAT(text, HasSubstr("  a person      needed 2 times\n"));
   EXPECT_THAT(text, HasSubstr("  faults        robin: 3 missed_grasp\n"));
   EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
   EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));

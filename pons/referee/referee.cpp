@@ -116,16 +116,22 @@ class Judge {
     if (!entry.ride && !entry.ended) return lost(parcel, entry, "in the exception chute without an entry");
     if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {
       ++verdict_.deserved;
+      ++verdict_.reasons[kind_of(entry.last_reason)].deserved;
     } else {
-      ++verdict_.undeserved;
+      undeserved(entry);
       find(parcel, entry, "undeserved exception");
     }
   }
 
   void below(const ParcelTruth& parcel, const Entry& entry) {
     if (entry.succeeded || (!entry.ride && !entry.ended)) return lost(parcel, entry, "fell without an entry");
-    ++verdict_.undeserved;
+    undeserved(entry);
     find(parcel, entry, "fell, with an entry");
+  }
+
+  void undeserved(const Entry& entry) {
+    ++verdict_.undeserved;
+    ++verdict_.reasons[kind_of(entry.last_reason)].undeserved;
   }
 
   void lost(const ParcelTruth& parcel, const Entry& entry, std::string_view why) {
@@ -147,7 +153,23 @@ class Judge {
   RunEnd end_;
 };
 
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 }  // namespace
+
+std::string kind_of(std::string_view reason) {
+  reason = reason.substr(0, reason.find_first_of(";:"));
+  std::string kind;
+  for (std::size_t i = 0; i < reason.size(); ++i) {
+    const bool within = i > 0 && i + 1 < reason.size() && is_digit(reason[i - 1]) && is_digit(reason[i + 1]);
+    if (!is_digit(reason[i]) && !(reason[i] == '.' && within)) {
+      kind += reason[i];
+    } else if (kind.empty() || kind.back() != '#') {
+      kind += '#';
+    }
+  }
+  return kind.empty() ? "no reason given" : kind;
+}
 
 Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const sim::ArmTruth& arm,
                         const bridge::Journal& journal, const Rules& rules, RunEnd end) {

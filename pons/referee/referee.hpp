@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pons/bridge/journal/journal.hpp"
@@ -26,6 +28,10 @@ struct Verdict {
   int duplicated = 0;  // handled twice by the journal
   int deserved = 0;    // exceptions that had a reason: label, mass, size
   int undeserved = 0;  // exceptions that had none, drops with an entry among them
+  struct Counts {
+    int deserved = 0, undeserved = 0;
+  };
+  std::map<std::string, Counts> reasons;  // of both, by kind_of the journal's reason
   int damaged = 0;
   int unfinished = 0;                 // still on the belt or in the hand when the run was broken off
   std::uint64_t violations = 0;       // axis-steps beyond a limit, as the simulator saw the arm
@@ -34,6 +40,10 @@ struct Verdict {
 };
 
 enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };
+
+// What reasons of one kind have in common: up to the first colon or semicolon, each number a #. "0 of 4 cups sealed;
+// gave up after 4 attempts" is of the kind "# of # cups sealed".
+[[nodiscard]] std::string kind_of(std::string_view reason);
 
 // Errors: the journal cannot be read.
 [[nodiscard]] Expected<Verdict> judge(const std::vector<sim::ParcelTruth>& parcels, const sim::ArmTruth& arm,

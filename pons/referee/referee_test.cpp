@@ -46,6 +46,25 @@ class RefereeTest : public ::testing::Test {
   sim::ArmTruth arm_;
 };
 
+TEST_F(RefereeTest, CountsExceptionsByTheKindOfTheirReason) {
+  EXPECT_EQ(kind_of("0 of 4 cups sealed; gave up after 4 attempts"), "# of # cups sealed");
+  EXPECT_EQ(kind_of("may be two: track 26"), "may be two");
+  EXPECT_EQ(kind_of("weighs 7.31 kg, more than 5.00 kg."), "weighs # kg, more than # kg.");
+  EXPECT_EQ(kind_of(""), "no reason given");
+  ride("A");
+  ride("B");
+  accept("C", "C");
+  end("C", Outcome::kFailed);
+  ParcelTruth unreadable = parcel("A", Whereabouts::kException, "exception");
+  unreadable.label = sim::LabelTruth::kDown;
+  const Verdict verdict =
+      judge({unreadable, parcel("B", Whereabouts::kException, "exception"), parcel("C", Whereabouts::kTray, "tray")});
+  ASSERT_EQ(verdict.reasons.size(), 2U);
+  EXPECT_EQ(verdict.reasons.at("r").deserved, 1);
+  EXPECT_EQ(verdict.reasons.at("r").undeserved, 1);
+  EXPECT_EQ(verdict.reasons.at("why").undeserved, 1);
+}
+
 TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   accept("A", "A");
   end("A", Outcome::kSucceeded);

@@ -59,7 +59,7 @@ Expected<void> Arming::tick(Time now) {
   look_around(now);
   const link::State& state = skills_.state();
   yielding_ = yielding_ && state.safety == SafetyState::kOperational;
-  needs_person_ = needs_person_ || (is_stopped(state) && needs_person(state));
+  if (is_stopped(state) && needs_person(state)) need_person();
   const bool operational = state.safety == SafetyState::kOperational && !yielding_ && !needs_person_;
   if (operational && took_over_) took_over_ = !skills_.settle(now);
   bridge_.hold(operational && !took_over_ ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
@@ -118,6 +118,10 @@ Expected<void> Arming::bring_in(Time now) {
   return skills_.recover(now);
 }
 
+void Arming::need_person() {
+  if (!std::exchange(needs_person_, true)) ++interventions_;
+}
+
 // From a stop at rest.
 bool Arming::may_resume(const link::State& state, Time now) const {
   return zones_are_empty(state, now) && now - *stopped_since_ >= kStandstillBeforeReset;
@@ -166,13 +170,13 @@ void Arming::note_person(std::string_view word, Time now) {
 // The arm first: a disk may keep one waiting.
 void Arming::stop(Time now) {
   skills_.halt();
-  needs_person_ = true;
+  need_person();
   note_person("stop", now);
 }
 
 void Arming::emergency_stop(Time now) {
   skills_.raise_emergency();
-  needs_person_ = true;
+  need_person();
   note_person("emergency stop", now);
 }
 

@@ -47,8 +47,11 @@ class Arming {
   // The arm is still being brought out of where a bridge that is no more has left it; nothing else may move it.
   [[nodiscard]] bool settles() const { return took_over_; }
   [[nodiscard]] std::int64_t stops() const { return stops_; }
+  // Times the arm came to need a person: by a cause that only one may reset, or by one's own word.
+  [[nodiscard]] std::int64_t interventions() const { return interventions_; }
 
  private:
+  void need_person();
   void note_person(std::string_view word, Time now);
   void look_around(Time now);
   void note_changes(const link::State& state, Time now);
@@ -70,7 +73,7 @@ class Arming {
   std::optional<Recovering> recovering_;     // since the arm was last operational, or in a person's hands
   std::array<Time, kMaxZones> occupied_at_;  // when somebody was last seen there, or heard of
   std::uint32_t zones_occupied_ = 0, zones_entered_ = 0;
-  std::int64_t stops_ = 0;
+  std::int64_t stops_ = 0, interventions_ = 0;
   bool needs_person_ = false;  // to reset and to arm
   bool was_operational_ = false;
   bool took_over_ = false;  // and the arm has not settled since

@@ -322,6 +322,7 @@ TEST_F(Visitor, StopsResetsAndArmsTheArm) {
   EXPECT_EQ(report_["parcels"]["lost"], 0) << report_.dump(2);
   EXPECT_EQ(report_["parcels"]["missorted"], 0);
   EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "nothing has ridden by";
+  EXPECT_EQ(report_["interventions"], 2) << "a stop and an emergency stop, each needed a person";
 }
 
 // The brain asks for its parcels under their own names. One that is taken costs it a try, not the parcel.

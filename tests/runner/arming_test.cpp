@@ -150,8 +150,10 @@ TEST_F(ArmingTest, OfEachCauseThatNeedsAPersonNobodyElseLeadsOut) {
     stand(row.cause);
     if (row.resumes == cerebellum::Resumes::kPerson) {
       expect_person_alone(arming);
+      EXPECT_EQ(arming.interventions(), 1);
       ++persons;
     } else {
+      EXPECT_EQ(arming.interventions(), 0);
       EXPECT_NEAR(leads_out_after_s(arming).value_or(60), 0.5, 0.02);
     }
   }
