@@ -17,6 +17,11 @@ if(CMAKE_CXX_FLAGS MATCHES "-fsanitize=")
 endif()
 add_library(ext::eigen ALIAS pons_eigen)
 
+# Headers alone.
+add_library(pons_boost INTERFACE)
+target_include_directories(pons_boost SYSTEM INTERFACE "${PONS_PREFIX}/include")
+add_library(ext::boost ALIAS pons_boost)
+
 function(pons_wheel_library name file)
   add_library(pons_ext_${name} SHARED IMPORTED GLOBAL)
   set_target_properties(pons_ext_${name} PROPERTIES IMPORTED_LOCATION "${file}")
