@@ -82,7 +82,8 @@ class Template {
       if (shown) out_ += text_.substr(at_, tag->begin - at_);
       at_ = tag->end;
       if (tag->kind == '/') {
-        if (tag->name != name || name.empty()) throw BadTemplate{tag->begin, fmt::format("'{}' is not open", tag->name)};
+        if (tag->name != name || name.empty())
+          throw BadTemplate{tag->begin, fmt::format("'{}' is not open", tag->name)};
         return;
       }
       if (tag->kind == '#' || tag->kind == '^') {
