@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "pons/core/error.hpp"
 
@@ -14,11 +15,15 @@ inline constexpr int kExitGood = 0;
 inline constexpr int kExitBadRun = 1;    // parcels lost or missorted, a limit broken, a part failed
 inline constexpr int kExitBadInput = 2;  // what was asked cannot be done: one line says why
 inline constexpr int kExitBodyGone = 3;  // pons bridge: its body has died or was ended
+inline constexpr int kExitNoResult = 4;  // pons sweep: a run has no result, and none is bad
 inline constexpr int kExitInterrupted = 130;
 
 using Chosen = std::function<int()>;  // returns the exit code
 
 void add_run(CLI::App& app, Chosen& chosen);
+// `words`: the whole command line after `pons`; `further`: what of it stands after --, which the parser does not see.
+void add_sweep(CLI::App& app, Chosen& chosen, const std::vector<std::string>& words,
+               const std::vector<std::string>& further);
 void add_body(CLI::App& app, Chosen& chosen);
 void add_bridge(CLI::App& app, Chosen& chosen);
 void add_worlds(CLI::App& app, Chosen& chosen);
@@ -30,6 +35,9 @@ void add_book(CLI::App& app, Chosen& chosen);
 void add_robot(CLI::App& app, Chosen& chosen);
 void add_doctor(CLI::App& app, Chosen& chosen);
 void add_completion(CLI::App& app, Chosen& chosen);
+
+// Whether `pons run WORDS` would begin: all that can be told before anything is built. Errors: what it would say.
+[[nodiscard]] Expected<void> check_run(const std::vector<std::string>& words);
 
 // A line for a person, on stdout or stderr. Never throws.
 void say(std::FILE* out, const std::string& text);

@@ -1,10 +1,14 @@
 // The command line: composes, parses, and runs what was chosen.
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "apps/commands.hpp"
 
@@ -18,6 +22,15 @@ std::string help_of(const CLI::App& app) {
                      chosen.empty() ? "" : " ");
 }
 
+// Of pons sweep, what stands after -- is for its runs: taken out of `words`.
+std::vector<std::string> taken_further(std::vector<std::string>& words) {
+  const auto dashes = std::ranges::find(words, "--");
+  if (words.empty() || words.front() != "sweep" || dashes == words.end()) return {};
+  std::vector<std::string> further(dashes + 1, words.end());
+  words.erase(dashes, words.end());
+  return further;
+}
+
 int run_command_line(int argc, char** argv) {
   CLI::App app{"Pons: the bridge between a robot's brain and its body.", "pons"};
   app.set_version_flag("--version", PONS_VERSION);
@@ -26,6 +39,9 @@ int run_command_line(int argc, char** argv) {
   app.footer("Start with: pons run parcel_cell");
   Chosen chosen;
   add_run(app, chosen);
+  std::vector<std::string> words(argv + 1, argv + argc);
+  const std::vector<std::string> all = words, further = taken_further(words);
+  add_sweep(app, chosen, all, further);
   add_body(app, chosen);
   add_bridge(app, chosen);
   add_worlds(app, chosen);
@@ -38,7 +54,8 @@ int run_command_line(int argc, char** argv) {
   add_doctor(app, chosen);
   add_completion(app, chosen);
   try {
-    app.parse(argc, argv);
+    std::ranges::reverse(words);  // as the parser takes them
+    app.parse(std::move(words));
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);
   } catch (const CLI::CallForVersion& version) {

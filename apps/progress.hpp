@@ -11,9 +11,27 @@
 
 namespace pons::apps {
 
+// A line that is drawn anew as things go on, and other lines above it.
+class StatusLine {
+ public:
+  // `out` is watched for being a terminal; elsewhere nothing is drawn.
+  explicit StatusLine(std::FILE* out);
+  [[nodiscard]] bool terminal() const { return terminal_; }
+  // At most ten times a second; says whether it was.
+  bool draw(std::string_view text);
+  // A line of something else, which ends with its line feed; what is drawn next stands below it.
+  void put(std::string_view line);
+  // Ends the line that is drawn.
+  void finish();
+
+ private:
+  std::FILE* out_;
+  bool terminal_, drawn_ = false;
+  std::chrono::steady_clock::time_point drawn_at_;
+};
+
 class Progress {
  public:
-  // `out` is watched for being a terminal.
   Progress(std::FILE* out, std::int64_t total);
 
   struct Figures {
@@ -24,20 +42,16 @@ class Progress {
   };
   // Draws when enough has changed; cheap otherwise.
   void show(const Figures& figures);
-  // A line of something else, which ends with its line feed; the bar is drawn anew below it.
-  void put(std::string_view line);
-  // Ends the bar's line.
-  void finish();
+  void put(std::string_view line) { line_.put(line); }
+  void finish() { line_.finish(); }
 
  private:
-  void bar(const Figures& figures, double rate);
-  void write(const std::string& text);
+  [[nodiscard]] std::string bar(const Figures& figures, double rate, double wall_s) const;
 
-  std::FILE* out_;
+  StatusLine line_;
   std::int64_t total_;
   std::int64_t shown_ = -1;
-  std::chrono::steady_clock::time_point began_, drawn_;
-  bool terminal_;
+  std::chrono::steady_clock::time_point began_;
 };
 
 }  // namespace pons::apps

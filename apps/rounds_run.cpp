@@ -154,15 +154,19 @@ Expected<std::vector<brain::Errand>> errands_of(const std::vector<std::string>& 
   return errands;
 }
 
-int run_rounds(const RoundsOptions& options, world::World world) {
+Expected<std::vector<brain::Errand>> errands_for(const RoundsOptions& options, const world::World& world) {
   if (!options.of_a_cell.empty())
-    return bad_input({"is for a cell with an arm; " + world.name + " has a base", options.of_a_cell, "leave it out"});
+    return fail("is for a cell with an arm; " + world.name + " has a base", options.of_a_cell, "leave it out");
   std::vector<std::string> files = options.tasks;
   if (files.empty()) {
     for (const fs::path& task : world.tasks) files.push_back(task.string());
   }
-  if (files.empty()) return bad_input({"nothing is asked of the base", "--task", "name a file with a task"});
-  auto errands = errands_of(files);
+  if (files.empty()) return fail("nothing is asked of the base", "--task", "name a file with a task");
+  return errands_of(files);
+}
+
+int run_rounds(const RoundsOptions& options, world::World world) {
+  auto errands = errands_for(options, world);
   if (!errands) return bad_input(errands.error());
 
   TemporaryFolder temporary;

@@ -26,6 +26,10 @@ struct RoundsOptions {
 // The tasks in those files, each to be asked for at its time. Error: a file that is none, a time that is none.
 [[nodiscard]] Expected<std::vector<brain::Errand>> errands_of(const std::vector<std::string>& tasks);
 
+// What is asked of the base: what the options name, else what its world has. Errors also: an option that only a cell
+// knows; nothing is asked.
+[[nodiscard]] Expected<std::vector<brain::Errand>> errands_for(const RoundsOptions& options, const world::World& world);
+
 // Returns the exit code. Bad unless every task succeeded and the referee found nothing.
 [[nodiscard]] int run_rounds(const RoundsOptions& options, world::World world);
 

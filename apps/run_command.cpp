@@ -127,6 +127,24 @@ RoundsOptions rounds_options(const RunOptions& options) {
   return rounds;
 }
 
+// Of a cell with an arm, what the options alone say of a run.
+struct CellInputs {
+  world::Manifest manifest;
+  BodySetup setup;
+};
+
+Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& world) {
+  if (!options.tasks.empty() || !options.speech.empty()) {
+    return fail("a cell with an arm gets its tasks from its dispatcher", options.tasks.empty() ? "--speech" : "--task",
+                "leave it out; pons task submit sends others to a run");
+  }
+  auto manifest = manifest_of(options.parcels, world, "pons run");
+  if (!manifest) return std::unexpected(manifest.error());
+  auto setup = body_setup(options.body, options.parcels.seed, world);
+  if (!setup) return std::unexpected(setup.error());
+  return CellInputs{std::move(*manifest), std::move(*setup)};
+}
+
 int run(const RunOptions& options) {
   // Before anything is opened: what is built is also taken down.
   watch_interrupts();
@@ -135,22 +153,16 @@ int run(const RunOptions& options) {
   auto world = world_named(options.world, "pons run");
   if (!world) return bad_input(world.error());
   if (world->base) return run_rounds(rounds_options(options), std::move(*world));
-  if (!options.tasks.empty() || !options.speech.empty()) {
-    return bad_input({"a cell with an arm gets its tasks from its dispatcher",
-                      options.tasks.empty() ? "--speech" : "--task",
-                      "leave it out; pons task submit sends others to a run"});
-  }
-  const auto manifest = manifest_of(options.parcels, *world, "pons run");
-  if (!manifest) return bad_input(manifest.error());
+  auto inputs = cell_inputs(options, *world);
+  if (!inputs) return bad_input(inputs.error());
+  const world::Manifest manifest = std::move(inputs->manifest);
 
   std::optional<TemporaryFolder> temporary;
   Expected<std::string> journal = bridge::named(options.journal, world->name);
   if (options.journal.empty()) journal = temporary.emplace().file("journal.db");
   if (!journal) return bad_input(journal.error());
-  auto setup = body_setup(options.body, options.parcels.seed, *world);
-  if (!setup) return bad_input(setup.error());
   AssemblyOptions assembly{.journal = *journal,
-                           .body = std::move(*setup),
+                           .body = std::move(inputs->setup),
                            .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep,
                            .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
   if (!options.socket.empty()) {
@@ -158,9 +170,32 @@ int run(const RunOptions& options) {
   } else if (options.realtime) {
     assembly.socket = default_socket();
   }
-  auto cell = Assembly::build(std::move(*world), *manifest, assembly);
+  auto cell = Assembly::build(std::move(*world), manifest, assembly);
   if (!cell) return bad_input(cell.error());
-  return run_cell(options, **cell, static_cast<std::int64_t>(manifest->size()));
+  return run_cell(options, **cell, static_cast<std::int64_t>(manifest.size()));
+}
+
+void add_options(CLI::App& command, RunOptions& options) {
+  command.add_option("world", options.world, "A world's name; `pons worlds` lists them");
+  add_parcel_options(command, options.parcels);
+  auto* lockstep =
+      command.add_flag("--lockstep", options.lockstep, "Virtual time, as fast as possible, repeatable (default)");
+  command.add_flag("--realtime", options.realtime, "Wall-clock pace, control loop on its own thread")
+      ->excludes(lockstep);
+  command.add_option("--journal", options.journal,
+                     "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes (a temporary file)");
+  command.add_option("--report", options.report, "JSON file for the figures of the run");
+  command.add_option("--log", options.log, "Text file for what the control loop did: stops, arming, refused commands");
+  command.add_option("--picture", options.picture, "PNG file for a picture of the cell at work");
+  command.add_option("--socket", options.socket, "Where `pons task` reaches this run (on by default with --realtime)");
+  command.add_option("--task", options.tasks,
+                     "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
+  command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");
+  add_body_setup_options(command, options.body);
+  command.add_flag("--recover", options.recover, "Bring an arm that is found outside its position limits slowly in");
+  command.add_flag("--explain", options.explain, "A line for each parcel that was not sorted as ordered");
+  command.add_flag("--quiet", options.quiet, "No progress");
+  refuse_empty(command);
 }
 
 }  // namespace
@@ -168,29 +203,28 @@ int run(const RunOptions& options) {
 void add_run(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "Run a world until its parcels are sorted, or its rounds are made");
-  command->add_option("world", options->world, "A world's name; `pons worlds` lists them");
-  add_parcel_options(*command, options->parcels);
-  auto* lockstep =
-      command->add_flag("--lockstep", options->lockstep, "Virtual time, as fast as possible, repeatable (default)");
-  command->add_flag("--realtime", options->realtime, "Wall-clock pace, control loop on its own thread")
-      ->excludes(lockstep);
-  command->add_option("--journal", options->journal,
-                      "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes (a temporary file)");
-  command->add_option("--report", options->report, "JSON file for the figures of the run");
-  command->add_option("--log", options->log,
-                      "Text file for what the control loop did: stops, arming, refused commands");
-  command->add_option("--picture", options->picture, "PNG file for a picture of the cell at work");
-  command->add_option("--socket", options->socket,
-                      "Where `pons task` reaches this run (on by default with --realtime)");
-  command->add_option("--task", options->tasks,
-                      "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
-  command->add_option("--speech", options->speech, "Folder for what a base says, a WAV file each (a temporary one)");
-  add_body_setup_options(*command, options->body);
-  command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
-  command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
-  command->add_flag("--quiet", options->quiet, "No progress");
-  refuse_empty(*command);
+  add_options(*command, *options);
   command->callback([options, &chosen] { chosen = [options] { return run(*options); }; });
+}
+
+Expected<void> check_run(const std::vector<std::string>& words) {
+  RunOptions options;
+  CLI::App command("", "pons run");
+  add_options(command, options);
+  try {
+    command.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  } catch (const CLI::ParseError& error) {
+    return fail(error.what(), "", "pons run --help shows what there is");
+  }
+  if (auto possible = check_files_of(options); !possible) return possible;
+  const auto world = world_named(options.world, "pons run");
+  if (!world) return std::unexpected(world.error());
+  if (world->base) {
+    const auto errands = errands_for(rounds_options(options), *world);
+    return errands ? Expected<void>{} : std::unexpected(errands.error());
+  }
+  const auto inputs = cell_inputs(options, *world);
+  return inputs ? Expected<void>{} : std::unexpected(inputs.error());
 }
 
 }  // namespace pons::apps

@@ -90,6 +90,8 @@ void watch_interrupts() {
 
 bool interrupted() { return interrupts > 0; }
 
+int interruptions() { return interrupts; }
+
 void add_parcel_options(CLI::App& command, ParcelOptions& options) {
   auto* parcels =
       command.add_option("--parcels", options.parcels, "How many parcels; 1 to 1000000 (200)")->check(whole_number);

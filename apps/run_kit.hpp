@@ -31,6 +31,7 @@ namespace pons::apps {
 // From here on the first SIGINT, SIGTERM or SIGHUP is counted, and the third ends the process at once.
 void watch_interrupts();
 [[nodiscard]] bool interrupted();
+[[nodiscard]] int interruptions();
 
 // ---- what is to be sorted ----
 
