@@ -70,16 +70,10 @@ void judge(record::SweepRun& run, const RunOutcome& outcome, const fs::path& fol
     return fail_with(run, Fate::kFailed, fmt::format("its report is of {}, seed {}", report->world, report->seed));
   }
   run.report = std::move(*report);
-  if (ended.code == kExitGood) {
-    run.fate = Fate::kGood;
-    run.last_words.clear();
-    return;
-  }
-  run.fate = Fate::kBad;
-  if (record::troubles(run).empty() || !complaint(run.last_words).empty()) {
-    const std::string said = complaint(run.last_words);
-    run.why = said.empty() ? describe(ended) : said;
-  }
+  const std::string said = complaint(std::exchange(run.last_words, {}));
+  run.fate = ended.code == kExitGood ? Fate::kGood : Fate::kBad;
+  if (run.fate == Fate::kGood) return;
+  run.why = said.empty() && record::troubles(run).empty() ? describe(ended) : said;
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace {
 using record::Fate;
 
 constexpr std::size_t kBarWidth = 30;
+constexpr std::size_t kTold = 8;  // lines of a run that is not good
 
 // What a good run is told by.
 std::string figure_of(const record::SweepRun& run) {
@@ -100,7 +101,9 @@ std::string told(const record::SweepRun& run) {
   std::string text = fmt::format("{}: {}{}{}\n", run.name, record::name(run.fate), figure_of(run),
                                  troubles.empty() ? "" : fmt::format(": {}", fmt::join(troubles, "; ")));
   if (run.fate == Fate::kGood) return text;
-  for (const std::string& line : run.last_words) text += fmt::format("          | {}\n", line);
+  std::vector<std::string> lines = run.report ? run.report->findings : run.last_words;
+  if (lines.size() > kTold) lines.resize(kTold);
+  for (const std::string& line : lines) text += fmt::format("          | {}\n", line);
   return text + fmt::format("          again: {}\n", record::shell_line(run.command));
 }
 

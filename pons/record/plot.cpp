@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kLeft = 44, kRight = 352, kTop = 22, kBottom = 182;
+constexpr double kLeft = 44, kRight = 344, kTop = 22, kBottom = 182;
 constexpr double kInset = 10;  // of the outermost ranks
 constexpr int kTicks = 5, kNames = 6;
 

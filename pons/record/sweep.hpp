@@ -29,7 +29,7 @@ struct SweepRun {
   std::vector<std::string> command;  // makes the run again, by itself
   Fate fate = Fate::kMissing;
   std::string why{};                      // of kFailed and kMissing, and of kBad what its report does not tell
-  std::vector<std::string> last_words{};  // of its log, unless it was good
+  std::vector<std::string> last_words{};  // of the logs of kFailed and kMissing
   std::optional<Report> report{};         // of kGood and kBad
 };
 

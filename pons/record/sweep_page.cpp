@@ -98,38 +98,40 @@ Json tile(std::string_view label, const std::string& value, const std::string& n
   return {{"label", label}, {"value", value}, {"note", note}, {"kind", kind}};
 }
 
-Json tile(std::string_view label, std::int64_t events, std::int64_t trials) {
-  return tile(label, grouped(events), bound_text(events, trials), events > 0 ? "off" : "fine");
-}
-
 Json tiles(const Sum& all, const std::vector<Sum>& groups) {
   Json list = Json::array();
   list.push_back(tile("runs good", fmt::format("{} of {}", grouped(all.good), grouped(all.planned)),
                       fmt::format("{} bad, {} without a result", all.bad, all.failed + all.missing),
                       all.good == all.planned ? "fine" : "off"));
   if (all.cells > 0) {
+    // A bound on what several worlds and plans come to together would be one on nothing that there is.
+    const bool one = std::ranges::count_if(groups, [](const Sum& sum) { return sum.cells > 0; }) == 1;
     const auto& parcels = all.parcels;
+    const auto share = [&](std::string_view label, std::int64_t events) {
+      list.push_back(tile(label, grouped(events),
+                          one ? bound_text(events, parcels.offered) : share_text(events, parcels.offered),
+                          events > 0 ? "off" : "fine"));
+    };
     list.push_back(tile(
         "parcels", grouped(parcels.offered),
         fmt::format("{} sorted, {}", grouped(parcels.sorted), share_text(parcels.sorted, parcels.offered)), "plain"));
-    list.push_back(tile("lost", parcels.lost, parcels.offered));
-    list.push_back(tile("missorted", parcels.missorted, parcels.offered));
-    list.push_back(tile("handled twice", parcels.duplicated, parcels.offered));
-    list.push_back(tile("exceptions, undeserved", grouped(parcels.exceptions.undeserved),
+    share("lost", parcels.lost);
+    share("missorted", parcels.missorted);
+    share("handled twice", parcels.duplicated);
+    list.push_back(tile("undeserved exceptions", grouped(parcels.exceptions.undeserved),
                         fmt::format("{}, and {} deserved", share_text(parcels.exceptions.undeserved, parcels.offered),
                                     grouped(parcels.exceptions.deserved)),
                         "plain"));
-    const bool one = std::ranges::count_if(groups, [](const Sum& sum) { return sum.cells > 0; }) == 1;
     if (one)
       list.push_back(tile("seconds a parcel", pace_text(all), fmt::format("median; {}", range_text(all)), "plain"));
   }
   if (all.bases > 0) {
-    list.push_back(tile("tasks succeeded",
-                        fmt::format("{} of {}", grouped(all.rounds.succeeded), grouped(all.rounds.tasks)),
-                        fmt::format("{} goals, {} missed", all.rounds.goals, all.rounds.missed),
-                        all.rounds.succeeded == all.rounds.tasks && all.rounds.missed == 0 ? "fine" : "off"));
-    list.push_back(tile("collisions", grouped(all.rounds.collisions), fmt::format("in {:.0f} m", all.rounds.driven_m),
-                        all.rounds.collisions > 0 ? "off" : "fine"));
+    const auto& rounds = all.rounds;
+    list.push_back(tile("tasks succeeded", fmt::format("{} of {}", grouped(rounds.succeeded), grouped(rounds.tasks)),
+                        fmt::format("{} goals, {} missed", rounds.goals, rounds.missed),
+                        rounds.succeeded == rounds.tasks && rounds.missed == 0 ? "fine" : "off"));
+    list.push_back(tile("collisions", grouped(rounds.collisions), fmt::format("in {:.0f} m", rounds.driven_m),
+                        rounds.collisions > 0 ? "off" : "fine"));
   }
   list.push_back(tile("interventions", grouped(all.interventions), "times a person was needed", "plain"));
   list.push_back(tile("limit violations", grouped(all.violations), "axis-ticks", all.violations > 0 ? "off" : "fine"));
@@ -172,23 +174,29 @@ Json reasons(const Sum& all) {
   return list;
 }
 
-Json injected(const std::vector<Sum>& groups) {
-  Json list = Json::array();
+// A row for each fault that a plan has, a column for each group that has a plan.
+Json injected(const Sum& all, const std::vector<Sum>& groups) {
+  Json columns = Json::array(), rows = Json::array();
   for (const Sum& sum : groups) {
-    for (const auto& [fault, times] : sum.faults_injected) {
-      const double rate = sum.parcels.offered > 0
-                              ? 1000.0 * static_cast<double>(times) / static_cast<double>(sum.parcels.offered)
-                              : 0.0;
-      std::string readable = fault;
-      std::ranges::replace(readable, '_', ' ');
-      list.push_back({{"world", sum.world},
-                      {"faults", sum.faults},
-                      {"fault", readable},
-                      {"times", grouped(times)},
-                      {"rate", fmt::format("{:.1f}", rate)}});
-    }
+    if (!sum.faults_injected.empty()) columns.push_back({{"world", sum.world}, {"faults", sum.faults}});
   }
-  return list;
+  for (const auto& [fault, total] : all.faults_injected) {
+    Json cells = Json::array();
+    for (const Sum& sum : groups) {
+      if (sum.faults_injected.empty()) continue;
+      const auto found = std::ranges::find(sum.faults_injected, fault, &std::pair<std::string, std::int64_t>::first);
+      const bool has = found != sum.faults_injected.end();
+      const bool rate = has && sum.parcels.offered > 0;
+      cells.push_back({{"times", has ? grouped(found->second) : kNone},
+                       {"rate", rate ? fmt::format("{:.1f}", 1000.0 * static_cast<double>(found->second) /
+                                                                 static_cast<double>(sum.parcels.offered))
+                                     : std::string()}});
+    }
+    std::string readable = fault;
+    std::ranges::replace(readable, '_', ' ');
+    rows.push_back({{"fault", readable}, {"total", grouped(total)}, {"cells", std::move(cells)}});
+  }
+  return {{"columns", std::move(columns)}, {"rows", std::move(rows)}};
 }
 
 Json figures_of(const SweepRun& run) {
@@ -265,7 +273,7 @@ Json view_of(const Sweep& sweep) {
                {"command", shell_line(sweep.command)},
                {"tiles", tiles(all, groups)},
                {"reasons", reasons(all)},
-               {"injected", injected(groups)}};
+               {"injected", injected(all, groups)}};
   for (const char* list : {"cells", "bases", "plots", "runs"}) view[list] = Json::array();
   for (const Sum& sum : groups) {
     if (sum.cells > 0) view["cells"].push_back(cell_view(sum));
@@ -274,7 +282,7 @@ Json view_of(const Sweep& sweep) {
   view["any_cells"] = !view["cells"].empty();
   view["any_bases"] = !view["bases"].empty();
   view["any_reasons"] = !view["reasons"].empty();
-  view["any_injected"] = !view["injected"].empty();
+  view["any_injected"] = !view["injected"]["rows"].empty();
   for (const Plot& plot : plots(sweep)) view["plots"].push_back(record::view_of(plot));
   for (std::size_t i = 0; i < sweep.runs.size(); ++i) view["runs"].push_back(run_view(sweep.runs[i], i));
   return view;

@@ -13,6 +13,7 @@ namespace pons::record {
 namespace {
 
 constexpr double kHundred = 100;
+constexpr std::size_t kBand = 6;  // of fewer runs quartiles say nothing
 
 std::string kind_of(const SweepRun& run) { return std::string(name(run.fate)); }
 
@@ -67,9 +68,13 @@ std::optional<Plot> by_seed(const Sweep& sweep, const Sum& sum) {
   }
   const auto of = spread(values);
   if (!of) return std::nullopt;
-  plot.about = fmt::format("median {:.2f}, best {:.2f}, worst {:.2f} {}; the band holds the middle half of {} runs",
-                           of->median, of->least, of->most, plot.y.label, values.size());
-  plot.levels = {{of->lower_quartile, of->upper_quartile, {}}, {of->median, of->median, "median"}};
+  plot.about =
+      fmt::format("median {:.2f}, best {:.2f}, worst {:.2f} {}", of->median, of->least, of->most, plot.y.label);
+  plot.levels = {{of->median, of->median, "median"}};
+  if (values.size() >= kBand) {
+    plot.about += fmt::format("; the band holds the middle half of {} runs", values.size());
+    plot.levels.push_back({of->lower_quartile, of->upper_quartile, {}});
+  }
   return plot;
 }
 
@@ -136,6 +141,14 @@ std::vector<Plot> plots(const Sweep& sweep) {
   std::vector<Plot> all;
   for (const Sum& sum : sums(sweep)) {
     if (auto plot = by_seed(sweep, sum)) all.push_back(std::move(*plot));
+  }
+  // What is measured alike is drawn on one scale, to be compared.
+  for (Plot& plot : all) {
+    for (const Plot& other : all) {
+      if (other.y.label != plot.y.label) continue;
+      widen(plot.y, other.y.least);
+      widen(plot.y, other.y.most);
+    }
   }
   if (auto plot = faults_against_outcomes(sweep)) all.push_back(std::move(*plot));
   if (auto plot = pace_of_simulation(sweep)) all.push_back(std::move(*plot));

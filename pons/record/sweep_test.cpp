@@ -198,6 +198,34 @@ TEST(SweepPage, EveryRunHasItsRowAndItsDots) {
   EXPECT_EQ(view["runs"].size(), 6U);
 }
 
+TEST(SweepPage, DrawsWhatIsMeasuredAlikeOnOneScale) {
+  const auto view = view_of(example());
+  EXPECT_EQ(view["plots"][0]["y_ticks"], view["plots"][1]["y_ticks"]) << "2.5 to 2.7 s, and 3.5 s";
+  EXPECT_NE(view["plots"][0]["y_ticks"], view["plots"][2]["y_ticks"]) << "millimetres";
+}
+
+TEST(SweepPage, BoundsNothingThatIsOfSeveralKinds) {
+  Sweep sweep = example();
+  const auto note = [](const nlohmann::ordered_json& view) {
+    for (const auto& tile : view["tiles"]) {
+      if (tile["label"] == "lost") return tile["note"].get<std::string>();
+    }
+    return std::string("no such tile");
+  };
+  EXPECT_EQ(note(view_of(sweep)), "0.044 %") << "2 of 4500";
+  sweep.runs.resize(2);
+  EXPECT_EQ(note(view_of(sweep)), "≤ 0.1 %") << "0 of 3000";
+}
+
+TEST(SweepPage, CountsEachFaultByItsPlan) {
+  const auto injected = view_of(example())["injected"];
+  ASSERT_EQ(injected["columns"].size(), 1U);
+  EXPECT_EQ(injected["columns"][0]["faults"], "storm");
+  ASSERT_EQ(injected["rows"].size(), 2U);
+  EXPECT_EQ(injected["rows"][0]["cells"][0]["times"], "25");
+  EXPECT_EQ(injected["rows"][0]["cells"][0]["rate"], "16.7");
+}
+
 TEST(SweepPage, RareReasonsAreOneBar) {
   Sweep sweep = example();
   sweep.runs = {cell_run("none", 1, 2.5)};
