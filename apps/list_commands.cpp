@@ -66,8 +66,8 @@ _pons() {
   local -a asked=()
   case $before in
     --world) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
-    --manifest|--journal|--report|--log|--picture|--socket|submit|check|compact|upgrade) COMPREPLY=($(compgen -f -- "$current")); return ;;
-    run|body|bridge) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
+    --manifest|--journal|--report|--log|--picture|--socket|--out|--merge|submit|check|compact|upgrade) COMPREPLY=($(compgen -f -- "$current")); return ;;
+    run|sweep|body|bridge) COMPREPLY=($(compgen -W "$(pons worlds 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
     skills) COMPREPLY=($(compgen -W "$(pons skills 2>/dev/null | cut -d' ' -f1)" -- "$current")); return ;;
     completion) COMPREPLY=($(compgen -W "bash zsh" -- "$current")); return ;;
   esac

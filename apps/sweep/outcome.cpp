@@ -49,28 +49,30 @@ void fail_with(record::SweepRun& run, Fate fate, std::string why) {
   run.why = std::move(why);
 }
 
-// What a program said of itself at the end: "pons: broken off: it ran too long".
-std::string complaint(const std::vector<std::string>& lines) {
-  for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
-    if (line->starts_with("pons: ")) return line->substr(6);
+// What a program said last on its error stream, which need not be the log's last line: "broken off: it ran too long".
+std::string complaint(const fs::path& log) {
+  std::ifstream in(log, std::ios::binary);
+  std::string found;
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("pons: ") && !line.starts_with("pons: degraded")) found = line.substr(6, kLongestLine);
   }
-  return {};
+  return found;
 }
 
 void judge(record::SweepRun& run, const RunOutcome& outcome, const fs::path& folder) {
-  run.last_words = last_lines(folder / kLogFile);
+  const std::string said = complaint(folder / kLogFile);
   const Ended& ended = outcome.ended;
-  if (ended.signal != 0 || (ended.code != kExitGood && ended.code != kExitBadRun)) {
-    const std::string said = ended.signal == 0 ? complaint(run.last_words) : std::string();
-    return fail_with(run, Fate::kFailed, said.empty() ? describe(ended) : fmt::format("{}: {}", describe(ended), said));
-  }
+  const bool whole = ended.signal == 0 && (ended.code == kExitGood || ended.code == kExitBadRun);
   auto report = record::read(folder / kReportFile);
-  if (!report) return fail_with(run, Fate::kFailed, report.error().line());
+  if (!whole || !report) {
+    run.last_words = last_lines(folder / kLogFile);
+    const std::string how = said.empty() ? describe(ended) : fmt::format("{}: {}", describe(ended), said);
+    return fail_with(run, Fate::kFailed, whole && said.empty() ? report.error().line() : how);
+  }
   if (report->world != run.world || report->seed != run.seed) {
     return fail_with(run, Fate::kFailed, fmt::format("its report is of {}, seed {}", report->world, report->seed));
   }
   run.report = std::move(*report);
-  const std::string said = complaint(std::exchange(run.last_words, {}));
   run.fate = ended.code == kExitGood ? Fate::kGood : Fate::kBad;
   if (run.fate == Fate::kGood) return;
   run.why = said.empty() && record::troubles(run).empty() ? describe(ended) : said;
