@@ -1,10 +1,10 @@
 #include "apps/sweep/conduct.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <deque>
 #include <optional>
 #include <system_error>
@@ -84,7 +84,7 @@ class Conductor {
     if (!child) return std::unexpected(child.error());
     free_slots_.pop_back();
     to_make_.pop_front();
-    jobs_.push_back({run, slot, std::move(*child)});
+    jobs_.push_back({run, slot, *child});
     return {};
   }
 

@@ -41,7 +41,7 @@ class BridgeSide {
   void close(Time now);
 
   // From now on the brain is silent in these spells.
-  void stall_brain(world::Spells stalls) { stalls_ = std::move(stalls); }
+  void stall_brain(const world::Spells& stalls) { stalls_ = stalls; }
   [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
