@@ -360,6 +360,7 @@ void Cerebellum::publish_measurement(const body::Sensors& sensors) {
   state_.belt_travel_m = sensors.belt_travel_m;
   state_.belt_speed_m_s = sensors.belt_speed_m_s;
   state_.photo_eye_blocked = sensors.photo_eye_blocked;
+  state_.fallen_into = sensors.fallen_into;
 }
 
 void Cerebellum::publish(link::CerebellumEnd& link, const body::SetPoints& set_points) {

@@ -10,6 +10,7 @@ namespace pons {
 inline constexpr std::size_t kMaxAxes = 8;    // the longest kinematic chain a robot file may name
 inline constexpr std::size_t kMaxCups = 8;    // suction cups of one gripper
 inline constexpr std::size_t kMaxZones = 16;  // watched zones of one cell
+inline constexpr std::size_t kMaxPlaces = 64;  // places of one cell
 
 // One value a joint, in the order of the robot file. Eigen with a compile-time ceiling: size() is the robot's own axis
 // count, storage is inline.

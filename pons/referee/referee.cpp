@@ -23,6 +23,7 @@ struct Entry {
   bool succeeded = false;
   bool ride = false;  // let go by on purpose
   std::string last_reason;
+  std::string fell_into;  // the chute that the last outcome names
 };
 
 // The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
@@ -48,6 +49,9 @@ void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) 
     ++entry.successes;
   }
   entry.last_reason = outcome->reason;
+  entry.fell_into.clear();
+  for (const Json& step : outcome->detail.value("steps", Json::array()))
+    entry.fell_into = task::text_of(step.value("detail", Json{}), "fell_into");
 }
 
 Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
@@ -101,7 +105,10 @@ class Judge {
 
  private:
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
-    if (parcel.place != parcel.destination) {
+    if (!entry.succeeded && parcel.place == entry.fell_into) {
+      undeserved(entry);
+      find(parcel, entry, "fell into another chute, which the journal names");
+    } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted");
     } else if (!entry.succeeded) {

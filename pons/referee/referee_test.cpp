@@ -34,6 +34,10 @@ class RefereeTest : public ::testing::Test {
     ASSERT_TRUE(journal_->accept(task, Time{}));
   }
   void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
+  void fell(const std::string& id, const std::string& place) {
+    const bridge::Json detail{{"steps", {{{"skill", "place"}, {"detail", {{"fell_into", place}}}}}}};
+    ASSERT_TRUE(journal_->outcome(id, Outcome::kException, "fell into " + place, Time{}, detail));
+  }
   void ride(const std::string& code) { ASSERT_TRUE(journal_->note(Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
 
   Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
@@ -100,10 +104,21 @@ TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {
   EXPECT_EQ(verdict.lost, 1) << "nobody ever decided about it";
 }
 
-TEST_F(RefereeTest, AnotherChuteIsMissortedWhateverTheJournalSays) {
+TEST_F(RefereeTest, AnotherChuteIsMissortedUnlessTheJournalNamesIt) {
   accept("A", "A");
   end("A", Outcome::kSucceeded);
-  EXPECT_EQ(judge({parcel("A", Whereabouts::kChute, "chute_2")}).missorted, 1);
+  accept("B", "B");
+  end("B", Outcome::kException);
+  accept("C", "C");
+  fell("C", "chute_3");
+  accept("D", "D");
+  fell("D", "chute_2");
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_2"), parcel("B", Whereabouts::kChute, "chute_2"),
+             parcel("C", Whereabouts::kChute, "chute_2"), parcel("D", Whereabouts::kChute, "chute_2")});
+  EXPECT_EQ(verdict.missorted, 3);
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.reasons.at("fell into chute_#").undeserved, 1);
 }
 
 TEST_F(RefereeTest, ExceptionNeedsAnEntryAndDeservesAReason) {

@@ -10,6 +10,7 @@
 #include "pons/sim/bus.hpp"
 #include "pons/sim/camera.hpp"
 #include "pons/sim/compose.hpp"
+#include "pons/sim/curtains.hpp"
 #include "pons/sim/faults.hpp"
 #include "pons/sim/feeder.hpp"
 #include "pons/sim/gripper.hpp"
@@ -50,6 +51,7 @@ struct Cell {
   Gripper gripper;
   Ledger ledger;
   Feeder feeder;
+  Curtains curtains;
   LabelStore labels;
   std::vector<std::unique_ptr<SimCamera>> cameras;
   std::vector<body::Camera*> camera_list;

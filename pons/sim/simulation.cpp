@@ -38,6 +38,7 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       belt(world.belt, seed),
       ledger(world, manifest, arrivals),
       feeder(world, manifest, arrivals),
+      curtains(world),
       body(this),
       noise(Random(seed).fork(kNoiseStream)),
       bus(from_s(world.robot.drive_delay_s)),
@@ -166,6 +167,8 @@ void Cell::measure() {
   measured.belt_travel_m = belt.travel_m();
   measured.belt_speed_m_s = belt.speed_m_s();
   measured.photo_eye_blocked = feeder.photo_eye(composed, data.get(), ledger);
+  curtains.update(composed, data.get(), ledger);
+  measured.fallen_into = curtains.counts();
 }
 
 void SimBody::read(body::Sensors& sensors) {

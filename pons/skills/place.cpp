@@ -44,16 +44,22 @@ constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
 constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
-constexpr double kMiddle = 0.15;  // of the mouth, from its centre
+constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
 
 class Place final : public ArmSkill {
  public:
   Place(Cell& cell, std::string name, std::string object, Time now)
-      : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now), delay_(cell.arm) {}
+      : cell_(cell),
+        name_(std::move(name)),
+        object_(std::move(object)),
+        started_(now),
+        delay_(cell.arm),
+        fallen_into_(cell.arm.state().fallen_into) {}
 
   Progress tick(Time now) override {
     move_along(delay_.take());
     if (!let_go_.empty() && !cell_.held) return gone(now);
+    if (phase_ == Phase::kFall) return fall(now);
     if (!cell_.arm.operational()) {
       // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
       plan_anew();
@@ -66,6 +72,8 @@ class Place final : public ArmSkill {
         return carry(now);
       case Phase::kRelease:
         return release(now);
+      case Phase::kFall:
+        break;
       case Phase::kHold:
         return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
     }
@@ -74,7 +82,8 @@ class Place final : public ArmSkill {
 
   void cancel(Time now) override {
     cancelled_ = true;
-    if (phase_ == Phase::kRelease || phase_ == Phase::kHold) return;  // it is over the mouth already
+    // It is over the mouth already, or on its way down.
+    if (phase_ == Phase::kRelease || phase_ == Phase::kFall || phase_ == Phase::kHold) return;
     if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
     phase_ = Phase::kHold;
   }
@@ -91,7 +100,7 @@ class Place final : public ArmSkill {
   }
 
  private:
-  enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kHold };
+  enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kFall, kHold };
 
   void plan_anew() {
     phase_ = Phase::kPlan;
@@ -211,18 +220,7 @@ class Place final : public ArmSkill {
   }
 
   Progress carry(Time now) {
-    if (cell_.arm.cups().phase == link::VacuumPhase::kLost) {
-      const std::string code = cell_.held->code;
-      cell_.arm.vacuum(false);
-      cell_.holds_nothing();
-      const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-      const task::Json detail{{"place", name_}, {"object", code}, {"at_m", {tip.x(), tip.y(), tip.z()}}};
-      // Over the middle of its mouth it only fell a little early.
-      const world::Place& target = *cell_.world.place(name_);
-      const Vector3 off = (tip - target.center_m).cwiseAbs();
-      const bool over = off.x() < kMiddle * target.size_m.x() && off.y() < kMiddle * target.size_m.y();
-      return over ? Progress{Status::kSucceeded, "let go early", detail} : Progress{Status::kFailed, "dropped", detail};
-    }
+    if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now);
     look_out(now);
     const bool level = hangs_level(now);
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
@@ -233,6 +231,32 @@ class Place final : public ArmSkill {
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
+  }
+
+  Progress begin_fall(Time now) {
+    fallen_ = cell_.held->code;
+    cell_.arm.vacuum(false);
+    cell_.holds_nothing();
+    fell_at_ = now;
+    phase_ = Phase::kFall;
+    return fall(now);
+  }
+
+  // The mouths' light curtains tell into which it went, and the journal whom to send there. What lies on the belt again
+  // is seen again.
+  Progress fall(Time now) {
+    task::Json detail{{"place", name_}, {"object", fallen_}};
+    for (std::size_t i = 0; i < cell_.world.places.size(); ++i) {
+      const world::Place& place = cell_.world.places[i];
+      // What rides off the belt's end falls through the exception chute's.
+      if (place.kind != world::PlaceKind::kChute) continue;
+      if (cell_.arm.state().fallen_into[i] == fallen_into_[i]) continue;
+      if (place.name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
+      detail["fell_into"] = place.name;
+      return {Status::kException, "fell into " + place.name, std::move(detail)};
+    }
+    if (now < fell_at_ + kFallsWithin) return {};
+    return {Status::kFailed, "dropped", std::move(detail)};
   }
 
   // From the vertical, in radians, and still fall through the mouth: its lower edges move aside with its height.
@@ -288,6 +312,9 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
+  std::array<std::uint16_t, kMaxPlaces> fallen_into_;  // before it was carried
+  std::string fallen_;                                 // what the cups lost on the way
+  Time fell_at_;
   bool cancelled_ = false;
 };
 

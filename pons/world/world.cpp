@@ -73,7 +73,7 @@ bool mouths_overlap(const Place& a, const Place& b) {
 std::vector<Place> read_places(const YamlValue& value) {
   std::vector<Place> places;
   std::set<std::string> taken{"belt", "home"};  // each means something already
-  for (const YamlValue& entry : value.list(1, 256)) {
+  for (const YamlValue& entry : value.list(1, kMaxPlaces)) {
     const YamlMap map(entry, {"name", "kind", "center", "size"});
     Place place;
     place.name = new_name(map["name"], taken);

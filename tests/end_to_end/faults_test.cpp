@@ -43,6 +43,16 @@ TEST(Faults, CupsThatLeakHoldOrAreTriedAgain) {
   EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 1) << run.said;
 }
 
+// Into its chute, into another, which the journal then names, on the belt or beside it.
+TEST(Faults, WhatFallsOnTheWayIsAccountedFor) {
+  const Faulty run = run_with("drop: {a_pick: 0.4}\n", 30, 2);
+  EXPECT_GE(run.injected("drop"), 5);
+  EXPECT_GE(
+      run.report["parcels"]["exceptions"]["reasons"].value("fell into chute_#", json::object()).value("undeserved", 0),
+      1)
+      << run.said;
+}
+
 TEST(Faults, ABeltThatJamsCostsTimeOnly) {
   const Faulty run = run_with("belt_jam: {an_hour: 300, lasts_s: [2, 6]}\n", 20, 1);
   EXPECT_GE(run.injected("belt_jam"), 1);
