@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pons/skills/conduct.hpp"
+#include "pons/skills/set_down.hpp"
 
 namespace pons::tests {
 namespace {
@@ -57,19 +58,20 @@ class ByArm : public skills::ArmSkill {
 
 class Pick final : public ByArm {
  public:
-  Pick(Cell& cell, Steps& steps, std::string object) : ByArm(cell, steps), object_(std::move(object)) {}
+  Pick(Cell& cell, Steps& steps, std::string object)
+      : ByArm(cell, steps), object_(std::move(object)), set_down_(cell) {}
 
   Progress tick(Time now) override {
-    if (cell_.held && cell_.held->code != object_)
-      return {Status::kFailed, fmt::format("the cups hold {}", cell_.held->code)};
     if (!cell_.arm.operational()) {
       phase_ = cell_.held ? Phase::kLift : Phase::kSeek;
+      lays_ = false;
       return cancelled_ ? Progress{Status::kFailed, "cancelled"} : Progress{};
     }
     if (cancelled_) {
       if (phase_ == Phase::kGrip && !cell_.held) vacuum(false);
       return {Status::kFailed, cell_.held ? "cancelled; still held" : "cancelled"};
     }
+    if (cell_.held && cell_.held->code != object_) return make_room(now);
     switch (phase_) {
       case Phase::kSeek:
         return seek(now);
@@ -83,7 +85,7 @@ class Pick final : public ByArm {
     return {Status::kFailed, "unreachable"};
   }
   bool may_rest(Time, task::Pause pause) override {
-    if (phase_ == Phase::kGrip || (pause == task::Pause::kHandOver && cell_.held)) return false;
+    if (lays_ || phase_ == Phase::kGrip || (pause == task::Pause::kHandOver && cell_.held)) return false;
     phase_ = cell_.held ? Phase::kLift : Phase::kSeek;
     lifts_ = false;
     return true;
@@ -93,6 +95,16 @@ class Pick final : public ByArm {
  private:
   enum class Phase : std::uint8_t { kSeek, kReach, kGrip, kLift };
 
+  // What a task that was broken off has left.
+  Progress make_room(Time now) {
+    if (!lays_) {
+      lays_ = set_down_.begin(now).has_value();
+      return {};
+    }
+    const auto laid = set_down_.tick(now);
+    lays_ = laid && !*laid;
+    return {};
+  }
   Progress seek(Time now) {
     if (cell_.held) return begin_lift();
     const ObjectBelief* const object = cell_.find(object_);
@@ -152,9 +164,10 @@ class Pick final : public ByArm {
   }
 
   const std::string object_;
+  skills::SetDown set_down_;
   Phase phase_ = Phase::kSeek;
   Time since_;
-  bool lifts_ = false;
+  bool lifts_ = false, lays_ = false;
 };
 
 class Place final : public ByArm {
