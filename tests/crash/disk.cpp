@@ -203,7 +203,7 @@ void Disk::write(File& file, Change change) {
 
 void Disk::sync(File& file) {
   if (syncs_ == Syncs::kNever) return;
-  file.durable = file.now;
+  for (const Change& change : file.pending) apply(file.durable, change);
   file.pending.clear();
   if (std::exchange(file.folder_synced, true)) return;
   removed_.clear();

@@ -56,6 +56,7 @@ void Senders::hear_submit(const std::string& id, const Json& answer) {
     const auto name = one.at("id").get<std::string>();
     Wish& wish = wishes_.at(name);
     if (!wish.accepted) say_(fmt::format("{} hears that it is accepted", name));
+    if (wish.hopeless) pursued_.push_back(name);  // an answer to an earlier question, late
     wish.accepted = true;
     wish.hopeless = false;
     const auto task = task::task_from(wish.task);

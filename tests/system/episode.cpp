@@ -14,6 +14,7 @@ namespace {
 constexpr Duration kPeriod = std::chrono::milliseconds(10);
 constexpr Duration kCalmWithin = std::chrono::minutes(60);   // all must have ended by then,
 constexpr Duration kQuietAtLast = std::chrono::seconds(40);  // and what lies on the belt has ridden off after that
+constexpr std::uint64_t kCellsThatGoDark = 6;                // one of so many
 constexpr std::size_t kRoomInLink = 256;                     // commands, at least, after every period
 
 // The link as two processes share it: what one of them has not written when it dies, the other never reads. So what a
@@ -75,6 +76,7 @@ class Episode {
   void compact();
   [[nodiscard]] Plan draw_plan();
   void calm();
+  void go_dark();
   void close();
 
   const Cellar& cellar_;
@@ -206,7 +208,7 @@ void Episode::buttons() {
 // ---- the bridge ----
 
 Plan Episode::draw_plan() {
-  if (options_.only) return *options_.only;
+  if (options_.only) return steps_.ends().empty() && !steps_.was_held_up() ? *options_.only : Plan{};
   Plan plan;
   const double fate = random_.uniform();
   plan.fate = fate < 0.45 ? Fate::kDies : fate < 0.75 ? Fate::kLosesPower : Fate::kIsHeldUp;
@@ -225,9 +227,9 @@ void Episode::bridge() {
     if (now_ >= begins_at_) begin_bridge();
     return;
   }
-  if (!calm_ && !options_.only && now_ >= ends_at_) {
+  if (!calm_ && now_ >= ends_at_) {
     ends_at_ = now_ + from_s(60);
-    if (random_.below(3) == 0) {
+    if (options_.only || random_.below(3) == 0) {
       say("the bridge is asked to end");
       ending_ = true;
       process_->stop();
@@ -241,7 +243,7 @@ void Episode::bridge() {
 
 void Episode::begin_bridge() {
   ++processes_;
-  ends_at_ = now_ + from_s(5 + 120 * random_.uniform() * random_.uniform());
+  ends_at_ = now_ + from_s(options_.only ? 40 : 5 + 120 * random_.uniform() * random_.uniform());
   steps_.begin(calm_ ? Plan{} : draw_plan());
   ending_ = false;
   idle_since_.reset();
@@ -284,8 +286,10 @@ void Episode::end_bridge() {
   } else if (in_order) {
     say("the bridge has ended in order");
   }
-  begins_at_ = now_ + from_s(0.05 + 8 * random_.uniform() * random_.uniform());
-  if (!calm_ && !options_.only && random_.below(6) == 0) compact();
+  // The next one may be there before the loop misses this one.
+  const bool at_once = options_.only || random_.below(4) == 0;
+  begins_at_ = now_ + from_s(at_once ? 0.02 : 8 * random_.uniform() * random_.uniform());
+  if (!calm_ && (options_.only || random_.below(6) == 0)) compact();
 }
 
 void Episode::gone(Fate fate) {
@@ -317,8 +321,12 @@ EpisodeResult Episode::run() {
     period();
     bridge();
   }
-  if (wrong_.empty()) calm();
-  if (wrong_.empty()) close();
+  if (wrong_.empty() && !options_.only && random_.below(kCellsThatGoDark) == 0) {
+    go_dark();
+  } else if (wrong_.empty()) {
+    calm();
+    if (wrong_.empty()) close();
+  }
   process_.reset();
   EpisodeResult result{.wrong = wrong_,
                        .last = trace_.last(),
@@ -354,6 +362,18 @@ void Episode::calm() {
     if (quiet_since && now_ > *quiet_since + kQuietAtLast) return;
     if (now_ > until) return wrong(fmt::format("it does not come to an end: {} waits", senders_.waits_for()));
   }
+}
+
+// The power of the whole cell: its body is gone, and nobody takes up what was open there. What anybody was told is in
+// the journal all the same.
+void Episode::go_dark() {
+  steps_.kill(Fate::kLosesPower);
+  process_.reset();
+  disk_.restart();
+  steps_.begin({});
+  const auto journal = bridge::Journal::open(kJournal, disk_.vfs());
+  if (!journal) return wrong("the journal does not open: " + journal.error().line());
+  referee_.look(**journal);
 }
 
 void Episode::close() {

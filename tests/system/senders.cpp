@@ -64,9 +64,12 @@ void Senders::step(Time now) {
     meddle(now);
     next_meddling_ = now + (calm_ ? from_s(2) : about(random_, to_s(asking.every) / asking.minds_change));
   }
-  for (auto& [id, wish] : wishes_) {
-    if (!wish.ended && !wish.hopeless && now >= wish.ask_at) pursue(id, wish, now);
-  }
+  std::erase_if(pursued_, [&](const std::string& id) {
+    Wish& wish = wishes_.at(id);
+    const bool over = wish.ended || wish.hopeless;
+    if (!over && now >= wish.ask_at) pursue(id, wish, now);
+    return over;
+  });
 }
 
 void Senders::wish(Time now) {
@@ -82,6 +85,7 @@ void Senders::wish(Time now) {
   for (std::size_t i = 0; i < together; ++i) {
     say_(fmt::format("wish {}", tasks[i].dump()));
     wishes_[ids[i]] = {.task = tasks[i], .together = all, .ask_at = now};
+    pursued_.push_back(ids[i]);
   }
 }
 

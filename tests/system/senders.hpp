@@ -76,6 +76,7 @@ class Senders {
   Say say_, wrong_;
   std::map<std::string, Wish> wishes_;
   std::vector<std::string> ids_;
+  std::vector<std::string> pursued_;  // of those, the ones that are not over
   std::map<std::int64_t, Asked> asked_;
   std::int64_t questions_ = 0;
   Time next_wish_, next_meddling_, next_hostility_;

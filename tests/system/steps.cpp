@@ -10,7 +10,6 @@ constexpr auto kBefore = Moment::kBefore, kAfter = Moment::kAfter;
 constexpr std::array kSteps = std::to_array<Step>({
     {Doing::kOpening, Act::kWriteFile, kBefore},   {Doing::kOpening, Act::kWriteFile, kAfter},
     {Doing::kOpening, Act::kSyncFile, kBefore},    {Doing::kOpening, Act::kSyncFile, kAfter},
-    {Doing::kOpening, Act::kCutFile, kBefore},     {Doing::kOpening, Act::kCutFile, kAfter},
     {Doing::kOpening, Act::kWriteLog, kBefore},    {Doing::kOpening, Act::kWriteLog, kAfter},
     {Doing::kOpening, Act::kSyncLog, kBefore},     {Doing::kOpening, Act::kSyncLog, kAfter},
     {Doing::kTakingOver, Act::kHeartbeat, kAfter}, {Doing::kTakingOver, Act::kLeadOut, kBefore},
@@ -32,7 +31,6 @@ constexpr std::array kSteps = std::to_array<Step>({
     {Doing::kClosing, Act::kCutLog, kBefore},      {Doing::kClosing, Act::kCutLog, kAfter},
     {Doing::kCompacting, Act::kWriteLog, kBefore}, {Doing::kCompacting, Act::kWriteLog, kAfter},
     {Doing::kCompacting, Act::kSyncLog, kBefore},  {Doing::kCompacting, Act::kSyncLog, kAfter},
-    {Doing::kCompacting, Act::kWriteFile, kAfter}, {Doing::kCompacting, Act::kSyncFile, kBefore},
 });
 
 std::string_view name(Doing doing) {
@@ -80,7 +78,7 @@ bool Steps::at(Act act, Moment moment) {
   if (held_up_now_ || plan_.fate == Fate::kLives || (plan_.at && *plan_.at != step) || --plan_.count > 0) return true;
   if (plan_.fate == Fate::kIsHeldUp) {
     plan_.fate = Fate::kLives;
-    held_up_now_ = true;
+    held_up_now_ = was_held_up_ = true;
     held_up_(plan_.held_up);
     held_up_now_ = false;
     return true;

@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
+#include <map>
 #include <vector>
 
 #include "tests/system/episode.hpp"
@@ -49,6 +51,7 @@ int run_job(const Cellar& cellar, const Options& options, int job) {
   Sum sum;
   const double wanted_s = 3600 * options.hours / options.jobs;
   const auto began = std::chrono::steady_clock::now();
+  const std::clock_t cpu_began = std::clock();
   for (std::uint64_t seed = options.seed + static_cast<std::uint64_t>(job);;
        seed += static_cast<std::uint64_t>(options.jobs)) {
     const EpisodeResult result = run_episode(cellar, episode_of(options, seed));
@@ -67,12 +70,14 @@ int run_job(const Cellar& cellar, const Options& options, int job) {
     if (sum.simulated_s >= wanted_s) break;
   }
   const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  const double cpu_s = static_cast<double>(std::clock() - cpu_began) / CLOCKS_PER_SEC;
   fmt::print(
-      "{:.2f} simulated hours in {:.1f} s ({:.0f} an hour): {} episodes, {} of {} wishes accepted, {} bridge "
+      "{:.2f} simulated hours in {:.1f} s ({:.0f} an hour, {:.0f} an hour of its CPU): {} episodes, {} of {} wishes "
+      "accepted, {} bridge "
       "processes, {} emergency buttons; {} succeeded, {} failed, {} cancelled: nothing wrong\n",
-      sum.simulated_s / 3600, took_s, sum.simulated_s / took_s, sum.episodes, sum.accepted, sum.wishes, sum.processes,
-      sum.stops, sum.outcomes[task::Outcome::kSucceeded], sum.outcomes[task::Outcome::kFailed],
-      sum.outcomes[task::Outcome::kCancelled]);
+      sum.simulated_s / 3600, took_s, sum.simulated_s / took_s, sum.simulated_s / cpu_s, sum.episodes, sum.accepted,
+      sum.wishes, sum.processes, sum.stops, sum.outcomes[task::Outcome::kSucceeded],
+      sum.outcomes[task::Outcome::kFailed], sum.outcomes[task::Outcome::kCancelled]);
   return EXIT_SUCCESS;
 }
 
