@@ -9,6 +9,8 @@
 namespace pons::tests {
 namespace {
 
+constexpr std::uint64_t kStopsOf = 100;  // looks at the arm, one
+
 // The same words may be right later: the bridge is ending, or its disk has failed.
 bool is_for_now(const std::string& error) {
   constexpr std::array<std::string_view, 5> kLater{"open already", "has stopped", "is stopping", "the journal",
@@ -85,14 +87,17 @@ void Person::step(Time now) {
   if (needs_.find("resets") != std::string::npos) word = "reset";
   if (needs_.find("arms") != std::string::npos) word = "arm";
   needs_.clear();
+  if (word == "robot" && !calm_ && random_.below(kStopsOf) == 0)
+    word = random_.below(2) == 0 ? "stop" : "emergency_stop", stop_ = questions_ + 1;
   network_.ask({++questions_, words_for(word), Way::kBeside}, now);
 }
 
 std::string Person::words_for(std::string_view operation) { return Json{{"op", operation}}.dump(); }
 
-void Person::hear(const Answer& answer) {
+bool Person::hear(const Answer& answer) {
   const auto robot = answer.json.find("robot");
   if (robot != answer.json.end()) needs_ = robot->value("needs", std::string{});
+  return answer.question == stop_ && answer.json.value("ok", false);
 }
 
 }  // namespace pons::tests

@@ -12,10 +12,12 @@ namespace pons::tests {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(10);
-constexpr Duration kCalmWithin = std::chrono::minutes(60);   // all must have ended by then,
+constexpr Duration kCalmWithin = std::chrono::minutes(20);   // all must have ended by then,
 constexpr Duration kQuietAtLast = std::chrono::seconds(40);  // and what lies on the belt has ridden off after that
-constexpr std::uint64_t kCellsThatGoDark = 6;                // one of so many
-constexpr std::size_t kRoomInLink = 256;                     // commands, at least, after every period
+constexpr Step kMotionSent{Doing::kTicking, Act::kMotion, Moment::kAfter};
+constexpr std::uint64_t kPieces = 8;           // about as many as a motion has
+constexpr std::uint64_t kCellsThatGoDark = 6;  // one of so many
+constexpr std::size_t kRoomInLink = 256;       // commands, at least, after every period
 
 // The link as two processes share it: what one of them has not written when it dies, the other never reads. So what a
 // process seems to send after its end is taken back.
@@ -28,6 +30,15 @@ class SharedLink {
   [[nodiscard]] link::Link& link() { return *link_; }
   void keep() { std::memcpy(kept_.get(), memory_.get(), sizeof(link::Link)); }
   void take_back() { std::memcpy(memory_.get(), kept_.get(), sizeof(link::Link)); }
+  // Of what the loop has not taken in yet, the last ones were never sent.
+  void shorten(std::size_t by) {
+    link::CerebellumEnd loop(*link_);
+    std::vector<link::Command> sent;
+    for (link::Command command; loop.receive(command);) sent.push_back(command);
+    link::BridgeEnd bridge(*link_);
+    sent.resize(sent.size() - std::min(by, sent.size()));
+    for (const link::Command& command : sent) (void)bridge.send(command);
+  }
 
  private:
   struct Free {
@@ -171,8 +182,8 @@ void Episode::tell_answers() {
   for (const Answer& answer : network_.take_answers(now_)) {
     if (answer.question >= kSendersBegin) {
       senders_.hear(answer, now_);
-    } else {
-      person_.hear(answer);
+    } else if (person_.hear(answer)) {
+      referee_.person_has_stopped(now_);
     }
   }
 }
@@ -180,6 +191,7 @@ void Episode::tell_answers() {
 // The bridge's process is held up.
 void Episode::pass(Duration duration) {
   say(fmt::format("the bridge is held up for {:.2f} s", to_s(duration)));
+  if (!calm_ && !released_at_ && random_.below(3) == 0) button_at_ = now_;
   for (const Time until = now_ + duration; now_ < until;) period();
 }
 
@@ -278,6 +290,8 @@ void Episode::end_bridge() {
   if (!gone_since_) gone_since_ = now_;
   if (const auto fate = steps_.gone_with()) {
     shared_.take_back();
+    // It died amid the pieces of a motion.
+    if (steps_.last_end() == kMotionSent) shared_.shorten(random_.below(kPieces));
     if (*fate == Fate::kLosesPower) {
       disk_.restart();
     } else {
@@ -349,6 +363,7 @@ void Episode::calm() {
   calm_ = true;
   if (steps_.alive()) steps_.begin({});
   network_.faults = {0, 0, 0};
+  person_.calm_down();
   plant_.faults = {0, 0};
   shared_.link().clear_emergency_stop();
   senders_.calm_down();

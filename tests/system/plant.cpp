@@ -83,7 +83,7 @@ void Plant::leave(Parcel& parcel, std::string_view how) {
   const world::Belt& belt = world_.belt;
   if (std::abs(from.y() - belt.y_center_m) < 0.5 * belt.width_m && from.x() < belt.x_end_m) {
     parcel.where = Parcel::Where::kBelt;
-    parcel.x_m = from.x();
+    parcel.x_m = beside_others(from.x());
     parcel.y_m = from.y();
     on_belt_.push_back(parcel.code);
     say_(fmt::format("{} is {} over the belt, at {:.2f} m", parcel.code, how, from.x()));
@@ -96,6 +96,19 @@ void Plant::leave(Parcel& parcel, std::string_view how) {
       parcel.place = place.name;
   }
   say_(fmt::format("{} is {} over {}", parcel.code, how, parcel.place));
+}
+
+// What falls onto another slides off it.
+double Plant::beside_others(double x_m) const {
+  const auto touches = [&](const std::string& code) { return std::abs(parcels_.at(code).x_m - x_m) < 2 * kBeside_m; };
+  while (std::ranges::any_of(on_belt_, touches)) x_m += kBeside_m;
+  return x_m;
+}
+
+std::optional<Vector3> Plant::top_of(const std::string& code) const {
+  if (std::ranges::find(on_belt_, code) == on_belt_.end()) return std::nullopt;
+  const Parcel& parcel = parcels_.at(code);
+  return Vector3(parcel.x_m, parcel.y_m, world_.belt.surface_z_m + kParcelHeight_m);
 }
 
 void Plant::take(Time) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,8 @@ class Plant {
   void put_on_belt(const std::string& code, const std::string& destination);
   // What a camera that sees everything on the belt would have perception believe.
   [[nodiscard]] std::vector<ObjectBelief> beliefs(Time now) const;
+  // One of them: the middle of its top; nothing when it is not on the belt.
+  [[nodiscard]] std::optional<Vector3> top_of(const std::string& code) const;
   [[nodiscard]] const std::map<std::string, Parcel>& parcels() const { return parcels_; }
   [[nodiscard]] const world::World& world() const { return world_; }
   [[nodiscard]] const Parcel* on_cups() const;
@@ -69,6 +72,7 @@ class Plant {
   void hold(Time now);
   void take(Time now);
   void leave(Parcel& parcel, std::string_view how);
+  [[nodiscard]] double beside_others(double x_m) const;
   [[nodiscard]] Vector3 tip();
 
   const world::World& world_;

@@ -135,10 +135,8 @@ runner::SkillPort Process::skill_port() {
     what();
     (void)outside_.steps.at(act, Moment::kAfter);
   };
-  return {.refresh =
-              [this, step](Time now, std::vector<ObjectBelief>, Time seen) {
-                step(Act::kHeartbeat, [&] { cell_.refresh(now, outside_.plant.beliefs(now), seen); });
-              },
+  return {.refresh = [this, step](Time now, std::vector<ObjectBelief>,
+                                  Time seen) { step(Act::kHeartbeat, [&] { cell_.refresh(now, {}, seen); }); },
           .locate = {},
           .state = [this]() -> const link::State& { return cell_.arm.state(); },
           .take_forgotten = [this] { return cell_.take_forgotten(); },

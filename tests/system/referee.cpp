@@ -90,6 +90,11 @@ void Referee::watch(const Glance& glance) {
     if (!(armed_at_ && *armed_at_ > emergency_at_)) wrong_("the arm was armed after an emergency stop, and by nobody");
     needs_person_ = false;
   }
+  if (stopped_at_ && cerebellum::moves(state) && !cerebellum::moves(before_)) {
+    if (!(armed_at_ && *armed_at_ > *stopped_at_))
+      wrong_("a person has stopped the arm, and nobody has armed it since");
+    stopped_at_.reset();
+  }
   const bool may_move = cerebellum::moves(state) || cerebellum::is_braking(state) || cerebellum::moves(before_) ||
                         cerebellum::is_braking(before_);
   if (glance.plant.moves() && !may_move) wrong_(fmt::format("the arm moves in the state {}", link::name(state)));

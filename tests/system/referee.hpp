@@ -32,6 +32,8 @@ class Referee {
   // The bridge has heard a person ask for that.
   void person_resets(Time now) { reset_at_ = now; }
   void person_arms(Time now) { armed_at_ = now; }
+  // And was told that the arm stops.
+  void person_has_stopped(Time now) { stopped_at_ = now; }
 
   // ---- the arm, every period ----
   struct Glance {
@@ -62,7 +64,7 @@ class Referee {
   std::map<std::string, Json> accepted_;
   std::map<std::string, task::Outcome> ended_;
   std::set<std::string> told_to_end_;
-  std::optional<Time> reset_at_, armed_at_;
+  std::optional<Time> reset_at_, armed_at_, stopped_at_;
   link::SafetyState before_ = link::SafetyState::kDisarmed;
   Time emergency_at_;
   bool needs_person_ = false;

@@ -84,12 +84,14 @@ class Senders {
   bool long_tree_ = false;
 };
 
-// Leads the arm out of what needs a person, a step at a time.
+// Leads the arm out of what needs a person, a step at a time; and now and then stops it.
 class Person {
  public:
   Person(Network& network, Random random) : network_(network), random_(random) {}
   void step(Time now);
-  void hear(const Answer& answer);
+  // Whether that is the answer to a stop: the arm may not go on without this person.
+  [[nodiscard]] bool hear(const Answer& answer);
+  void calm_down() { calm_ = true; }
   [[nodiscard]] static std::string words_for(std::string_view operation);
 
  private:
@@ -98,6 +100,8 @@ class Person {
   std::string needs_;
   Time acts_at_;
   std::int64_t questions_ = 0;
+  std::int64_t stop_ = 0;  // the question that was one, the last time
+  bool calm_ = false;
 };
 
 // Questions of the person have numbers below this; those of senders begin here.

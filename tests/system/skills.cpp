@@ -19,6 +19,7 @@ using task::Status;
 constexpr double kLift_m = 0.30, kOverRim_m = 0.25;
 constexpr Duration kSettles = std::chrono::milliseconds(30);  // after the end of a motion
 constexpr Duration kSealsWithin = std::chrono::milliseconds(400), kOpensWithin = std::chrono::milliseconds(600);
+constexpr Duration kTryEvery = std::chrono::milliseconds(500);
 constexpr Duration kPrints = std::chrono::milliseconds(300);
 
 // What both arm skills need.
@@ -58,8 +59,8 @@ class ByArm : public skills::ArmSkill {
 
 class Pick final : public ByArm {
  public:
-  Pick(Cell& cell, Steps& steps, std::string object)
-      : ByArm(cell, steps), object_(std::move(object)), set_down_(cell) {}
+  Pick(Cell& cell, Plant& plant, Steps& steps, std::string object)
+      : ByArm(cell, steps), plant_(plant), object_(std::move(object)), set_down_(cell) {}
 
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
@@ -67,7 +68,8 @@ class Pick final : public ByArm {
       lays_ = false;
       return cancelled_ ? Progress{Status::kFailed, "cancelled"} : Progress{};
     }
-    if (cancelled_) {
+    // What it has taken hold of is lifted free of the belt first.
+    if (cancelled_ && !(cell_.held && phase_ == Phase::kLift)) {
       if (phase_ == Phase::kGrip && !cell_.held) vacuum(false);
       return {Status::kFailed, cell_.held ? "cancelled; still held" : "cancelled"};
     }
@@ -84,6 +86,10 @@ class Pick final : public ByArm {
     }
     return {Status::kFailed, "unreachable"};
   }
+  void cancel(Time now) override {
+    cancelled_ = true;
+    if (phase_ != Phase::kLift) ByArm::cancel(now);
+  }
   bool may_rest(Time, task::Pause pause) override {
     if (lays_ || phase_ == Phase::kGrip || (pause == task::Pause::kHandOver && cell_.held)) return false;
     phase_ = cell_.held ? Phase::kLift : Phase::kSeek;
@@ -98,7 +104,8 @@ class Pick final : public ByArm {
   // What a task that was broken off has left.
   Progress make_room(Time now) {
     if (!lays_) {
-      lays_ = set_down_.begin(now).has_value();
+      if (now >= lays_again_at_) lays_ = set_down_.begin(now).has_value();
+      lays_again_at_ = now + kTryEvery;
       return {};
     }
     const auto laid = set_down_.tick(now);
@@ -107,9 +114,9 @@ class Pick final : public ByArm {
   }
   Progress seek(Time now) {
     if (cell_.held) return begin_lift();
-    const ObjectBelief* const object = cell_.find(object_);
-    if (object == nullptr) return {Status::kFailed, "it is not on the belt"};
-    const Vector3 top = object->world_from_top.translation();
+    const auto seen = plant_.top_of(object_);
+    if (!seen) return {Status::kFailed, "it is not on the belt"};
+    const Vector3& top = *seen;
     const world::Belt& belt = cell_.world.belt;
     if (top.x() > belt.pick_x_max_m) return {Status::kFailed, "it has ridden past"};
     if (top.x() < belt.pick_x_min_m + 0.02) return {};
@@ -131,8 +138,7 @@ class Pick final : public ByArm {
     cell_.hold_belt(now);
     if (cell_.arm.cups().phase == link::VacuumPhase::kSealed) {
       const skills::Load load{.size_m = {kParcelLength_m, kParcelWidth_m, kParcelHeight_m}};
-      cell_.held = skills::Held{.code = object_, .load = load, .mass_kg = kParcelMass_kg};
-      cell_.weighs(kParcelMass_kg);
+      cell_.held = skills::Held{.code = object_, .load = load};
       return begin_lift();
     }
     if (now < since_ + kSealsWithin) return {};
@@ -156,17 +162,21 @@ class Pick final : public ByArm {
       up.z() = cell_.world.belt.surface_z_m + kParcelHeight_m + kLift_m;
       if (!go(now, up)) return {Status::kFailed, "no way up"};
     }
-    return arrived(now) ? Progress{Status::kSucceeded, {}, {{"mass_kg", kParcelMass_kg}}} : Progress{};
+    if (!arrived(now)) return {};
+    cell_.weighs(kParcelMass_kg);
+    if (cancelled_) return {Status::kFailed, "cancelled; still held"};
+    return {Status::kSucceeded, {}, {{"mass_kg", kParcelMass_kg}}};
   }
   Progress begin_again() {
     phase_ = Phase::kSeek;
     return {};
   }
 
+  const Plant& plant_;
   const std::string object_;
   skills::SetDown set_down_;
   Phase phase_ = Phase::kSeek;
-  Time since_;
+  Time since_, lays_again_at_;
   bool lifts_ = false, lays_ = false;
 };
 
@@ -285,10 +295,10 @@ void add_skills(task::SkillRegistry& registry, Cell& cell, Plant& plant, Steps& 
                 .attempts = 3,
                 .outputs = {"mass_kg"},
                 .safe_points = {"before it takes hold", "when it holds it"},
-                .start = [&cell, &steps, begins](const Json& arguments, Time) {
+                .start = [&cell, &plant, &steps, begins](const Json& arguments, Time) {
                   begins();
-                  auto skill =
-                      conduct(cell, std::make_unique<Pick>(cell, steps, arguments.at("object").get<std::string>()));
+                  auto skill = conduct(
+                      cell, std::make_unique<Pick>(cell, plant, steps, arguments.at("object").get<std::string>()));
                   (void)steps.at(Act::kStart, Moment::kAfter);
                   return skill;
                 }});

@@ -62,6 +62,7 @@ std::span<const Step> all_steps() { return kSteps; }
 
 void Steps::begin(const Plan& plan) {
   plan_ = plan;
+  last_end_.reset();
   gone_with_.reset();
 }
 
@@ -84,6 +85,7 @@ bool Steps::at(Act act, Moment moment) {
     return true;
   }
   ++ends_[step];
+  last_end_ = step;
   kill(plan_.fate);
   return false;
 }

@@ -90,7 +90,8 @@ class Steps {
   [[nodiscard]] std::optional<Fate> gone_with() const { return gone_with_; }
   void kill(Fate fate);
 
-  // Any process so far.
+  // At which the last process ended that did so at one; any process was held up so far.
+  [[nodiscard]] const std::optional<Step>& last_end() const { return last_end_; }
   [[nodiscard]] bool was_held_up() const { return was_held_up_; }
   // Steps at which a process died or lost its power, and how often.
   [[nodiscard]] const std::map<Step, std::int64_t>& ends() const { return ends_; }
@@ -102,6 +103,7 @@ class Steps {
   Plan plan_;
   Doing doing_ = Doing::kOpening;
   std::optional<Fate> gone_with_;
+  std::optional<Step> last_end_;
   bool held_up_now_ = false, was_held_up_ = false;
   std::map<Step, std::int64_t> ends_, passed_;
 };
