@@ -15,6 +15,8 @@ constexpr Duration kPeriod = std::chrono::milliseconds(10);
 constexpr Duration kCalmWithin = std::chrono::minutes(20);   // all must have ended by then,
 constexpr Duration kQuietAtLast = std::chrono::seconds(40);  // and what lies on the belt has ridden off after that
 constexpr Step kMotionSent{Doing::kTicking, Act::kMotion, Moment::kAfter};
+constexpr std::uint64_t kRemembers = 8;        // words to a task, of which a bridge dies soon after one
+constexpr std::uint64_t kDecisions = 12;       // bridges, one that is held up with one
 constexpr std::uint64_t kPieces = 8;           // about as many as a motion has
 constexpr std::uint64_t kCellsThatGoDark = 6;  // one of so many
 constexpr std::size_t kRoomInLink = 256;       // commands, at least, after every period
@@ -149,6 +151,13 @@ Episode::Episode(const Cellar& cellar, const EpisodeOptions& options)
   network_.when_heard = [this](const Question& question) {
     if (question.text == person_.words_for("reset")) referee_.person_resets(now_);
     if (question.text == person_.words_for("arm")) referee_.person_arms(now_);
+    // What a task was told a moment ago is what its bridge forgets most easily.
+    const bool is_verb = question.text.find("\"submit\"") == std::string::npos && question.way == Way::kNetwork &&
+                         question.text.find("\"watch\"") == std::string::npos;
+    if (is_verb && !calm_ && !ending_ && !options_.only && random_.below(kRemembers) == 0)
+      steps_.begin({.fate = random_.below(3) == 0 ? Fate::kLosesPower : Fate::kDies,
+                    .at = {},
+                    .count = static_cast<std::int64_t>(1 + random_.below(80))});
   };
   button_at_ = now_ + from_s(60 * random_.uniform());
 }
@@ -191,7 +200,7 @@ void Episode::tell_answers() {
 // The bridge's process is held up.
 void Episode::pass(Duration duration) {
   say(fmt::format("the bridge is held up for {:.2f} s", to_s(duration)));
-  if (!calm_ && !released_at_ && random_.below(3) == 0) button_at_ = now_;
+  if (!calm_ && !released_at_ && random_.below(2) == 0) button_at_ = now_;
   for (const Time until = now_ + duration; now_ < until;) period();
 }
 
@@ -225,6 +234,12 @@ Plan Episode::draw_plan() {
   const double fate = random_.uniform();
   plan.fate = fate < 0.45 ? Fate::kDies : fate < 0.75 ? Fate::kLosesPower : Fate::kIsHeldUp;
   plan.held_up = from_s(0.05 * std::pow(200, random_.uniform()));
+  // What a bridge has decided on before it was held up, the arm must not take for the present.
+  if (random_.below(kDecisions) == 0)
+    return {.fate = Fate::kIsHeldUp,
+            .at = Step{Doing::kLooking, Act::kLeadOut, Moment::kBefore},
+            .count = static_cast<std::int64_t>(1 + random_.below(2)),
+            .held_up = from_s(1 + 4 * random_.uniform())};
   if (random_.below(5) < 3) {
     plan.at = all_steps()[random_.below(all_steps().size())];
     plan.count = static_cast<std::int64_t>(std::pow(30, random_.uniform()));

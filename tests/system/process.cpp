@@ -28,7 +28,10 @@ class BesideTheBelt final : public brain::Brain {
     brain::Decisions decisions = dispatcher_.observe(beliefs, now, set_aside);
     // What others ask for is no order of its own.
     std::erase_if(decisions.rides, [](const brain::Ride& ride) { return ride.reason == brain::kRideUnknown; });
-    if (comes_yet(beliefs)) return decisions;
+    if (comes_yet(beliefs)) {
+      decisions.belt_waits = false;
+      return decisions;
+    }
     for (const ObjectBelief& belief : beliefs) {
       const double x_m = belief.world_from_top.translation().x();
       const bool leaves = x_m > belt_.waits_at_m() - kStops_m && x_m < belt_.pick_x_max_m;
@@ -83,7 +86,7 @@ Process::Process(const Outside& outside)
       sight_(std::make_unique<Blind>()),
       darkroom_(outside.world),
       cell_(end_, outside.world, outside.model.copy()),
-      rest_(cell_),
+      lay_down_(cell_, outside.steps),
       take_up_(cell_) {}
 
 Process::~Process() {
@@ -143,7 +146,11 @@ runner::SkillPort Process::skill_port() {
           .arm = [this, step](Time now) { step(Act::kLeadOut, [&] { cell_.arm.arm(now); }); },
           .outside_rad = [this] { return cell_.arm.outside_rad(); },
           .recover = [this](Time now) { return cell_.arm.recover(now); },
-          .rest = [this](Time now) { rest_.tick(now); },
+          .rest =
+              [this](Time now) {
+                cell_.let_go_of_unknown();
+                if (cell_.held) lay_down_.tick(now);
+              },
           .belt = [this, step](link::Belt wanted) { step(Act::kBelt, [&] { cell_.arm.belt(wanted); }); },
           .holds_belt = [this](Time now) { return cell_.holds_belt(now); },
           .halt = [this, step] { step(Act::kLeadOut, [&] { cell_.arm.halt(); }); },

@@ -15,10 +15,10 @@
 #include "pons/runner/darkroom.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/skills/cell.hpp"
-#include "pons/skills/rest.hpp"
 #include "pons/skills/take_up.hpp"
 #include "pons/world/world.hpp"
 #include "tests/crash/disk.hpp"
+#include "tests/system/hand.hpp"
 #include "tests/system/network.hpp"
 #include "tests/system/plant.hpp"
 #include "tests/system/steps.hpp"
@@ -67,7 +67,7 @@ class Process {
   runner::Darkroom darkroom_;
   std::unique_ptr<bridge::Journal> journal_;
   skills::Cell cell_;
-  skills::Rest rest_;
+  LayDown lay_down_;
   skills::TakeUp take_up_;
   task::SkillRegistry registry_;
   std::unique_ptr<bridge::Bridge> bridge_;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "pons/skills/conduct.hpp"
-#include "pons/skills/set_down.hpp"
+#include "tests/system/hand.hpp"
 
 namespace pons::tests {
 namespace {
@@ -16,64 +16,48 @@ using task::Json;
 using task::Progress;
 using task::Status;
 
-constexpr double kLift_m = 0.30, kOverRim_m = 0.25;
-constexpr Duration kSettles = std::chrono::milliseconds(30);  // after the end of a motion
+constexpr double kOverRim_m = 0.25;
+constexpr Duration kToldWithin = std::chrono::milliseconds(30);  // from here to the cups
 constexpr Duration kSealsWithin = std::chrono::milliseconds(400), kOpensWithin = std::chrono::milliseconds(600);
-constexpr Duration kTryEvery = std::chrono::milliseconds(500);
+constexpr double kInside_m = 0.02;
+constexpr Duration kComesWithin = std::chrono::seconds(20);
 constexpr Duration kPrints = std::chrono::milliseconds(300);
 
 // What both arm skills need.
 class ByArm : public skills::ArmSkill {
  public:
-  ByArm(Cell& cell, Steps& steps) : cell_(cell), steps_(steps) {}
+  ByArm(Cell& cell, Steps& steps) : cell_(cell), hand_(cell, steps) {}
   void cancel(Time now) override {
     cancelled_ = true;
     if (cell_.arm.operational() && now < cell_.arm.motion_end()) (void)cell_.arm.stop(now);
   }
 
  protected:
-  // To where the tip points down there, at rest. False: no way.
-  bool go(Time now, const Vector3& to) {
-    const Time from = cell_.arm.splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    const auto q = cell_.model.inverse(Cell::tip_down(to, 0), state.position, model::Among::kAllBranches);
-    if (!q) return false;
-    const auto way = motion::move(state, from, {*q, AxisVector::Zero(q->size())}, cell_.limits_planned());
-    if (!way) return false;
-    (void)steps_.at(Act::kMotion, Moment::kBefore);
-    const bool sent = cell_.arm.stream(*way).has_value();
-    (void)steps_.at(Act::kMotion, Moment::kAfter);
-    return sent;
-  }
-  [[nodiscard]] bool arrived(Time now) const { return now >= cell_.arm.motion_end() + kSettles; }
-  void vacuum(bool on) {
-    (void)steps_.at(Act::kCups, Moment::kBefore);
-    cell_.arm.vacuum(on);
-    (void)steps_.at(Act::kCups, Moment::kAfter);
-  }
-
   Cell& cell_;
-  Steps& steps_;
+  Hand hand_;
   bool cancelled_ = false;
 };
 
 class Pick final : public ByArm {
  public:
   Pick(Cell& cell, Plant& plant, Steps& steps, std::string object)
-      : ByArm(cell, steps), plant_(plant), object_(std::move(object)), set_down_(cell) {}
+      : ByArm(cell, steps), plant_(plant), object_(std::move(object)), lay_down_(cell, steps) {}
 
   Progress tick(Time now) override {
     if (!cell_.arm.operational()) {
       phase_ = cell_.held ? Phase::kLift : Phase::kSeek;
-      lays_ = false;
       return cancelled_ ? Progress{Status::kFailed, "cancelled"} : Progress{};
     }
     // What it has taken hold of is lifted free of the belt first.
-    if (cancelled_ && !(cell_.held && phase_ == Phase::kLift)) {
-      if (phase_ == Phase::kGrip && !cell_.held) vacuum(false);
+    const bool lifts_it = cell_.held && cell_.held->code == object_ && phase_ == Phase::kLift;
+    if (cancelled_ && !lifts_it) {
+      if (phase_ == Phase::kGrip && !cell_.held) hand_.vacuum(false);
       return {Status::kFailed, cell_.held ? "cancelled; still held" : "cancelled"};
     }
-    if (cell_.held && cell_.held->code != object_) return make_room(now);
+    if (cell_.held && cell_.held->code != object_) {
+      lay_down_.tick(now);  // what a task that was broken off has left
+      return {};
+    }
     switch (phase_) {
       case Phase::kSeek:
         return seek(now);
@@ -91,27 +75,18 @@ class Pick final : public ByArm {
     if (phase_ != Phase::kLift) ByArm::cancel(now);
   }
   bool may_rest(Time, task::Pause pause) override {
-    if (lays_ || phase_ == Phase::kGrip || (pause == task::Pause::kHandOver && cell_.held)) return false;
+    if ((cell_.held && cell_.held->code != object_) || phase_ == Phase::kGrip ||
+        (pause == task::Pause::kHandOver && cell_.held))
+      return false;
     phase_ = cell_.held ? Phase::kLift : Phase::kSeek;
     lifts_ = false;
     return true;
   }
-  void go_on(Time, Duration) override {}
+  void go_on(Time, Duration) override { seeks_since_.reset(); }
 
  private:
   enum class Phase : std::uint8_t { kSeek, kReach, kGrip, kLift };
 
-  // What a task that was broken off has left.
-  Progress make_room(Time now) {
-    if (!lays_) {
-      if (now >= lays_again_at_) lays_ = set_down_.begin(now).has_value();
-      lays_again_at_ = now + kTryEvery;
-      return {};
-    }
-    const auto laid = set_down_.tick(now);
-    lays_ = laid && !*laid;
-    return {};
-  }
   Progress seek(Time now) {
     if (cell_.held) return begin_lift();
     const auto seen = plant_.top_of(object_);
@@ -119,17 +94,19 @@ class Pick final : public ByArm {
     const Vector3& top = *seen;
     const world::Belt& belt = cell_.world.belt;
     if (top.x() > belt.pick_x_max_m) return {Status::kFailed, "it has ridden past"};
-    if (top.x() < belt.pick_x_min_m + 0.02) return {};
+    if (!seeks_since_) seeks_since_ = now;
+    if (top.x() < belt.pick_x_min_m + kInside_m)
+      return now < *seeks_since_ + kComesWithin ? Progress{} : Progress{Status::kFailed, "it does not come"};
     cell_.hold_belt(now);
     if (cell_.belt_speed_m_s() > 0) return {};
-    if (!go(now, top)) return {Status::kFailed, "no way to it"};
+    if (!hand_.go(now, top)) return {Status::kFailed, "no way to it"};
     phase_ = Phase::kReach;
     return {};
   }
   Progress reach(Time now) {
     cell_.hold_belt(now);
-    if (!arrived(now)) return {};
-    vacuum(true);
+    if (!hand_.arrived(now)) return {};
+    hand_.vacuum(true);
     since_ = now;
     phase_ = Phase::kGrip;
     return {};
@@ -142,7 +119,7 @@ class Pick final : public ByArm {
       return begin_lift();
     }
     if (now < since_ + kSealsWithin) return {};
-    vacuum(false);
+    hand_.vacuum(false);
     return {Status::kRetry, "missed it"};
   }
   Progress begin_lift() {
@@ -153,16 +130,12 @@ class Pick final : public ByArm {
   Progress lift(Time now) {
     if (!cell_.held) return begin_again();
     if (cell_.arm.cups().phase != link::VacuumPhase::kSealed) {
-      vacuum(false);
+      hand_.vacuum(false);
       cell_.holds_nothing();
       return {Status::kRetry, "lost it on the way up"};
     }
-    if (!std::exchange(lifts_, true)) {
-      Vector3 up = cell_.model.world_from_tip(cell_.arm.planned(cell_.arm.splice_time(now)).position).translation();
-      up.z() = cell_.world.belt.surface_z_m + kParcelHeight_m + kLift_m;
-      if (!go(now, up)) return {Status::kFailed, "no way up"};
-    }
-    if (!arrived(now)) return {};
+    if (!std::exchange(lifts_, true) && !hand_.rise(now)) return {Status::kFailed, "no way up"};
+    if (!hand_.arrived(now)) return {};
     cell_.weighs(kParcelMass_kg);
     if (cancelled_) return {Status::kFailed, "cancelled; still held"};
     return {Status::kSucceeded, {}, {{"mass_kg", kParcelMass_kg}}};
@@ -174,10 +147,11 @@ class Pick final : public ByArm {
 
   const Plant& plant_;
   const std::string object_;
-  skills::SetDown set_down_;
+  LayDown lay_down_;
   Phase phase_ = Phase::kSeek;
-  Time since_, lays_again_at_;
-  bool lifts_ = false, lays_ = false;
+  std::optional<Time> seeks_since_;
+  Time since_;
+  bool lifts_ = false;
 };
 
 class Place final : public ByArm {
@@ -195,19 +169,19 @@ class Place final : public ByArm {
     }
     if (cancelled_) return {Status::kFailed, "cancelled; still held"};
     if (cell_.arm.cups().phase != link::VacuumPhase::kSealed) {
-      vacuum(false);
+      hand_.vacuum(false);
       cell_.holds_nothing();
       return {Status::kFailed, "lost it on the way"};
     }
     if (phase_ == Phase::kSetOut) {
       Vector3 over = cell_.world.place(place_)->center_m;
       over.z() += kOverRim_m;
-      if (!go(now, over)) return {Status::kFailed, "no way there"};
+      if (!hand_.go(now, over)) return {Status::kFailed, "no way there"};
       phase_ = Phase::kCarry;
       return {};
     }
-    if (!arrived(now)) return {};
-    vacuum(false);
+    if (!hand_.arrived(now)) return {};
+    hand_.vacuum(false);
     since_ = now;
     phase_ = Phase::kLetGo;
     return {};
@@ -228,7 +202,7 @@ class Place final : public ByArm {
 
   // The cups are off, through every stop: what is over the mouth falls in.
   Progress let_go(Time now) {
-    if (cell_.arm.state().vacuum_on != 0 && now > since_ + kSettles) {
+    if (cell_.arm.state().vacuum_on != 0 && now > since_ + kToldWithin) {
       phase_ = Phase::kSetOut;  // a stop came before the word did
       return {};
     }
