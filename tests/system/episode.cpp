@@ -15,7 +15,7 @@ constexpr Duration kPeriod = std::chrono::milliseconds(10);
 constexpr Duration kCalmWithin = std::chrono::minutes(20);   // all must have ended by then,
 constexpr Duration kQuietAtLast = std::chrono::seconds(40);  // and what lies on the belt has ridden off after that
 constexpr Step kMotionSent{Doing::kTicking, Act::kMotion, Moment::kAfter};
-constexpr std::uint64_t kRemembers = 8;        // words to a task, of which a bridge dies soon after one
+constexpr std::uint64_t kRemembers = 3;        // words to a task, of which a bridge dies soon after one
 constexpr std::uint64_t kDecisions = 12;       // bridges, one that is held up with one
 constexpr std::uint64_t kPieces = 8;           // about as many as a motion has
 constexpr std::uint64_t kCellsThatGoDark = 6;  // one of so many
@@ -152,8 +152,9 @@ Episode::Episode(const Cellar& cellar, const EpisodeOptions& options)
     if (question.text == person_.words_for("reset")) referee_.person_resets(now_);
     if (question.text == person_.words_for("arm")) referee_.person_arms(now_);
     // What a task was told a moment ago is what its bridge forgets most easily.
-    const bool is_verb = question.text.find("\"submit\"") == std::string::npos && question.way == Way::kNetwork &&
-                         question.text.find("\"watch\"") == std::string::npos;
+    const bool is_verb = question.way == Way::kNetwork && (question.text.find("\"cancel\"") != std::string::npos ||
+                                                           question.text.find("\"halt\"") != std::string::npos ||
+                                                           question.text.find("\"pause\"") != std::string::npos);
     if (is_verb && !calm_ && !ending_ && !options_.only && random_.below(kRemembers) == 0)
       steps_.begin({.fate = random_.below(3) == 0 ? Fate::kLosesPower : Fate::kDies,
                     .at = {},
