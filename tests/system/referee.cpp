@@ -150,7 +150,10 @@ void Referee::check_story(const TaskHistory& task) {
   for (const bridge::Event& event : task.events) {
     if (ending && event.kind == bridge::kAttemptEvent)
       wrong_(fmt::format("{} has begun a skill after it was told to end", id));
-    ending = ending || event.kind == bridge::kCancellingEvent || event.kind == bridge::kHaltingEvent;
+    const bool ends = event.kind == bridge::kCancellingEvent || event.kind == bridge::kHaltingEvent;
+    if (ends && event.run < task.record.outcome->run && task.record.outcome->outcome != Outcome::kCancelled)
+      wrong_(fmt::format("{} was told to end, and the next bridge has not ended it so", id));
+    ending = ending || ends;
   }
   if (told_to_end_.contains(id) && task.record.outcome->outcome != Outcome::kCancelled && !ending &&
       kept_ == Kept::kAll)
