@@ -42,9 +42,9 @@ const Error kNoStream{"no stream goes on", "chunk_stream",
 
 }  // namespace
 
-Desk::Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
+Desk::Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
            runner::Arming& arming, Stream stream)
-    : socket_(std::move(socket)), bridge_(bridge), journal_(journal), arming_(arming), stream_(std::move(stream)) {}
+    : visitors_(std::move(visitors)), bridge_(bridge), journal_(journal), arming_(arming), stream_(std::move(stream)) {}
 
 Json Desk::observe(Time now) const {
   const task::ChunkStream* const stream = stream_();
@@ -77,7 +77,7 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 
 void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
-  for (gate::Request& request : socket_->poll()) {
+  for (gate::Request& request : visitors_->poll()) {
     auto asked = gate::asked_from(request.text);
     if (asked && asked->operation == gate::Operation::kWatch && watchers_.size() < kWatchersMost) {
       watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});

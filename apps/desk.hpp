@@ -1,4 +1,5 @@
-// Where visitors are answered: requests from the local socket meet bridge, journal and arm.
+// Where visitors are answered: requests from the local socket, or wherever visitors come from, meet bridge, journal and
+// arm.
 #pragma once
 
 #include <functional>
@@ -20,8 +21,8 @@ class Desk {
  public:
   // The stream of chunks that goes on, or null.
   using Stream = std::function<task::ChunkStream*()>;
-  // All but the socket must outlive it.
-  Desk(std::unique_ptr<gate::LocalSocket> socket, bridge::Bridge& bridge, const bridge::Journal& journal,
+  // All but the visitors must outlive it.
+  Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
        runner::Arming& arming, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
@@ -43,7 +44,7 @@ class Desk {
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
 
-  std::unique_ptr<gate::LocalSocket> socket_;
+  std::unique_ptr<gate::Visitors> visitors_;
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
   runner::Arming& arming_;

@@ -33,19 +33,26 @@ struct SocketLimits {
   std::chrono::milliseconds patience{10'000};    // for half a line, and for a client to read what waits for it
 };
 
-class LocalSocket {
+// Where requests come from. Whoever answers them need not know what brought them.
+class Visitors {
+ public:
+  virtual ~Visitors() = default;
+  // What came since the last call, in the order of arrival; does not wait. At most one a client.
+  [[nodiscard]] virtual std::vector<Request> poll() = 0;
+};
+
+class LocalSocket final : public Visitors {
  public:
   // A socket file that nobody listens on is replaced; any other file at `path` is left and refused.
   // Errors: path too long, directory missing, in use, not a socket, not permitted.
   [[nodiscard]] static Expected<std::unique_ptr<LocalSocket>> listen(const std::filesystem::path& path,
                                                                      SocketLimits limits = {});
   // Ends the thread, closes every connection, removes the file.
-  ~LocalSocket();
+  ~LocalSocket() override;
   LocalSocket(const LocalSocket&) = delete;
   LocalSocket& operator=(const LocalSocket&) = delete;
 
-  // What came since the last call, in the order of arrival; does not wait. At most one a client.
-  [[nodiscard]] std::vector<Request> poll();
+  [[nodiscard]] std::vector<Request> poll() override;
 
  private:
   struct Server;

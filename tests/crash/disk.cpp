@@ -11,6 +11,7 @@ namespace pons::tests {
 namespace {
 
 constexpr std::size_t kSector = 512;
+constexpr std::uint64_t kTornSectors = 8;  // of so many that were being written one was so only down to some byte
 
 struct Handle {
   sqlite3_file base;
@@ -48,23 +49,24 @@ struct DiskCalls {
   }
   static int write(sqlite3_file* file, const void* from, int amount, sqlite3_int64 offset) {
     Handle* const handle = handle_of(file);
-    if (handle->disk->off_) return SQLITE_IOERR_WRITE;
+    if (!handle->disk->begin(Disk::Operation::kWrite, *handle->name)) return SQLITE_IOERR_WRITE;
     handle->disk->write(file_of(handle),
                         {static_cast<std::size_t>(offset),
                          std::string(static_cast<const char*>(from), static_cast<std::size_t>(amount)), std::nullopt});
-    return handle->disk->spend() ? SQLITE_OK : SQLITE_IOERR_WRITE;
+    return handle->disk->end(Disk::Operation::kWrite, *handle->name) ? SQLITE_OK : SQLITE_IOERR_WRITE;
   }
   static int truncate(sqlite3_file* file, sqlite3_int64 size) {
     Handle* const handle = handle_of(file);
-    if (handle->disk->off_) return SQLITE_IOERR_TRUNCATE;
+    if (!handle->disk->begin(Disk::Operation::kCut, *handle->name)) return SQLITE_IOERR_TRUNCATE;
     handle->disk->write(file_of(handle), {0, {}, static_cast<std::size_t>(size)});
-    return handle->disk->spend() ? SQLITE_OK : SQLITE_IOERR_TRUNCATE;
+    return handle->disk->end(Disk::Operation::kCut, *handle->name) ? SQLITE_OK : SQLITE_IOERR_TRUNCATE;
   }
   static int sync(sqlite3_file* file, int) {
     Handle* const handle = handle_of(file);
-    if (handle->disk->off_ || !handle->disk->spend()) return SQLITE_IOERR_FSYNC;
-    handle->disk->sync(file_of(handle));
-    return SQLITE_OK;
+    Disk* const disk = handle->disk;
+    if (!disk->begin(Disk::Operation::kSync, *handle->name) || !disk->spend()) return SQLITE_IOERR_FSYNC;
+    disk->sync(file_of(handle));
+    return disk->asks(Disk::Operation::kSync, Disk::Moment::kAfter, *handle->name) ? SQLITE_OK : SQLITE_IOERR_FSYNC;
   }
   static int size(sqlite3_file* file, sqlite3_int64* size) {
     Handle* const handle = handle_of(file);
@@ -87,8 +89,9 @@ struct DiskCalls {
     Disk* const disk = disk_of(vfs);
     if (disk->off_) return SQLITE_IOERR_DELETE;
     if (!disk->files_.contains(name)) return SQLITE_IOERR_DELETE_NOENT;
+    if (!disk->begin(Disk::Operation::kRemove, name)) return SQLITE_IOERR_DELETE;
     disk->remove(name);
-    return disk->spend() ? SQLITE_OK : SQLITE_IOERR_DELETE;
+    return disk->end(Disk::Operation::kRemove, name) ? SQLITE_OK : SQLITE_IOERR_DELETE;
   }
   static int access(sqlite3_vfs* vfs, const char* name, int, int* there) {
     if (disk_of(vfs)->off_) return SQLITE_IOERR_ACCESS;
@@ -165,9 +168,22 @@ Disk::Disk(std::uint64_t seed, Syncs syncs) : random_(seed), syncs_(syncs) {
 
 Disk::~Disk() { sqlite3_vfs_unregister(&vfs_); }
 
+bool Disk::asks(Operation operation, Moment moment, const std::string& file) {
+  off_ = off_ || (watch_ && !watch_(operation, moment, file));
+  return !off_;
+}
+
+bool Disk::begin(Operation operation, const std::string& file) {
+  return !off_ && asks(operation, Moment::kBefore, file);
+}
+
+bool Disk::end(Operation operation, const std::string& file) {
+  return spend() && asks(operation, Moment::kAfter, file);
+}
+
 bool Disk::spend() {
   ++operations_;
-  off_ = off_at_ && operations_ >= *off_at_;
+  off_ = off_ || (off_at_ && operations_ >= *off_at_);
   return !off_;
 }
 
@@ -187,7 +203,7 @@ void Disk::write(File& file, Change change) {
 
 void Disk::sync(File& file) {
   if (syncs_ == Syncs::kNever) return;
-  file.durable = file.now;
+  for (const Change& change : file.pending) apply(file.durable, change);
   file.pending.clear();
   if (std::exchange(file.folder_synced, true)) return;
   removed_.clear();
@@ -212,7 +228,9 @@ std::string Disk::after_power_off(const File& file) {
     for (std::size_t at = 0; at < change.bytes.size();) {
       const std::size_t end = std::min(change.bytes.size(), at + kSector - (change.offset + at) % kSector);
       const bool kept = mood == 1 || (mood == 2 && random_.below(2) == 0);
-      if (kept) apply(content, {change.offset + at, change.bytes.substr(at, end - at), std::nullopt});
+      const bool torn = kept && mood == 2 && random_.below(kTornSectors) == 0;
+      const std::size_t whole = torn ? at + random_.below(end - at) : end;
+      if (kept) apply(content, {change.offset + at, change.bytes.substr(at, whole - at), std::nullopt});
       at = end;
     }
   }
@@ -227,6 +245,11 @@ std::string Disk::content(const std::string& name) const {
 void Disk::put(const std::string& name, std::string content) {
   files_[name] = {.now = content, .durable = std::move(content), .pending = {}, .folder_synced = true};
   named_.insert(name);
+}
+
+void Disk::next_user() {
+  off_ = false;
+  off_at_.reset();
 }
 
 void Disk::restart() {

@@ -1,17 +1,22 @@
 // A disk that loses its power: an SQLite VFS in memory. What was written and not synced may be gone afterwards, wholly
-// or in part, sector by sector in any order; so may files that were made or removed since their folder was synced.
+// or in part, sector by sector in any order, a sector itself down to any byte; so may files that were made or removed
+// since their folder was synced.
 //
 // Models what POSIX promises and SQLite counts on: a sync makes a file's bytes durable, the first sync of a new log its
-// folder; a sector is written wholly or not at all.
+// folder; what a write does not touch stays as it was.
+//
+// A process that dies takes nothing with it: what it has written the next one finds, synced or not.
 #pragma once
 
 #include <sqlite3.h>
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pons/core/random.hpp"
@@ -20,6 +25,12 @@ namespace pons::tests {
 
 class Disk {
  public:
+  enum class Operation : std::uint8_t { kWrite, kCut, kSync, kRemove };
+  enum class Moment : std::uint8_t { kBefore, kAfter };
+  // Asked before and after each operation, with the file's name. False: who uses the disk dies there, and all later
+  // calls fail.
+  using Watch = std::function<bool(Operation operation, Moment moment, const std::string& file)>;
+
   // A disk that lies says that it has synced.
   enum class Syncs : std::uint8_t { kTruly, kNever };
 
@@ -37,11 +48,16 @@ class Disk {
   // fail.
   void power_off_at(std::int64_t n) { off_at_ = operations_ + n; }
   [[nodiscard]] bool off() const { return off_; }
+  void watch(Watch watch) { watch_ = std::move(watch); }
+  // Its user is dead: all calls fail until the next one comes.
+  void user_dies() { off_ = true; }
   // What a file holds, empty where there is none; and a file as a disk may hold it.
   [[nodiscard]] std::string content(const std::string& name) const;
   void put(const std::string& name, std::string content);
   // What a computer finds that is switched on again. Nothing may have a file open.
   void restart();
+  // What the next process finds on the same computer. Likewise.
+  void next_user();
 
  private:
   friend struct DiskCalls;
@@ -56,7 +72,11 @@ class Disk {
     bool folder_synced = false;   // since it was made
   };
 
-  [[nodiscard]] bool spend();  // one operation; false: with it the power went
+  [[nodiscard]] bool asks(Operation operation, Moment moment, const std::string& file);
+  [[nodiscard]] bool spend();                                              // counts one; false: with it the power goes
+  [[nodiscard]] bool begin(Operation operation, const std::string& file);  // false: nothing of it happens
+  // It has happened; false: with it the power went.
+  [[nodiscard]] bool end(Operation operation, const std::string& file);
   void write(File& file, Change change);
   void sync(File& file);
   void remove(const std::string& name);
@@ -67,6 +87,7 @@ class Disk {
   sqlite3_vfs vfs_{};
   Random random_;
   Syncs syncs_;
+  Watch watch_;
   std::map<std::string, File> files_;    // that are there
   std::map<std::string, File> removed_;  // and may be there again
   std::set<std::string> named_;          // that the folder keeps
