@@ -138,7 +138,7 @@ runner::SkillPort Process::skill_port() {
     what();
     (void)outside_.steps.at(act, Moment::kAfter);
   };
-  return {.refresh = [this, step](Time now, std::vector<ObjectBelief>,
+  return {.refresh = [this, step](Time now, const std::vector<ObjectBelief>&,
                                   Time seen) { step(Act::kHeartbeat, [&] { cell_.refresh(now, {}, seen); }); },
           .locate = {},
           .state = [this]() -> const link::State& { return cell_.arm.state(); },
