@@ -31,6 +31,19 @@ constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
 constexpr std::string_view kAttached = "attached";  // a bridge to a body; in the journal
 
+// That of the body whose last bridge wrote this journal; empty in one that no bridge of such a body has opened.
+Expected<std::string> body_in(const bridge::Journal& journal) {
+  const auto events = journal.notes();
+  if (!events) return std::unexpected(events.error());
+  std::string body;
+  for (const bridge::Event& event : *events) {
+    if (event.kind == kAttached) body = task::text_of(event.detail, "body");
+  }
+  return body;
+}
+
+}  // namespace
+
 bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
   using Fate = skills::TakeUp::Fate;
   switch (fate) {
@@ -45,19 +58,6 @@ bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
   }
   return {done, task::Outcome::kFailed, "unknown"};
 }
-
-// That of the body whose last bridge wrote this journal; empty in one that no bridge of such a body has opened.
-Expected<std::string> body_in(const bridge::Journal& journal) {
-  const auto events = journal.notes();
-  if (!events) return std::unexpected(events.error());
-  std::string body;
-  for (const bridge::Event& event : *events) {
-    if (event.kind == kAttached) body = task::text_of(event.detail, "body");
-  }
-  return body;
-}
-
-}  // namespace
 
 Expected<void> check_resources(const task::SkillRegistry& skills, const world::World& world) {
   for (const auto& [name, type] : skills.all()) {

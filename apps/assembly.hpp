@@ -139,4 +139,7 @@ class Assembly {
   explicit Assembly(world::World w) : world(std::move(w)) {}
 };
 
+// What becomes of a task that a bridge which is no more had begun, of whose steps so many were done.
+[[nodiscard]] bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done);
+
 }  // namespace pons::apps

@@ -33,40 +33,33 @@ Report::Throughput throughput(double span_s, std::int64_t sorted) {
   return {.seconds_per_parcel = seconds_per_parcel, .parcels_per_hour = 3600.0 / seconds_per_parcel};
 }
 
-namespace {
-
-void put_parcels(Json& json, const Report& report) {
-  const auto& parcels = report.parcels;
+Json to_json(const Report::Parcels& parcels) {
   Json reasons = Json::object();
   for (const auto& [reason, counts] : parcels.exceptions.reasons)
     reasons[reason] = {{"deserved", counts.deserved}, {"undeserved", counts.undeserved}};
-  json["parcels"] = {{"offered", parcels.offered},
-                     {"sorted", parcels.sorted},
-                     {"missorted", parcels.missorted},
-                     {"lost", parcels.lost},
-                     {"duplicated", parcels.duplicated},
-                     {"exceptions",
-                      {{"deserved", parcels.exceptions.deserved},
-                       {"undeserved", parcels.exceptions.undeserved},
-                       {"reasons", std::move(reasons)}}},
-                     {"damaged", parcels.damaged}};
-  json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
-                        {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
+  return {{"offered", parcels.offered},
+          {"sorted", parcels.sorted},
+          {"missorted", parcels.missorted},
+          {"lost", parcels.lost},
+          {"duplicated", parcels.duplicated},
+          {"exceptions",
+           {{"deserved", parcels.exceptions.deserved},
+            {"undeserved", parcels.exceptions.undeserved},
+            {"reasons", std::move(reasons)}}},
+          {"damaged", parcels.damaged}};
 }
 
-void put_rounds(Json& json, const Report::Rounds& rounds) {
-  json["rounds"] = {{"tasks", rounds.tasks},
-                    {"succeeded", rounds.succeeded},
-                    {"goals", rounds.goals},
-                    {"missed", rounds.missed},
-                    {"worst_goal_m", number(rounds.worst_goal_m)},
-                    {"worst_goal_rad", number(rounds.worst_goal_rad)},
-                    {"collisions", rounds.collisions},
-                    {"fastest_m_s", number(rounds.fastest_m_s)},
-                    {"driven_m", number(rounds.driven_m)}};
+Json to_json(const Report::Rounds& rounds) {
+  return {{"tasks", rounds.tasks},
+          {"succeeded", rounds.succeeded},
+          {"goals", rounds.goals},
+          {"missed", rounds.missed},
+          {"worst_goal_m", number(rounds.worst_goal_m)},
+          {"worst_goal_rad", number(rounds.worst_goal_rad)},
+          {"collisions", rounds.collisions},
+          {"fastest_m_s", number(rounds.fastest_m_s)},
+          {"driven_m", number(rounds.driven_m)}};
 }
-
-}  // namespace
 
 nlohmann::ordered_json to_json(const Report& report) {
   const auto& loop = report.loop;
@@ -74,10 +67,13 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["version"] = kReportVersion;
   json["seed"] = report.seed;
   json["world"] = report.world;
-  if (report.rounds)
-    put_rounds(json, *report.rounds);
-  else
-    put_parcels(json, report);
+  if (report.rounds) {
+    json["rounds"] = to_json(*report.rounds);
+  } else {
+    json["parcels"] = to_json(report.parcels);
+    json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
+                          {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
+  }
   json["retries"] = report.retries;
   json["interventions"] = report.interventions ? Json(*report.interventions) : Json(nullptr);
   json["fault_plan"] = report.fault_plan;

@@ -104,6 +104,8 @@ inline constexpr std::size_t kMostFindings = 100;
 
 // Keys in the order of the struct. A number that is not finite becomes null.
 [[nodiscard]] nlohmann::ordered_json to_json(const Report& report);
+[[nodiscard]] nlohmann::ordered_json to_json(const Report::Parcels& parcels);
+[[nodiscard]] nlohmann::ordered_json to_json(const Report::Rounds& rounds);
 
 // Puts the report at `path`, whole or not at all (see write_whole).
 [[nodiscard]] Expected<void> write(const Report& report, const std::filesystem::path& path);

@@ -13,7 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-[[nodiscard]] Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 [[nodiscard]] Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 void add(Report::Parcels& sum, const Report::Parcels& parcels) {
@@ -44,34 +43,6 @@ void add(Report::Rounds& sum, const Report::Rounds& rounds) {
   sum.driven_m += rounds.driven_m;
 }
 
-Json json_of(const Report::Parcels& parcels) {
-  Json reasons = Json::object();
-  for (const auto& [reason, counts] : parcels.exceptions.reasons)
-    reasons[reason] = {{"deserved", counts.deserved}, {"undeserved", counts.undeserved}};
-  return {{"offered", parcels.offered},
-          {"sorted", parcels.sorted},
-          {"missorted", parcels.missorted},
-          {"lost", parcels.lost},
-          {"duplicated", parcels.duplicated},
-          {"exceptions",
-           {{"deserved", parcels.exceptions.deserved},
-            {"undeserved", parcels.exceptions.undeserved},
-            {"reasons", std::move(reasons)}}},
-          {"damaged", parcels.damaged}};
-}
-
-Json json_of(const Report::Rounds& rounds) {
-  return {{"tasks", rounds.tasks},
-          {"succeeded", rounds.succeeded},
-          {"goals", rounds.goals},
-          {"missed", rounds.missed},
-          {"worst_goal_m", number(rounds.worst_goal_m)},
-          {"worst_goal_rad", number(rounds.worst_goal_rad)},
-          {"collisions", rounds.collisions},
-          {"fastest_m_s", number(rounds.fastest_m_s)},
-          {"driven_m", number(rounds.driven_m)}};
-}
-
 Json json_of(const std::optional<Spread>& spread) {
   if (!spread) return nullptr;
   return {{"best", spread->least},
@@ -89,7 +60,7 @@ Json json_of(const Sum& sum) {
                   {"missing", sum.missing}, {"bad_at_most", number(at_most(sum.bad, sum.reports))}};
   if (sum.cells > 0) {
     const auto& parcels = sum.parcels;
-    json["parcels"] = json_of(parcels);
+    json["parcels"] = to_json(parcels);
     json["at_most"] = {{"missorted", number(at_most(parcels.missorted, parcels.offered))},
                        {"lost", number(at_most(parcels.lost, parcels.offered))},
                        {"duplicated", number(at_most(parcels.duplicated, parcels.offered))},
@@ -97,7 +68,7 @@ Json json_of(const Sum& sum) {
                        {"damaged", number(at_most(parcels.damaged, parcels.offered))}};
     json["seconds_per_parcel"] = json_of(spread(sum.seconds_per_parcel));
   }
-  if (sum.bases > 0) json["rounds"] = json_of(sum.rounds);
+  if (sum.bases > 0) json["rounds"] = to_json(sum.rounds);
   json["retries"] = sum.retries;
   json["interventions"] = sum.interventions;
   json["violations"] = sum.violations;

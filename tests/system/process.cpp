@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/assembly.hpp"
 #include "tests/system/skills.hpp"
 
 namespace pons::tests {
@@ -62,21 +63,6 @@ class BesideTheBelt final : public brain::Brain {
   const bridge::Bridge& bridge_;
   brain::Dispatcher dispatcher_;
 };
-
-Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
-  using Fate = skills::TakeUp::Fate;
-  switch (fate) {
-    case Fate::kGoesOn:
-      return {.done = done};
-    case Fate::kDone:
-      return {.done = done + 1};
-    case Fate::kLost:
-      return {done, task::Outcome::kFailed, "lost from the cups while no bridge lived"};
-    case Fate::kBroken:
-      return {done, task::Outcome::kFailed, "its bridge was ended in the middle of it"};
-  }
-  return {done, task::Outcome::kFailed, "unknown"};
-}
 
 }  // namespace
 
@@ -171,7 +157,7 @@ runner::SkillPort Process::skill_port() {
 // A printer remembers what it has printed.
 Resumption Process::resume(const task::Task& task, std::size_t done) {
   const task::Step& next = task.steps[done];
-  if (next.skill != "print") return resumption(take_up_.fate(task, done), done);
+  if (next.skill != "print") return apps::resumption(take_up_.fate(task, done), done);
   const Json& arguments = next.arguments;
   const int printed =
       outside_.plant.printed(arguments.at("task").get<std::string>(), arguments.at("number").get<int>());
