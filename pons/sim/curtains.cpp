@@ -12,7 +12,7 @@ constexpr double kBelowRim_m = 0.02;
 Curtains::Curtains(const world::World& world) {
   for (std::size_t i = 0; i < world.places.size(); ++i) {
     const world::Place& place = world.places[i];
-    if (place.kind == world::PlaceKind::kTray) continue;
+    if (place.kind != world::PlaceKind::kChute && place.kind != world::PlaceKind::kException) continue;
     mouths_.push_back({i, place.center_m - Vector3(0, 0, kBelowRim_m), 0.5 * place.size_m.head<2>()});
   }
 }
