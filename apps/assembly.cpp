@@ -78,31 +78,36 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
     return fail(fmt::format("has {} cameras", world.cameras.size()), (world.folder / "world.yaml").string(),
                 fmt::format("the link has places for {}", link::kMaxCameras));
   }
-  std::unique_ptr<BodyHalf> self(new BodyHalf(meeting.link));
-  auto model = model::RobotModel::load(world.robot);
-  if (!model) return std::unexpected(model.error());
+  auto self = std::make_unique<BodyHalf>();
   const cerebellum::Settings settings = settings_of(world);
-  if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
+  const auto stations = world.arms();
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    auto model = model::RobotModel::load(stations[i].robot);
+    if (!model) return std::unexpected(model.error());
+    if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
+    self->arms.push_back(std::make_unique<Arm>(stations.size() > 1 ? stations[i].arm : std::string(), *meeting.links[i],
+                                               std::move(*model), settings));
+  }
   auto simulation = sim::Simulation::create(world, manifest, setup.seed, setup.faults);
   if (!simulation) return std::unexpected(simulation.error());
   self->faults = setup.faults;
   self->simulation = std::move(*simulation);
   self->simulation->expect_visits(setup.visits);
   if (setup.arm_at) self->simulation->set_arm(*setup.arm_at);
-  self->cerebellum = std::make_unique<cerebellum::Cerebellum>(std::move(*model), settings, Time{});
   self->photographer = std::make_unique<runner::Photographer>(world, self->simulation->cameras(), meeting.frames,
                                                               meeting.pages, meeting.pixels, meeting.pace);
   return self;
 }
 
 runner::BodyParts BodyHalf::parts() {
-  return {.plant = {.body = &simulation->body(),
-                    .cameras = simulation->cameras(),
+  std::vector<runner::RobotParts> robots;
+  for (std::size_t i = 0; i < arms.size(); ++i)
+    robots.push_back({arms[i]->name, &simulation->body(i), &arms[i]->cerebellum, &arms[i]->end});
+  return {.plant = {.cameras = simulation->cameras(),
                     .advance = [this](Time now) { simulation->advance_to(now); },
                     .finished = [this] { return simulation->finished(); },
                     .health = [this] { return simulation->health(); }},
-          .cerebellum = cerebellum.get(),
-          .link = &end,
+          .robots = std::move(robots),
           .photographer = photographer.get()};
 }
 
@@ -110,23 +115,15 @@ runner::BodyParts BodyHalf::parts() {
 
 Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& world, const world::Manifest& manifest,
                                                         const BridgeOptions& options, const Meeting& meeting) {
-  std::unique_ptr<BridgeHalf> self(new BridgeHalf(meeting.link));
-  auto model = model::RobotModel::load(world.robot);
-  if (!model) return std::unexpected(model.error());
+  auto self = std::make_unique<BridgeHalf>();
+  if (auto added = self->add_arms(world, meeting); !added) return std::unexpected(added.error());
   const bool realtime = meeting.pace == runner::Pace::kRealTime;
-  self->perception = std::make_unique<perception::Perception>(
-      world, model->copy(),
-      [&helper = self->helper](const auto& first, const auto& second) { helper.both(first, second); });
-  self->cell = std::make_unique<skills::Cell>(self->end, world, std::move(*model),
-                                              realtime ? kRealTimeLead : skills::kSpliceLead);
-  self->rest = std::make_unique<skills::Rest>(*self->cell);
-  self->take_up = std::make_unique<skills::TakeUp>(*self->cell);
-  skills::add_skills(self->registry, *self->cell, policy_names());
-  if (auto good = check_resources(self->registry, world); !good) return std::unexpected(good.error());
-
-  bridge::tree::Library trees(self->registry);
+  const task::SkillRegistry& registry = self->arms.front()->registry;
+  bridge::tree::Library trees(registry);
   if (auto loaded = trees.load(world.folder / "trees"); !loaded) return std::unexpected(loaded.error());
-  auto rules = bridge::Rules::compile(world.review, self->registry, facts_of(*self->cell, orders_of(manifest)));
+  std::vector<const skills::Cell*> cells;
+  for (const auto& arm : self->arms) cells.push_back(&arm->cell);
+  auto rules = bridge::Rules::compile(world.review, registry, facts_of(std::move(cells), orders_of(manifest)));
   if (!rules) return std::unexpected(rules.error());
   // Before the journal: a run that is refused leaves none behind.
   std::unique_ptr<gate::LocalSocket> socket;
@@ -136,7 +133,8 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     socket = std::move(*listening);
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
-  self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
+  self->bridge = std::make_unique<bridge::Bridge>(*self->journal, registry, world);
+  for (std::size_t i = 1; i < self->arms.size(); ++i) self->bridge->add_robot(self->arms[i]->registry);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
@@ -148,18 +146,49 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   } else {
     self->inference = std::make_unique<brain::PromptInference>();
   }
-  self->policies = std::make_unique<brain::PolicyRunner>(policies_of(world, self->cell->model), *self->inference);
+  self->policies =
+      std::make_unique<brain::PolicyRunner>(policies_of(self->cell().world, self->cell().model), *self->inference);
   const auto visitors = [half = self.get()](Time now) {
-    half->policies->attend(half->cell->stream, now);
+    half->policies->attend(half->cell().stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_ports(),
                                                            world.zones, options.recovery, visitors);
   if (socket) {
-    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
-                                        [half = self.get()] { return half->cell->stream; });
+    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->armings(),
+                                        [half = self.get()] { return half->cell().stream; });
   }
   return self;
+}
+
+Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& meeting) {
+  const bool realtime = meeting.pace == runner::Pace::kRealTime;
+  const auto stations = world.arms();
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    auto model = model::RobotModel::load(stations[i].robot);
+    if (!model) return std::unexpected(model.error());
+    if (perception) {
+      perception->add_robot(model->copy());
+    } else {
+      perception = std::make_unique<perception::Perception>(
+          world, model->copy(), [this](const auto& first, const auto& second) { helper.both(first, second); });
+    }
+    arms.push_back(std::make_unique<Arm>(*meeting.links[i], stations[i], std::move(*model),
+                                         realtime ? kRealTimeLead : skills::kSpliceLead));
+    // There is one stream of chunks at most, and it is the first arm's.
+    skills::add_skills(arms[i]->registry, arms[i]->cell, policy_names());
+    if (auto good = check_resources(arms[i]->registry, world); !good) return good;
+  }
+  for (const auto& one : arms) {
+    for (const auto& other : arms) {
+      if (other != one) one->cell.beside(other->cell);
+    }
+  }
+  return {};
+}
+
+bool BridgeHalf::holds_something() const {
+  return std::ranges::any_of(arms, [](const auto& arm) { return arm->cell.held.has_value(); });
 }
 
 Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
@@ -181,25 +210,34 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   return journal->commit();
 }
 
-runner::SkillPort BridgeHalf::skill_port() {
-  return {.refresh = [this](Time now, std::vector<ObjectBelief> objects,
-                            Time seen) { cell->refresh(now, std::move(objects), seen); },
-          .state = [this]() -> const link::State& { return cell->arm.state(); },
-          .take_forgotten = [this] { return cell->take_forgotten(); },
-          .arm = [this](Time now) { cell->arm.arm(now); },
-          .outside_rad = [this] { return cell->arm.outside_rad(); },
-          .recover = [this](Time now) { return cell->arm.recover(now); },
-          .rest = [this](Time now) { rest->tick(now); },
-          .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
-          .holds_belt = [this](Time now) { return cell->holds_belt(now); },
-          .halt = [this] { cell->arm.halt(); },
-          .raise_emergency = [this] { end.raise_emergency_stop(); },
-          .release_emergency = [this] { end.clear_emergency_stop(); },
-          .carries = [this] { return take_up->carries(); },
-          .restore = [this](const task::Json& carried) { take_up->restore(carried); },
-          .resume = [this](const task::Task& task,
-                           std::size_t done) { return resumption(take_up->fate(task, done), done); },
-          .settle = [this](Time now) { return take_up->settle(now); }};
+std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
+  std::vector<runner::SkillPort> ports;
+  for (std::size_t robot = 0; robot < arms.size(); ++robot) {
+    auto& [end, cell, rest, take_up, registry] = *arms[robot];
+    ports.push_back({.name = cell.world.arm,
+                     .robot = robot,
+                     .refresh = [&cell](Time now, std::vector<ObjectBelief> objects,
+                                        Time seen) { cell.refresh(now, std::move(objects), seen); },
+                     .state = [&cell]() -> const link::State& { return cell.arm.state(); },
+                     .take_forgotten = [&cell] { return cell.take_forgotten(); },
+                     .arm = [&cell](Time now) { cell.arm.arm(now); },
+                     .outside_rad = [&cell] { return cell.arm.outside_rad(); },
+                     .recover = [&cell](Time now) { return cell.arm.recover(now); },
+                     .rest = [&rest](Time now) { rest.tick(now); },
+                     .belt = [&cell](link::Belt wanted) { cell.arm.belt(wanted); },
+                     .holds_belt = [&cell](Time now) { return cell.holds_belt(now); },
+                     .halt = [&cell] { cell.arm.halt(); },
+                     .raise_emergency = [&end] { end.raise_emergency_stop(); },
+                     .release_emergency = [&end] { end.clear_emergency_stop(); },
+                     .carries = [&take_up] { return take_up.carries(); },
+                     .takes_until_m = cell.world.belt.pick_x_max_m,
+                     .lets_pass = [&cell] { return cell.lets_pass(); },
+                     .restore = [&take_up](const task::Json& carried) { take_up.restore(carried); },
+                     .resume = [&take_up](const task::Task& task,
+                                          std::size_t done) { return resumption(take_up.fate(task, done), done); },
+                     .settle = [&take_up](Time now) { return take_up.settle(now); }});
+  }
+  return ports;
 }
 
 // ---- both ----
@@ -207,7 +245,11 @@ runner::SkillPort BridgeHalf::skill_port() {
 Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
                                                     const AssemblyOptions& options) {
   std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
-  const Meeting meeting{self->link, self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(), options.pace};
+  std::vector<link::Link*> links;
+  for (std::size_t i = 0; i < self->world.arms().size(); ++i)
+    links.push_back(self->links.emplace_back(std::make_unique<link::Link>()).get());
+  const Meeting meeting{std::move(links), self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(),
+                        options.pace};
   auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);

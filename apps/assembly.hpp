@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/desk.hpp"
@@ -38,7 +39,7 @@ namespace pons::apps {
 
 // Where both halves meet, and at whose pace. Everything outlives them.
 struct Meeting {
-  link::Link& link;
+  std::vector<link::Link*> links;  // one for each of world.arms()
   link::Frames& frames;
   const link::FramePages& pages;
   std::byte* pixels;
@@ -65,12 +66,16 @@ class BodyHalf {
 
   world::FaultPlan faults;
   std::unique_ptr<sim::Simulation> simulation;
-  link::CerebellumEnd end;
-  std::unique_ptr<cerebellum::Cerebellum> cerebellum;
+  // What is one an arm, below the link.
+  struct Arm {
+    Arm(std::string the_name, link::Link& link, model::RobotModel model, const cerebellum::Settings& settings)
+        : name(std::move(the_name)), end(link), cerebellum(std::move(model), settings, Time{}) {}
+    std::string name;  // empty where there is no other
+    link::CerebellumEnd end;
+    cerebellum::Cerebellum cerebellum;
+  };
+  std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<runner::Photographer> photographer;
-
- private:
-  explicit BodyHalf(link::Link& link) : end(link) {}
 };
 
 struct BridgeOptions {
@@ -90,14 +95,25 @@ class BridgeHalf {
                                                                    const BridgeOptions& options,
                                                                    const Meeting& meeting);
 
-  link::BridgeEnd end;
+  // What is one an arm, above the link.
+  struct Arm {
+    Arm(link::Link& link, const world::World& station, model::RobotModel model, Duration splice_lead)
+        : end(link), cell(end, station, std::move(model), splice_lead) {}
+    link::BridgeEnd end;
+    skills::Cell cell;
+    skills::Rest rest{cell};
+    skills::TakeUp take_up{cell};
+    task::SkillRegistry registry;
+  };
+  // The first one's, where there is no other.
+  [[nodiscard]] skills::Cell& cell() { return arms.front()->cell; }
+  // Whether any arm has something on its cups.
+  [[nodiscard]] bool holds_something() const;
+
   std::unique_ptr<bridge::Journal> journal;
   runner::Helper helper;  // perception's
   std::unique_ptr<perception::Perception> perception;
-  std::unique_ptr<skills::Cell> cell;
-  std::unique_ptr<skills::Rest> rest;
-  std::unique_ptr<skills::TakeUp> take_up;
-  task::SkillRegistry registry;
+  std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
   std::unique_ptr<brain::Inference> inference;
@@ -107,9 +123,9 @@ class BridgeHalf {
   std::unique_ptr<Desk> desk;
 
  private:
-  explicit BridgeHalf(link::Link& link) : end(link) {}
+  [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
-  [[nodiscard]] runner::SkillPort skill_port();
+  [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
 };
 
 struct AssemblyOptions {
@@ -130,7 +146,7 @@ class Assembly {
   [[nodiscard]] runner::Parts parts();
 
   world::World world;
-  link::Link link;
+  std::vector<std::unique_ptr<link::Link>> links;
   runner::Darkroom darkroom{world};
   std::unique_ptr<BodyHalf> body;
   std::unique_ptr<BridgeHalf> above;

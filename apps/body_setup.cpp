@@ -79,6 +79,9 @@ Expected<BodySetup> body_setup(const BodySetupOptions& options, std::uint64_t se
     setup.visits.push_back(*visit);
   }
   if (options.arm_at.empty()) return setup;
+  if (world.arms().size() > 1)
+    return fail("says where one arm is found", "--arm-at " + options.arm_at,
+                fmt::format("leave it out: {} has {} arms", world.name, world.arms().size()));
   const auto position = arm_at(options.arm_at, world);
   if (!position) return std::unexpected(position.error());
   setup.arm_at = *position;

@@ -16,19 +16,21 @@ void add_size(const Vector3& size_m, Json& known) {
 
 }  // namespace
 
-task::Facts facts_of(const skills::Cell& cell, brain::Orders orders) {
-  auto of = [&cell, orders = std::move(orders)](std::string_view thing) {
+task::Facts facts_of(std::vector<const skills::Cell*> cells, brain::Orders orders) {
+  auto of = [cells = std::move(cells), orders = std::move(orders)](std::string_view thing) {
     Json known = Json::object();
     if (thing == "home") return Json{{"kind", "home"}};
-    if (const world::Place* const place = cell.world.place(thing)) return Json{{"kind", world::name(place->kind)}};
+    if (const world::Place* const place = cells.front()->world.place(thing))
+      return Json{{"kind", world::name(place->kind)}};
     // Of what nobody has ordered that much is known.
     const auto order = orders.find(thing);
     known["destination"] = order == orders.end() ? std::string() : order->second.destination;
     known["priority"] = order == orders.end() ? 0 : order->second.priority;
-    if (const ObjectBelief* const seen = cell.find(thing)) add_size(seen->size_m, known);
-    if (cell.held && cell.held->code == thing) {
-      add_size(cell.held->load.size_m, known);
-      if (cell.held->mass_kg > 0) known["mass_kg"] = cell.held->mass_kg;
+    if (const ObjectBelief* const seen = cells.front()->find(thing)) add_size(seen->size_m, known);
+    for (const skills::Cell* const cell : cells) {
+      if (!cell->held || cell->held->code != thing) continue;
+      add_size(cell->held->load.size_m, known);
+      if (cell->held->mass_kg > 0) known["mass_kg"] = cell->held->mass_kg;
     }
     return known;
   };

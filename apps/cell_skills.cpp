@@ -25,9 +25,10 @@ Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) 
     skills::add_base_skills(self->registry, *self->chassis, *self->speech);
     return self;
   }
-  auto model = model::RobotModel::load(self->world.robot);
+  const world::World& station = self->world.arms().front();
+  auto model = model::RobotModel::load(station.robot);
   if (!model) return std::unexpected(model.error());
-  self->cell = std::make_unique<skills::Cell>(*self->end, self->world, std::move(*model));
+  self->cell = std::make_unique<skills::Cell>(*self->end, station, std::move(*model));
   skills::add_skills(self->registry, *self->cell, policy_names());
   return self;
 }

@@ -43,8 +43,12 @@ const Error kNoStream{"no stream goes on", "chunk_stream",
 }  // namespace
 
 Desk::Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
-           runner::Arming& arming, Stream stream)
-    : visitors_(std::move(visitors)), bridge_(bridge), journal_(journal), arming_(arming), stream_(std::move(stream)) {}
+           std::vector<runner::Arming*> arming, Stream stream)
+    : visitors_(std::move(visitors)),
+      bridge_(bridge),
+      journal_(journal),
+      arming_(std::move(arming)),
+      stream_(std::move(stream)) {}
 
 Json Desk::observe(Time now) const {
   const task::ChunkStream* const stream = stream_();
@@ -140,7 +144,7 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kReset:
     case gate::Operation::kArm:
       if (auto told = tell_arm(asked.operation, now); !told) return gate::refusal(told.error());
-      return {{"ok", true}, {"robot", arming_.describe()}};
+      return {{"ok", true}, {"robot", describe()}};
   }
   return gate::refusal({"unknown operation", "request", "pons/gate/request.hpp lists them"});
 }
@@ -220,11 +224,28 @@ Json Desk::tell_task(const gate::Asked& asked, Time now) {
 }
 
 Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {
-  if (operation == gate::Operation::kReset) return arming_.reset(now);
-  if (operation == gate::Operation::kArm) return arming_.arm(now);
-  if (operation == gate::Operation::kStop) arming_.stop(now);
-  if (operation == gate::Operation::kEmergencyStop) arming_.emergency_stop(now);
+  for (runner::Arming* const arming : arming_) {
+    if (operation == gate::Operation::kStop) arming->stop(now);
+    if (operation == gate::Operation::kEmergencyStop) arming->emergency_stop(now);
+  }
+  if (operation != gate::Operation::kReset && operation != gate::Operation::kArm) return {};
+  std::vector<runner::Arming*> waiting = arming_;
+  std::erase_if(waiting, [](const runner::Arming* arming) { return !arming->needs_person(); });
+  if (waiting.empty()) waiting.push_back(arming_.front());
+  for (runner::Arming* const arming : waiting) {
+    auto told = operation == gate::Operation::kReset ? arming->reset(now) : arming->arm(now);
+    if (!told) return told;
+  }
   return {};
+}
+
+// The first robot that waits for something; where none does, the first.
+Json Desk::describe() const {
+  for (const runner::Arming* const arming : arming_) {
+    Json robot = arming->describe();
+    if (robot.at("needs") != "") return robot;
+  }
+  return arming_.front()->describe();
 }
 
 }  // namespace pons::apps

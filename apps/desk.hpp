@@ -21,9 +21,10 @@ class Desk {
  public:
   // The stream of chunks that goes on, or null.
   using Stream = std::function<task::ChunkStream*()>;
-  // All but the visitors must outlive it.
+  // All but the visitors must outlive it. `arming` is that of each robot: a stop is for all of them, a reset and an arming
+  // for those that wait for a person.
   Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
-       runner::Arming& arming, Stream stream);
+       std::vector<runner::Arming*> arming, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
@@ -41,13 +42,14 @@ class Desk {
   [[nodiscard]] std::optional<bridge::Json> news(const gate::Asked& asked) const;
   void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
+  [[nodiscard]] bridge::Json describe() const;
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
 
   std::unique_ptr<gate::Visitors> visitors_;
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
-  runner::Arming& arming_;
+  std::vector<runner::Arming*> arming_;
   Stream stream_;
   struct Watcher {
     gate::Request request;

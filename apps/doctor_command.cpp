@@ -106,8 +106,6 @@ Finding try_world(const std::string& name) {
   const auto world = world::load(worlds_folder(), name);
   if (!world) return say(Finding::kBad, what, world.error().line());
   if (world->base) return std::max(try_base(what, *world), try_speech());
-  auto model = model::RobotModel::load(world->robot);
-  if (!model) return say(Finding::kBad, what, model.error().line());
   const auto manifest = world::draw_manifest(*world, 1, 1);
   if (!manifest) return say(Finding::kBad, what, manifest.error().line());
   const auto simulation = sim::Simulation::create(*world, *manifest, 1);
@@ -117,10 +115,18 @@ Finding try_world(const std::string& name) {
     camera->begin(Time{});
     if (auto taken = camera->finish(frame); !taken) return say(Finding::kBad, what, taken.error().line());
   }
-  if (const std::string far = out_of_reach(*world, *model); !far.empty())
-    return say(Finding::kBad, what, fmt::format("the tool does not reach {}; move it, or the robot", far));
+  const auto stations = world->arms();
+  for (const world::World& station : stations) {
+    auto model = model::RobotModel::load(station.robot);
+    if (!model) return say(Finding::kBad, what, model.error().line());
+    if (const std::string far = out_of_reach(station, *model); !far.empty())
+      return say(Finding::kBad, what,
+                 fmt::format("the tool of '{}' does not reach {}; move it, or the robot", station.arm, far));
+  }
   return say(Finding::kGood, what,
-             fmt::format("composes, the arm reaches, and {} cameras render", world->cameras.size()));
+             fmt::format("composes, {}, and {} cameras render",
+                         stations.size() == 1 ? "the arm reaches" : fmt::format("{} arms reach", stations.size()),
+                         world->cameras.size()));
 }
 
 int doctor(double jitter_s) {

@@ -18,19 +18,21 @@ int worlds() {
   for (const std::string& name : names) {
     const auto world = world::load(folder, name);
     if (!world) {
-      fmt::print("{:<14} broken: {}\n", name, world.error().line());
+      fmt::print("{:<20} broken: {}\n", name, world.error().line());
       code = kExitBadInput;
       continue;
     }
     if (world->base) {
-      fmt::print("{:<14} {} (base, {:.1f} m/s), {} stations, a map of {:.0f} by {:.0f} m\n", name, world->robot.name,
+      fmt::print("{:<20} {} (base, {:.1f} m/s), {} stations, a map of {:.0f} by {:.0f} m\n", name, world->robot.name,
                  world->base->speed_m_s, world->base->stations.size(), world->map->width() * world->map->resolution_m(),
                  world->map->height() * world->map->resolution_m());
       continue;
     }
     std::size_t chutes = 0;
     for (const world::Place& place : world->places) chutes += place.kind == world::PlaceKind::kChute ? 1 : 0;
-    fmt::print("{:<14} {} ({} axes), {} chutes, {} cameras\n", name, world->robot.name, world->robot.home.size(),
+    const std::size_t arms = world->arms().size();
+    fmt::print("{:<20} {}{} ({} axes), {} chutes, {} cameras\n", name,
+               arms > 1 ? fmt::format("{} times ", arms) : std::string(), world->robot.name, world->robot.home.size(),
                chutes, world->cameras.size());
   }
   return code;

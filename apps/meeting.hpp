@@ -34,7 +34,7 @@ class MeetingPlace {
 
   [[nodiscard]] link::Border& border() const { return **border_; }
   [[nodiscard]] Meeting meeting() const {
-    return {border().link, border().frames, *pages_, pixels_->data(), runner::Pace::kRealTime};
+    return {{&border().link}, border().frames, *pages_, pixels_->data(), runner::Pace::kRealTime};
   }
   // `tell` gets what people should know.
   [[nodiscard]] runner::Crossing crossing(std::function<void(std::string_view)> tell) const {

@@ -77,12 +77,12 @@ Expected<void> Rounds::build_bridge(const RoundsSetup& setup) {
   bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   observer = std::make_unique<runner::Observer>(world, localiser, darkroom.frames, darkroom.pages, darkroom.memory(),
                                                 setup.pace);
-  bridge_side = std::make_unique<runner::BridgeSide>(*bridge, errands, skill_port(), world.zones,
+  bridge_side = std::make_unique<runner::BridgeSide>(*bridge, errands, skill_ports(), world.zones,
                                                      runner::Recovery::kRefused, [this](Time now) {
                                                        if (desk) desk->attend(now);
                                                      });
   if (socket) {
-    desk = std::make_unique<Desk>(std::move(socket), *bridge, *journal, bridge_side->arming(),
+    desk = std::make_unique<Desk>(std::move(socket), *bridge, *journal, bridge_side->armings(),
                                   []() -> task::ChunkStream* { return nullptr; });
   }
   return {};
@@ -109,37 +109,36 @@ Expected<void> Rounds::review(const bridge::tree::Library& trees) const {
   return {};
 }
 
-runner::SkillPort Rounds::skill_port() {
+std::vector<runner::SkillPort> Rounds::skill_ports() {
   skills::Arm& wheels = chassis->wheels;
-  return {.refresh = [this](Time now, const std::vector<ObjectBelief>&, Time) { chassis->refresh(now); },
-          .locate = [this](const BaseBelief& belief) { chassis->locate(belief); },
-          .state = [&wheels]() -> const link::State& { return wheels.state(); },
-          .take_forgotten = [] { return std::vector<std::uint32_t>{}; },
-          .arm = [&wheels](Time now) { wheels.arm(now); },
-          .outside_rad = [&wheels] { return wheels.outside_rad(); },
-          .recover = [&wheels](Time now) { return wheels.recover(now); },
-          .rest = [](Time) {},
-          .belt = [](link::Belt) {},
-          .halt = [&wheels] { wheels.halt(); },
-          .raise_emergency = [this] { bridge_end.raise_emergency_stop(); },
-          .release_emergency = [this] { bridge_end.clear_emergency_stop(); },
-          .carries = [] { return bridge::Json{}; },
-          .restore = [](const bridge::Json&) {},
-          .resume =
-              [](const task::Task&, std::size_t done) {
-                return bridge::Resumption{done, task::Outcome::kFailed, "its bridge was ended in the middle of it"};
-              },
-          .settle = [](Time) { return true; }};
+  return {{.name = "base",
+           .refresh = [this](Time now, const std::vector<ObjectBelief>&, Time) { chassis->refresh(now); },
+           .locate = [this](const BaseBelief& belief) { chassis->locate(belief); },
+           .state = [&wheels]() -> const link::State& { return wheels.state(); },
+           .take_forgotten = [] { return std::vector<std::uint32_t>{}; },
+           .arm = [&wheels](Time now) { wheels.arm(now); },
+           .outside_rad = [&wheels] { return wheels.outside_rad(); },
+           .recover = [&wheels](Time now) { return wheels.recover(now); },
+           .rest = [](Time) {},
+           .belt = [](link::Belt) {},
+           .halt = [&wheels] { wheels.halt(); },
+           .raise_emergency = [this] { bridge_end.raise_emergency_stop(); },
+           .release_emergency = [this] { bridge_end.clear_emergency_stop(); },
+           .carries = [] { return bridge::Json{}; },
+           .restore = [](const bridge::Json&) {},
+           .resume =
+               [](const task::Task&, std::size_t done) {
+                 return bridge::Resumption{done, task::Outcome::kFailed, "its bridge was ended in the middle of it"};
+               },
+           .settle = [](Time) { return true; }}};
 }
 
 runner::Parts Rounds::parts() {
-  return {.body = {.plant = {.body = &simulation->body(),
-                             .cameras = simulation->cameras(),
+  return {.body = {.plant = {.cameras = simulation->cameras(),
                              .advance = [this](Time now) { simulation->advance_to(now); },
                              .finished = [] { return true; },  // nothing comes by itself
                              .health = [this] { return simulation->health(); }},
-                   .cerebellum = cerebellum.get(),
-                   .link = &body_end,
+                   .robots = {{{}, &simulation->body(), cerebellum.get(), &body_end}},
                    .photographer = photographer.get()},
           .bridge_side = bridge_side.get(),
           .observer = observer.get()};

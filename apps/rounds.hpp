@@ -65,7 +65,7 @@ class Rounds {
   [[nodiscard]] Expected<void> build_body(const RoundsSetup& setup);
   [[nodiscard]] Expected<void> build_bridge(const RoundsSetup& setup);
   [[nodiscard]] Expected<void> review(const bridge::tree::Library& trees) const;
-  [[nodiscard]] runner::SkillPort skill_port();
+  [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
 };
 
 // How the loop watches the wheels of a base.

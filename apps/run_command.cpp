@@ -63,7 +63,7 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 const std::int64_t done = std::min(settled, total);
                 if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
                 // With something on the cups, halfway: that is what the cell looks like.
-                if (!options.realtime && !options.picture.empty() && !pictured && cell.above->cell->held &&
+                if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
                     done * 2 >= total) {
                   pictured = take_picture(cell, options.picture).has_value();
                 }
@@ -89,7 +89,7 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   const auto reckoning =
       reckon(cell.world, *cell.body, *cell.above->journal,
              {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(), cell.above->bridge->retries(),
-              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->arming().interventions()});
+              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->interventions()});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
@@ -137,6 +137,10 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
   if (!options.tasks.empty() || !options.speech.empty()) {
     return fail("a cell with an arm gets its tasks from its dispatcher", options.tasks.empty() ? "--speech" : "--task",
                 "leave it out; pons task submit sends others to a run");
+  }
+  if (options.realtime && world.arms().size() > 1) {
+    return fail(fmt::format("{} has {} arms, which run in virtual time", world.name, world.arms().size()), "--realtime",
+                "leave it out");
   }
   auto manifest = manifest_of(options.parcels, world, "pons run");
   if (!manifest) return std::unexpected(manifest.error());

@@ -124,6 +124,9 @@ Expected<world::World> cell_named(const std::string& name, const std::string& co
   auto world = world_named(name, command);
   if (world && world->base)
     return fail(fmt::format("{} has a base, which runs in one process", name), command, "pons run " + name);
+  if (world && world->arms().size() > 1)
+    return fail(fmt::format("{} has {} arms, which run in one process and in virtual time", name, world->arms().size()),
+                command, "pons run " + name);
   return world;
 }
 
@@ -213,7 +216,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   const sim::Truth truth(*body.simulation);
   const runner::RunResult& result = figures.result;
   auto verdict =
-      referee::judge(truth.parcels(), truth.arm(), journal, {world.rules.max_press_n, world.rules.max_drop_m},
+      referee::judge(truth.parcels(), truth.arms(), journal, {world.rules.max_press_n, world.rules.max_drop_m},
                      result.complete ? referee::RunEnd::kComplete : referee::RunEnd::kBrokenOff);
   if (!verdict) return std::unexpected(verdict.error());
   record::Report report;
@@ -228,6 +231,9 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                     .damaged = verdict->damaged};
   for (const auto& [reason, counts] : verdict->reasons)
     report.parcels.exceptions.reasons[reason] = {counts.deserved, counts.undeserved};
+  for (std::size_t i = 0; i < verdict->sorted_by.size(); ++i)
+    report.arms.sorted.emplace_back(world.arms()[i].arm, verdict->sorted_by[i]);
+  if (world.arms().size() > 1) report.arms.least_apart_m = truth.least_between_arms_m();
   report.interventions = figures.interventions;
   report.findings = verdict->findings;
   Time first = result.end;
@@ -238,11 +244,14 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   report.retries = figures.retries;
   report.fault_plan = body.faults.name;
   report.faults = injected(body, figures);
-  const cerebellum::Statistics& loop = body.cerebellum->statistics();
-  report.limits = {.violations = static_cast<std::int64_t>(verdict->violations + loop.violations),
-                   .worst_ratio = std::max({verdict->worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
-                                            loop.commanded.jerk, loop.commanded.torque}),
-                   .saturated = static_cast<std::int64_t>(loop.saturated)};
+  report.limits = {.violations = static_cast<std::int64_t>(verdict->violations), .worst_ratio = verdict->worst_ratio};
+  for (const auto& arm : body.arms) {
+    const cerebellum::Statistics& loop = arm->cerebellum.statistics();
+    report.limits.violations += static_cast<std::int64_t>(loop.violations);
+    report.limits.saturated += static_cast<std::int64_t>(loop.saturated);
+    report.limits.worst_ratio = std::max({report.limits.worst_ratio, loop.commanded.speed, loop.commanded.acceleration,
+                                          loop.commanded.jerk, loop.commanded.torque});
+  }
   put_loop(result, report);
   report.wall_seconds = figures.wall_s;
   report.state_hash = state_hash(body, *verdict);

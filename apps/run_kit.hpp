@@ -48,7 +48,7 @@ void add_parcel_options(CLI::App& command, ParcelOptions& options);
 // Error: none is named, or there is no such world.
 [[nodiscard]] Expected<world::World> world_named(const std::string& name, const std::string& command);
 
-// Likewise, for what only a cell with an arm can do. Error also: it has a base.
+// Likewise, for what only a cell with one arm can do. Error also: it has a base, or several arms.
 [[nodiscard]] Expected<world::World> cell_named(const std::string& name, const std::string& command);
 
 // The longest that a run of so many parcels takes (run time): one that takes longer hangs.

@@ -66,7 +66,7 @@ Rehearsal rehearse(const world::World& world, const world::Manifest& manifest, s
   Listener listener(simulation.body(), world.robot.home.size());
   Rehearsal rehearsal;
   runner::Parts parts = cell->parts();
-  parts.body.plant.body = &listener;
+  parts.body.robots.front().body = &listener;
   parts.body.plant.advance = [&](Time now) {
     rehearsal.told.push_back(listener.told());
     simulation.advance_to(now);

@@ -37,6 +37,8 @@ class Brain {
   // which somebody has paused before they began: what they are about rides on.
   [[nodiscard]] virtual Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now,
                                           const std::set<std::string>& set_aside) = 0;
+  // Before observe(): what rides past there, along the belt, no robot that works takes any more.
+  virtual void taken_until(double /*x_m*/) {}
   // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
   virtual bool heard(std::string_view id, task::Outcome outcome) = 0;
   // What an earlier one asked for in this run, and what became of it, in that order, before the first observe():

@@ -55,7 +55,7 @@ bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all
 }  // namespace
 
 Dispatcher::Dispatcher(Orders orders, const world::World& world)
-    : orders_(std::move(orders)), world_(world), label_view_end_m_(brain::label_view_end_m(world)) {}
+    : orders_(std::move(orders)), world_(world), belt_(world.belt), label_view_end_m_(brain::label_view_end_m(world)) {}
 
 bool Dispatcher::heard(std::string_view id, task::Outcome outcome) {
   const auto asked = asked_.find(id);
@@ -111,7 +111,7 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
 void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                         Decisions& decisions) {
   const double x_m = belief.world_from_top.translation().x();
-  const bool in_reach = x_m <= world_.belt.pick_x_max_m;
+  const bool in_reach = x_m <= belt_.pick_x_max_m;
   if (belief.code.empty()) {
     if (in_reach && !past_label_view(belief)) return;
     return ride(belief, kRideUnreadable, decisions);
@@ -164,7 +164,7 @@ bool Dispatcher::too_large(const Vector3& size_m, const Order& order) const {
 }
 
 bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const {
-  const world::Belt& belt = world_.belt;
+  const world::Belt& belt = belt_;
   const double x_m = express.world_from_top.translation().x();
   std::vector<double> ahead_s;  // that those have which it would overtake
   for (const ObjectBelief& other : all) {
@@ -188,7 +188,7 @@ bool Dispatcher::must_wait(const ObjectBelief& express, const std::vector<Object
 
 bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
   const double half_m = std::max(belief.size_m.x(), belief.size_m.y()) / 2;
-  const double on_the_way_m = reading_delay_s(world_) * speed_m_s(belief, world_.belt);
+  const double on_the_way_m = reading_delay_s(world_) * speed_m_s(belief, belt_);
   return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
 }
 
@@ -196,7 +196,7 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
 bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
   const auto known = known_.find(belief.code);
   if (known == known_.end() || !known->second.asked) return false;
-  const world::Belt& belt = world_.belt;
+  const world::Belt& belt = belt_;
   const double speed_m_s = std::max(belief.velocity_m_s.x(), 0.0);
   const double stops_m = speed_m_s * (kHeard_s + speed_m_s / (2 * belt.ramp_m_s2));
   const double x_m = belief.world_from_top.translation().x();
@@ -204,7 +204,7 @@ bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {
-  const world::Belt& belt = world_.belt;
+  const world::Belt& belt = belt_;
   // At the belt's nominal speed: by what it runs at just now, one asked for later could seem to leave sooner.
   const double nominal_s = (belt.pick_x_max_m - belief.world_from_top.translation().x()) / belt.speed_m_s;
   return {{"id", id_of(belief.code, tries)},

@@ -50,6 +50,7 @@ class Dispatcher final : public Brain {
 
   [[nodiscard]] Decisions observe(const std::vector<ObjectBelief>& beliefs, Time now,
                                   const std::set<std::string>& set_aside = {}) override;
+  void taken_until(double x_m) override { belt_.pick_x_max_m = x_m; }
   bool heard(std::string_view id, task::Outcome outcome) override;
   void recall(const task::Task& task, std::optional<task::Outcome> outcome) override;
   void recall_ride(std::string_view code) override;
@@ -82,6 +83,7 @@ class Dispatcher final : public Brain {
 
   Orders orders_;
   const world::World& world_;
+  world::Belt belt_;  // as far as robots take from it
   double label_view_end_m_;
   std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
   std::map<std::string, std::string, std::less<>> asked_;  // code by task id

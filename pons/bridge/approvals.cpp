@@ -88,7 +88,7 @@ void Bridge::expire_asked(Time now) {
 // Whether a skill may start now.
 Expected<void> Bridge::permit(const std::string& id, const task::Step& use, Time now) {
   const Open& open = *open_.find(id)->second;
-  auto asked = review_.judge_start(open.task, use);
+  auto asked = review_.judge_start(open.task, use, *robots_[open.robot].skills);
   if (!asked) return std::unexpected(asked.error());
   std::erase_if(*asked, [&](const Leave& leave) { return open.allowed.contains(Open::key(leave)); });
   if (asked->empty()) return review_.rules().count_use(use.skill, now);

@@ -34,7 +34,8 @@ std::vector<std::string> names(const std::vector<world::Resource>& resources) {
 
 Bridge::Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world)
     : journal_(journal),
-      skills_(skills),
+      world_(world),
+      robots_{{world.arms().front().arm, &skills}},
       review_(skills, names(world.resources)),
       arbiter_(names(world.resources), world.schedule),
       urgent_priority_(world.schedule.urgent_priority),
@@ -47,11 +48,9 @@ Bridge::~Bridge() = default;
 Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted,
                                std::int64_t sequence) {
   auto open = std::make_unique<Open>();
-  if (program) open->resources = program->resources;
-  for (const task::Step& step : task.steps) {
-    const auto& needs = skills_.find(step.skill)->resources;
-    open->resources.insert(open->resources.end(), needs.begin(), needs.end());
-  }
+  open->robots = robots_for(task, program.get());
+  open->robot = open->robots.front();
+  open->resources = resources_for(task, program.get(), open->robot);
   // What thousands wait with need not be ready to run.
   if (task.tree && task.tree->xml.empty()) open->program = std::move(program);
   open->sequence = sequence;
@@ -65,7 +64,10 @@ Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Prog
 
 void Bridge::enqueue(const Open& open) {
   const auto deadline = open.begun ? std::nullopt : open.task.deadline;
-  arbiter_.add({open.task.id, open.priority, deadline, open.waits_since, open.resources});
+  Claim claim{open.task.id, open.priority, deadline, open.waits_since, open.resources};
+  for (std::size_t way = 1; way < open.robots.size(); ++way)
+    claim.instead.push_back(resources_for(open.task, nullptr, open.robots[way]));
+  arbiter_.add(claim);
 }
 
 // ---- after another bridge ----
@@ -232,7 +234,7 @@ void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const
 // ---- a tick ----
 
 void Bridge::tick(Time now) {
-  if (held()) stand_still(now);
+  stand_still(now);
   last_tick_ = now;
   // Who ends frees resources for who starts in the same tick.
   shared_work_ = 0;
@@ -256,9 +258,9 @@ void Bridge::tick(Time now) {
 
 // A stopped robot's time does not count: not for those that run, nor for those that wait.
 void Bridge::stand_still(Time now) {
-  if (last_tick_ > Time{}) held_for_ += now - last_tick_;
+  if (held() && last_tick_ > Time{}) held_for_ += now - last_tick_;
   for (const auto& [id, open] : running_) {
-    open->tree->stand_still();
+    if (is_held(open->robot)) open->tree->stand_still();
   }
 }
 
@@ -270,9 +272,10 @@ void Bridge::expire(Time now) {
 
 std::vector<std::string> Bridge::start_granted(Time now) {
   if (held() || fault_) return {};
-  std::vector<std::string> granted = arbiter_.grant(now - held_for_);
+  std::vector<std::string> granted = arbiter_.grant(now - held_for_, fits());
   for (const std::string& id : granted) {
     Open& open = *open_.find(id)->second;
+    open.robot = open.robots[arbiter_.way(id)];
     open.stage = Open::Stage::kRuns;
     running_.emplace(id, &open);
     if (std::exchange(open.handed_over, false)) {
@@ -294,13 +297,14 @@ void Bridge::regain(Open& open, Time now) {
 }
 
 void Bridge::start(Open& open, Time now) {
-  if (!std::exchange(open.begun, true)) tell(open, now, kStartedEvent, {{"waited_s", to_s(now - open.accepted)}});
+  if (!std::exchange(open.begun, true))
+    tell(open, now, kStartedEvent, {{"robot", robots_[open.robot].name}, {"waited_s", to_s(now - open.accepted)}});
   if (!open.tree) {
     // It was seen to be good when it was taken.
     if (open.task.tree && !open.program) open.program = review_.program(open.task).value_or(nullptr);
     const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
                                        open.task.steps.end());
-    open.tree = tree_of(open.task, open.program ? open.program : tree::program_of(left, skills_));
+    open.tree = tree_of(open.task, open.program ? open.program : tree::program_of(left, *robots_[open.robot].skills));
   }
   if (open.told == Open::Told::kPause) open.tree->pause(now, task::Pause::kStand);
 }
@@ -453,8 +457,9 @@ std::vector<std::string> Bridge::running() const {
   return ids;
 }
 
-bool Bridge::uses_resources() const {
-  return std::ranges::any_of(running_, [](const auto& entry) { return !entry.second->resources.empty(); });
+bool Bridge::uses_resources(std::size_t robot) const {
+  return std::ranges::any_of(
+      running_, [&](const auto& entry) { return entry.second->robot == robot && !entry.second->resources.empty(); });
 }
 
 void Bridge::tell(Open& open, Time now, std::string_view kind, const Json& detail) {

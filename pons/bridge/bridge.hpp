@@ -66,6 +66,11 @@ class Bridge {
   Bridge(Journal& journal, const task::SkillRegistry& skills, const world::World& world);
   ~Bridge();
 
+  // Before the first task: another robot, one for each of world.arms(), with what it can do. A task of steps runs on
+  // the first that is free, has all its skills and a chance to take up what it is about, and stays there; what has a
+  // tree, and what needs no resource, is the first robot's. `skills` must outlive the bridge and not change.
+  void add_robot(const task::SkillRegistry& skills);
+
   // Before the first task.
   void use_rules(Rules rules, Contradictions contradictions) {
     review_.use_rules(std::move(rules), std::move(contradictions));
@@ -101,15 +106,16 @@ class Bridge {
   [[nodiscard]] Expected<void> halt(std::string_view id, Time now, std::string_view reason);
   // Cancels everything and refuses what comes; tick() on until idle().
   void stop(Time now, std::string_view reason);
-  // The robot has had an emergency stop, for that cause: open tasks are held or cancelled as the world says. Called
-  // again before released() it does nothing.
-  void emergency_stop(Time now, std::string_view cause);
-  void released(Time now);
+  // That robot has had an emergency stop, for that cause: open tasks are held or cancelled as the world says, but for
+  // those that another robot runs or, being in order, may run. Called again before released() it does nothing.
+  void emergency_stop(Time now, std::string_view cause, std::size_t robot = 0);
+  void released(Time now, std::size_t robot = 0);
 
-  // Held, it starts no task (protective stop) and preempts none; running ones go on being ticked, but no time passes:
-  // none runs out, and none that waits grows older.
-  enum class Hold : std::uint8_t { kOff, kOn };
-  void hold(Hold hold) { hold_ = hold; }
+  // Held (protective stop), a robot starts no task and gives none up; those it runs go on being ticked, but no time
+  // passes for them: none runs out. While all are held, none that waits grows older. Gone: held until a person comes;
+  // the others do not wait for it.
+  enum class Hold : std::uint8_t { kOff, kOn, kGone };
+  void hold(Hold hold, std::size_t robot = 0) { robots_[robot].hold = hold; }
 
   // A journal entry of no task; `order` is what it belongs to, if anything.
   void note(std::string_view kind, const Json& detail, Time now, std::string_view order = {});
@@ -134,9 +140,9 @@ class Bridge {
   // Waiting ones that a person has paused, or is asked about.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
   // Whether any of those that run needs some: else nothing moves for a task.
-  [[nodiscard]] bool uses_resources() const;
+  [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
-  [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
+  [[nodiscard]] bool held() const;                                 // all robots
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
   [[nodiscard]] std::int64_t refused() const { return refused_; }  // submissions
   // Set for good when the journal cannot be written or a skill did not end when told to: nothing is admitted or started
@@ -168,6 +174,13 @@ class Bridge {
   [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,
                                                     std::shared_ptr<const tree::Program> program);
   void enqueue(const Open& open);
+  // robots.cpp
+  [[nodiscard]] std::vector<std::size_t> robots_for(const task::Task& task, const tree::Program* program) const;
+  [[nodiscard]] std::vector<std::string> resources_for(const task::Task& task, const tree::Program* program,
+                                                       std::size_t robot) const;
+  [[nodiscard]] Arbiter::Fits fits() const;
+  [[nodiscard]] task::Chance chance(const Open& open, std::size_t robot) const;
+  [[nodiscard]] bool is_held(std::size_t robot) const { return robots_[robot].hold != Hold::kOff; }
   void park(Open& open, Time now);
   void unpark(Open& open, Time now);
   [[nodiscard]] Expected<Open*> find_open(std::string_view id);
@@ -198,7 +211,7 @@ class Bridge {
   void conclude(const std::string& id, Open& open, const task::Progress& progress, Time now);
   enum class Ending : std::uint8_t { kCancel, kHalt };
   [[nodiscard]] Expected<void> end(std::string_view id, Ending ending, Time now, std::string_view reason);
-  void end_all(Time now, std::string_view reason);
+  void end_those(const std::function<bool(const Open&)>& concerned, Time now, std::string_view reason);
   void end_running(Open& open, Ending ending, Time now, std::string_view reason);
   void end_waiting(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
@@ -208,7 +221,14 @@ class Bridge {
   void set_fault(Error error);
 
   Journal& journal_;
-  const task::SkillRegistry& skills_;
+  struct Robot {
+    std::string name;
+    const task::SkillRegistry* skills;
+    Hold hold = Hold::kOff;
+    bool emergency = false;
+  };
+  const world::World& world_;
+  std::vector<Robot> robots_;
   Review review_;
   Arbiter arbiter_;
   int urgent_priority_;
@@ -226,9 +246,7 @@ class Bridge {
   std::int64_t retries_ = 0, refused_ = 0;
   Rate refusals_{20, std::chrono::minutes(1)};  // that the journal tells of: a brain may send nonsense for ever
   std::int64_t untold_refusals_ = 0;
-  Hold hold_ = Hold::kOff;
   bool unkept_ = false;  // an acceptance or an outcome waits for commit()
-  bool emergency_ = false;
   bool stopping_ = false;
 };
 

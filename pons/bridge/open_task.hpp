@@ -33,7 +33,9 @@ struct Bridge::Open {
   Time parked_at;        // in that time, too
   std::size_t done = 0;  // steps that an earlier bridge has seen succeed
   std::shared_ptr<const tree::Program> program;  // of its tree, none of steps; of one sent along not before it starts
-  std::vector<std::string> resources;
+  std::vector<std::size_t> robots;               // that may run it; those of the arbiter's ways
+  std::size_t robot = 0;                         // that does
+  std::vector<std::string> resources;            // of the first way
   std::unique_ptr<tree::Tree>
       tree;                       // none before it was granted for the first time, but for one that was begun earlier
   Asked asked;                    // what a person must allow before it begins

@@ -110,8 +110,9 @@ Expected<void> Bridge::resume(std::string_view id, Time now) {
 void Bridge::preempt(Time now) {
   if (held() || fault_) return;
   const auto stays = [this](std::string_view id) { return running_.find(id)->second->told == Open::Told::kPause; };
-  for (const auto& [id, by] : arbiter_.preemptions(stays)) {
+  for (const auto& [id, by] : arbiter_.preemptions(stays, fits())) {
     Open& open = *running_.find(id)->second;
+    if (is_held(open.robot)) continue;
     if (open.told != Open::Told::kNothing || open.cancelled) continue;
     open.told = Open::Told::kPreempt;
     open.stands = false;
@@ -191,9 +192,10 @@ void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view r
   tell(open, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}});
 }
 
-void Bridge::end_all(Time now, std::string_view reason) {
+void Bridge::end_those(const std::function<bool(const Open&)>& concerned, Time now, std::string_view reason) {
   std::vector<Open*> waiting;
   for (const auto& [id, open] : open_) {
+    if (!concerned(*open)) continue;
     if (open->stage == Open::Stage::kRuns) {
       end_running(*open, Ending::kCancel, now, reason);
     } else {
@@ -205,31 +207,7 @@ void Bridge::end_all(Time now, std::string_view reason) {
 
 void Bridge::stop(Time now, std::string_view reason) {
   stopping_ = true;
-  end_all(now, reason);
-}
-
-// ---- emergency stop ----
-
-void Bridge::emergency_stop(Time now, std::string_view cause) {
-  if (std::exchange(emergency_, true)) return;
-  if (on_emergency_stop_ == world::OnEmergencyStop::kCancel) {
-    end_all(now, fmt::format("stopped: {}", cause));
-    return;
-  }
-  for (const auto& [id, open] : open_) {
-    open->held = true;
-    unkept_ = true;
-    tell(*open, now, kHeldEvent, {{"cause", cause}});
-  }
-}
-
-void Bridge::released(Time now) {
-  if (!std::exchange(emergency_, false)) return;
-  for (const auto& [id, open] : open_) {
-    if (!std::exchange(open->held, false)) continue;
-    unkept_ = true;
-    tell(*open, now, kReleasedEvent);
-  }
+  end_those([](const Open&) { return true; }, now, reason);
 }
 
 }  // namespace pons::bridge

@@ -7,10 +7,11 @@
 
 namespace pons {
 
-inline constexpr std::size_t kMaxAxes = 8;    // the longest kinematic chain a robot file may name
-inline constexpr std::size_t kMaxCups = 8;    // suction cups of one gripper
-inline constexpr std::size_t kMaxZones = 16;  // watched zones of one cell
+inline constexpr std::size_t kMaxAxes = 8;     // the longest kinematic chain a robot file may name
+inline constexpr std::size_t kMaxCups = 8;     // suction cups of one gripper
+inline constexpr std::size_t kMaxZones = 16;   // watched zones of one cell
 inline constexpr std::size_t kMaxPlaces = 64;  // places of one cell
+inline constexpr std::size_t kMaxArms = 4;     // along one belt
 
 // One value a joint, in the order of the robot file. Eigen with a compile-time ceiling: size() is the robot's own axis
 // count, storage is inline.
@@ -18,6 +19,15 @@ using AxisVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, sta
 
 // A force (N) and a moment (N·m), or a twist (m/s, rad/s): the straight part first.
 using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+// Where the axes of each arm along a belt are, in their order; of a single robot the first.
+struct ArmPositions {
+  ArmPositions() = default;
+  template <typename Positions>
+  ArmPositions(const Eigen::MatrixBase<Positions>& only)
+      : of{AxisVector(only)} {}         // NOLINT(google-explicit-constructor)
+  std::array<AxisVector, kMaxArms> of;  // rad
+};
 
 // Limits that hold in every tick. Rates are symmetric; all entries are positive except position_min.
 struct AxisLimits {

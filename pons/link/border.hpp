@@ -43,7 +43,7 @@ enum class Closing : std::uint32_t { kOpen, kComplete, kBrokenOff };
 // changes is one word, what one word tells, or a channel that bears it.
 struct Border {
   // Grows with every change of what lies in here, messages included: of a field, its unit or an enumerator's value.
-  static constexpr std::uint64_t kVersion = 4;
+  static constexpr std::uint64_t kVersion = 5;
   static constexpr std::size_t kLongestPath = 4096;
 
   Border(const Identity& who, std::uint64_t life) : identity(who), body(life) {}

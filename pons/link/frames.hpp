@@ -24,7 +24,7 @@ inline constexpr std::size_t kMaxCameras = 8;
 // What the robot measured when the shutter was open.
 struct Shot {
   Time stamp;
-  AxisVector joint_position;  // rad
+  ArmPositions joint_position;
   double belt_travel_m = 0;
 };
 

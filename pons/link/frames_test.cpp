@@ -86,12 +86,12 @@ TEST(FramePages, EveryCameraHasPagesOfItsOwn) {
 // A change here is a change of what two processes must agree on: give Border another version, and these figures with
 // it.
 TEST(Border, ItsVersionIsThatOfThisLayout) {
-  EXPECT_EQ(Border::kVersion, 4U);
+  EXPECT_EQ(Border::kVersion, 5U);
   EXPECT_EQ(sizeof(Command), 632U);
   EXPECT_EQ(sizeof(State), 1040U);
   EXPECT_EQ(sizeof(Link), 650752U);
-  EXPECT_EQ(sizeof(Frames), 1040U);
-  EXPECT_EQ(sizeof(Border), 660224U);
+  EXPECT_EQ(sizeof(Frames), 2960U);
+  EXPECT_EQ(sizeof(Border), 662144U);
   EXPECT_EQ(offsetof(Command, contact_n), 456U);
   EXPECT_EQ(offsetof(Command, belt), 624U);
   EXPECT_EQ(offsetof(State, tip_wrench), 624U);

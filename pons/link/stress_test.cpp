@@ -34,7 +34,7 @@ Shot shot_of(int number) {
 std::uint8_t colour_of(int number) { return static_cast<std::uint8_t>(number % 251); }
 
 bool shows(const Shot& shot, int number) {
-  return shot.belt_travel_m == number && shot.joint_position == AxisVector::Constant(6, number);
+  return shot.belt_travel_m == number && shot.joint_position.of[0] == AxisVector::Constant(6, number);
 }
 bool shows(const RgbdFrame& frame, int number) {
   return std::ranges::all_of(frame.rgb, [&](std::uint8_t value) { return value == colour_of(number); }) &&

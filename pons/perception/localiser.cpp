@@ -34,7 +34,7 @@ Localiser::Localiser(const world::World& world)
 }
 
 void Localiser::process(const RgbdFrame& frame, const Moment& moment) {
-  predict(moment.joint_position);
+  predict(moment.joint_position.of[0]);
   take_ends(frame);
   if (static_cast<int>(ends_.size()) >= kFewest) correct();
   map_from_base_.yaw = wrapped(map_from_base_.yaw);
@@ -42,7 +42,7 @@ void Localiser::process(const RgbdFrame& frame, const Moment& moment) {
   belief_->stamp = frame.stamp;
   belief_->map_from_base = map_from_base_;
   belief_->covariance = covariance_;
-  belief_->wheels_rad = moment.joint_position;
+  belief_->wheels_rad = moment.joint_position.of[0];
   judge();
 }
 

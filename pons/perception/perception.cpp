@@ -41,8 +41,12 @@ struct Perception::Impl {
   std::map<std::string, TopViewer, std::less<>> viewers;  // by camera
   std::map<std::string, TrayWatch, std::less<>> watches;  // by place
   std::map<std::string, Vector3, std::less<>> shared;     // labels read on one sighting, relative to the belt
-  std::vector<ObjectBelief> cut;                          // relative to the belt
-  bool sees_belt = true;
+  // Of each place from which cameras look at the belt, by where that is along it:
+  struct Look {
+    std::vector<ObjectBelief> cut;  // relative to the belt
+    bool sees_belt = true;
+  };
+  std::map<double, Look> looks;
 
   Impl(const world::World& the_world, model::RobotModel model, Both the_both)
       : world(the_world), both(std::move(the_both)), self_filter(std::move(model)), tracker(the_world) {
@@ -96,18 +100,19 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   }
   const cv::Mat1b& robot = self_filter.mask(frame, viewer->second.sampling(), moment.joint_position);
   const TopView& view = viewer->second.build(frame, robot);
-  sees_belt = view.clear;
+  Look& look = looks[camera.world_from_optical.translation().x()];
+  look.sees_belt = view.clear;
   const Segments& segments =
       segmenter.segment(view, marks(view, moment.belt_travel_m), known(view, frame.stamp, moment.belt_travel_m));
   const std::vector<Sighting> sightings = measure(view, segments);
   const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
-  cut.clear();
+  look.cut.clear();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (!sightings[i].at_border || tracks[i] != 0) continue;
     const bool comes = sightings[i].world_from_top.translation().x() < view.camera_m.x();
     // What is near the robot may be what it carries.
     if (!comes && (sightings[i].near_robot || !reaches_end(camera, sightings[i]))) continue;
-    cut.push_back(half_seen(sightings[i], comes ? Seen::kFront : Seen::kBack, moment.belt_travel_m));
+    look.cut.push_back(half_seen(sightings[i], comes ? Seen::kFront : Seen::kBack, moment.belt_travel_m));
   }
   if (camera.reads_labels) read_labels(frame, view, segments, sightings, tracks, moment.belt_travel_m);
 }
@@ -164,6 +169,8 @@ Perception::Perception(const world::World& world, model::RobotModel model, Both 
 
 Perception::~Perception() = default;
 
+void Perception::add_robot(model::RobotModel model) { impl_->self_filter.add(std::move(model)); }
+
 void Perception::process(const RgbdFrame& frame, const Moment& moment) {
   const auto camera = std::ranges::find(impl_->world.cameras, frame.camera, &world::CameraSpec::name);
   if (camera == impl_->world.cameras.end()) return;
@@ -182,7 +189,8 @@ std::vector<ObjectBelief> Perception::beliefs(Time now, double belt_travel_m) co
 }
 
 std::vector<ObjectBelief> Perception::cut(Time now, double belt_travel_m) const {
-  std::vector<ObjectBelief> beliefs = impl_->cut;
+  std::vector<ObjectBelief> beliefs;
+  for (const auto& [x_m, look] : impl_->looks) beliefs.insert(beliefs.end(), look.cut.begin(), look.cut.end());
   for (ObjectBelief& belief : beliefs) {
     belief.stamp = belief.last_seen = now;
     belief.world_from_top.translation().x() += belt_travel_m;
@@ -190,7 +198,9 @@ std::vector<ObjectBelief> Perception::cut(Time now, double belt_travel_m) const 
   return beliefs;
 }
 
-bool Perception::sees_belt() const { return impl_->sees_belt; }
+bool Perception::sees_belt() const {
+  return std::ranges::all_of(impl_->looks, [](const auto& entry) { return entry.second.sees_belt; });
+}
 
 bool Perception::wants_labels() const { return impl_->tracker.wants_labels(); }
 

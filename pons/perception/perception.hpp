@@ -19,6 +19,8 @@ class Perception final : public Sight {
  public:
   Perception(const world::World& world, model::RobotModel model, Both both = one_after_the_other);
   ~Perception() override;
+  // Another robot that the cameras may see; before the first frame.
+  void add_robot(model::RobotModel model);
 
   // Takes in one frame (in the order of their stamps). Frames of a camera that watches the belt update tracks; those of
   // a camera that watches a place update occupancy().

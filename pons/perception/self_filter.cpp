@@ -43,13 +43,15 @@ Sampling::Sampling(const Intrinsics& full, int wanted_width)
       cx(full.cx / step),
       cy(full.cy / step) {}
 
-SelfFilter::SelfFilter(model::RobotModel model, double margin_m) : model_(std::move(model)), margin_m_(margin_m) {}
+SelfFilter::SelfFilter(model::RobotModel model, double margin_m) : margin_m_(margin_m) { add(std::move(model)); }
 
-const cv::Mat1b& SelfFilter::mask(const RgbdFrame& frame, const Sampling& sampling, const AxisVector& joint_position) {
+const cv::Mat1b& SelfFilter::mask(const RgbdFrame& frame, const Sampling& sampling,
+                                  const ArmPositions& joint_position) {
   robot_.create(sampling.height, sampling.width);
   robot_.setTo(0);
-  if (joint_position.size() == model_.axes()) {
-    model_.place_capsules(joint_position, capsules_);
+  for (std::size_t robot = 0; robot < models_.size(); ++robot) {
+    if (joint_position.of[robot].size() != models_[robot].axes()) continue;
+    models_[robot].place_capsules(joint_position.of[robot], capsules_);
     for (const auto& capsule : capsules_) paint(frame, sampling, capsule);
   }
   const cv::Rect seen = cv::boundingRect(robot_);

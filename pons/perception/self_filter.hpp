@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "pons/core/image.hpp"
@@ -39,14 +40,16 @@ class SelfFilter {
 
   // How far beyond its capsules the robot may reach: fingers of hoses, calibration, the bellows' play.
   explicit SelfFilter(model::RobotModel model, double margin_m = 0.025);
+  // Another robot that may be in the picture, at most kMaxArms in all; before the first frame.
+  void add(model::RobotModel model) { models_.push_back(std::move(model)); }
 
   // Good until the next call. One value a sample.
-  const cv::Mat1b& mask(const RgbdFrame& frame, const Sampling& sampling, const AxisVector& joint_position);
+  const cv::Mat1b& mask(const RgbdFrame& frame, const Sampling& sampling, const ArmPositions& joint_position);
 
  private:
   void paint(const RgbdFrame& frame, const Sampling& sampling, const model::PlacedCapsule& capsule);
 
-  model::RobotModel model_;
+  std::vector<model::RobotModel> models_;
   double margin_m_;
   std::vector<model::PlacedCapsule> capsules_;
   std::vector<float> depth_row_;

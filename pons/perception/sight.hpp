@@ -14,7 +14,7 @@ namespace pons::perception {
 
 // What the robot and belt measured when the frame's shutter was open.
 struct Moment {
-  AxisVector joint_position;  // rad
+  ArmPositions joint_position;
   double belt_travel_m = 0;
 };
 

@@ -25,6 +25,12 @@ using Json = nlohmann::ordered_json;
   return text;
 }
 
+[[nodiscard]] std::string arms_text(const Report::Arms& arms) {
+  std::string text;
+  for (const auto& [arm, sorted] : arms.sorted) text += fmt::format("{} {}, ", arm, sorted);
+  return text + fmt::format("never nearer than {:.2f} m to each other", arms.least_apart_m);
+}
+
 }  // namespace
 
 Report::Throughput throughput(double span_s, std::int64_t sorted) {
@@ -71,6 +77,8 @@ nlohmann::ordered_json to_json(const Report& report) {
     json["rounds"] = to_json(*report.rounds);
   } else {
     json["parcels"] = to_json(report.parcels);
+    json["arms"] = {{"sorted", Json::object()}, {"least_apart_m", number(report.arms.least_apart_m)}};
+    for (const auto& [arm, sorted] : report.arms.sorted) json["arms"]["sorted"][arm] = sorted;
     json["throughput"] = {{"seconds_per_parcel", number(report.throughput.seconds_per_parcel)},
                           {"parcels_per_hour", number(report.throughput.parcels_per_hour)}};
   }
@@ -116,6 +124,7 @@ using Line = std::function<void(std::string_view name, std::string_view value)>;
 void tell_parcels(const Line& line, const Report& report) {
   const auto& parcels = report.parcels;
   line("sorted", fmt::format("{} of {} parcels offered", parcels.sorted, parcels.offered));
+  if (report.arms.sorted.size() > 1) line("by", arms_text(report.arms));
   line("exceptions",
        fmt::format("{} deserved, {} undeserved", parcels.exceptions.deserved, parcels.exceptions.undeserved));
   line("missorted", fmt::format("{}", parcels.missorted));

@@ -36,6 +36,11 @@ struct Report {
     Exceptions exceptions{};
     std::int64_t damaged = 0;  // pressed or dropped too hard
   };
+  // Of each arm, by its name.
+  struct Arms {
+    std::vector<std::pair<std::string, std::int64_t>> sorted{};       // parcels
+    double least_apart_m = std::numeric_limits<double>::quiet_NaN();  // any two, with their loads; NaN of one arm
+  };
   struct Throughput {
     double seconds_per_parcel = 0;  // first parcel offered to last outcome, over parcels sorted; NaN when none was
     double parcels_per_hour = 0;
@@ -81,6 +86,7 @@ struct Report {
   std::uint64_t seed = 0;
   std::string world{};
   Parcels parcels{};
+  Arms arms{};
   Throughput throughput{};
   std::optional<Rounds> rounds{};  // of a world with a base, instead of parcels and throughput
   std::int64_t retries = 0;

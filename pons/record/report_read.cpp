@@ -70,6 +70,10 @@ Report report_of(const Fields& json) {
     report.throughput = throughput(0, 0);
   } else {
     report.parcels = parcels_of(json.of("parcels"));
+    const Fields arms = json.of("arms"), sorted = arms.of("sorted");
+    for (const auto& arm : sorted.all().items())
+      report.arms.sorted.emplace_back(arm.key(), sorted.count(arm.key().c_str()));
+    report.arms.least_apart_m = arms.number("least_apart_m");
     const Fields pace = json.of("throughput");
     report.throughput = {pace.number("seconds_per_parcel"), pace.number("parcels_per_hour")};
   }

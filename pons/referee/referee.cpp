@@ -178,24 +178,29 @@ std::string kind_of(std::string_view reason) {
   return kind.empty() ? "no reason given" : kind;
 }
 
-Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const sim::ArmTruth& arm,
+Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const std::vector<sim::ArmTruth>& arms,
                         const bridge::Journal& journal, const Rules& rules, RunEnd end) {
   const auto entries = read(journal);
   if (!entries) return std::unexpected(entries.error());
   Verdict verdict;
+  verdict.sorted_by.resize(arms.size());
   Judge judge(verdict, *entries, end);
   for (const ParcelTruth& parcel : parcels) {
     if (parcel.where == Whereabouts::kNotOffered) continue;
     ++verdict.offered;
+    const int sorted = verdict.sorted;
     judge.parcel(parcel);
+    if (parcel.arm >= 0) verdict.sorted_by[static_cast<std::size_t>(parcel.arm)] += verdict.sorted - sorted;
     if (parcel.max_press_n > rules.max_press_n || parcel.max_drop_m > rules.max_drop_m) {
       ++verdict.damaged;
       verdict.findings.push_back(fmt::format("{}: damaged: pressed {:.0f} N, dropped {:.2f} m", parcel.parcel_id,
                                              parcel.max_press_n, parcel.max_drop_m));
     }
   }
-  verdict.violations = arm.speed_violations + arm.torque_violations;
-  verdict.worst_ratio = std::max(arm.worst_speed_ratio, arm.worst_torque_ratio);
+  for (const sim::ArmTruth& arm : arms) {
+    verdict.violations += arm.speed_violations + arm.torque_violations;
+    verdict.worst_ratio = std::max({verdict.worst_ratio, arm.worst_speed_ratio, arm.worst_torque_ratio});
+  }
   return verdict;
 }
 

@@ -22,12 +22,13 @@ struct Rules {
 
 struct Verdict {
   int offered = 0;
-  int sorted = 0;      // in the ordered chute, and the journal says so
-  int missorted = 0;   // in another chute than the order's
-  int lost = 0;        // no outcome, or not where the outcome says, or on floor or tray without an entry
-  int duplicated = 0;  // handled twice by the journal
-  int deserved = 0;    // exceptions that had a reason: label, mass, size
-  int undeserved = 0;  // exceptions that had none, drops with an entry among them
+  int sorted = 0;              // in the ordered chute, and the journal says so
+  std::vector<int> sorted_by;  // of those, each arm
+  int missorted = 0;           // in another chute than the order's
+  int lost = 0;                // no outcome, or not where the outcome says, or on floor or tray without an entry
+  int duplicated = 0;          // handled twice by the journal
+  int deserved = 0;            // exceptions that had a reason: label, mass, size
+  int undeserved = 0;          // exceptions that had none, drops with an entry among them
   struct Counts {
     int deserved = 0, undeserved = 0;
   };
@@ -46,7 +47,8 @@ enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };
 [[nodiscard]] std::string kind_of(std::string_view reason);
 
 // Errors: the journal cannot be read.
-[[nodiscard]] Expected<Verdict> judge(const std::vector<sim::ParcelTruth>& parcels, const sim::ArmTruth& arm,
-                                      const bridge::Journal& journal, const Rules& rules, RunEnd end);
+[[nodiscard]] Expected<Verdict> judge(const std::vector<sim::ParcelTruth>& parcels,
+                                      const std::vector<sim::ArmTruth>& arms, const bridge::Journal& journal,
+                                      const Rules& rules, RunEnd end);
 
 }  // namespace pons::referee

@@ -47,7 +47,7 @@ class RefereeTest : public ::testing::Test {
   }
 
   std::unique_ptr<bridge::Journal> journal_;
-  sim::ArmTruth arm_;
+  std::vector<sim::ArmTruth> arm_{1};
 };
 
 TEST_F(RefereeTest, CountsExceptionsByTheKindOfTheirReason) {
@@ -166,8 +166,8 @@ TEST_F(RefereeTest, DamageAndLimitsComeFromTruth) {
   end("A", Outcome::kSucceeded);
   ParcelTruth pressed = parcel("A", Whereabouts::kChute, "chute_1");
   pressed.max_press_n = 121;
-  arm_.speed_violations = 2;
-  arm_.worst_speed_ratio = 1.1;
+  arm_.front().speed_violations = 2;
+  arm_.front().worst_speed_ratio = 1.1;
   const Verdict verdict = judge({pressed});
   EXPECT_EQ(verdict.damaged, 1);
   EXPECT_EQ(verdict.sorted, 1);

@@ -62,7 +62,9 @@ Expected<void> Arming::tick(Time now) {
   if (is_stopped(state) && needs_person(state)) need_person();
   const bool operational = state.safety == SafetyState::kOperational && !yielding_ && !needs_person_;
   if (operational && took_over_) took_over_ = !skills_.settle(now);
-  bridge_.hold(operational && !took_over_ ? bridge::Bridge::Hold::kOff : bridge::Bridge::Hold::kOn);
+  using Hold = bridge::Bridge::Hold;
+  const bool free = operational && !took_over_;
+  bridge_.hold(free ? Hold::kOff : needs_person_ ? Hold::kGone : Hold::kOn, skills_.robot);
   note_changes(state, now);
   if (operational) {
     stopped_since_.reset();
@@ -75,13 +77,15 @@ Expected<void> Arming::tick(Time now) {
 
 void Arming::note_changes(const link::State& state, Time now) {
   const bool operational = state.safety == SafetyState::kOperational && !yielding_;
-  if (is_emergency(state)) bridge_.emergency_stop(now, link::name(state.cause));
-  if (operational) bridge_.released(now);
+  if (is_emergency(state)) bridge_.emergency_stop(now, link::name(state.cause), skills_.robot);
+  if (operational) bridge_.released(now, skills_.robot);
   if (was_operational_ && !operational) {
     ++stops_;
-    bridge_.note("stop", {{"state", link::name(state.safety)}, {"cause", link::name(state.cause)}}, now);
+    bridge_.note("stop",
+                 {{"robot", skills_.name}, {"state", link::name(state.safety)}, {"cause", link::name(state.cause)}},
+                 now);
   } else if (!was_operational_ && operational) {
-    bridge_.note("armed", {{"epoch", state.epoch}}, now);
+    bridge_.note("armed", {{"robot", skills_.name}, {"epoch", state.epoch}}, now);
   }
   was_operational_ = operational;
 }
@@ -105,7 +109,7 @@ Expected<void> Arming::bring_in(Time now) {
                 "see that its way in is clear and allow it with --recover, or bring it in by hand");
   }
   if (!recovering_) {
-    bridge_.note("recovery", {{"outside_rad", outside_rad}}, now);
+    bridge_.note("recovery", {{"robot", skills_.name}, {"outside_rad", outside_rad}}, now);
     recovering_ = Recovering{.for_so_long = Duration{0}, .at = now};
   }
   const Duration since = now - std::exchange(recovering_->at, now);
@@ -163,7 +167,7 @@ void Arming::recall(std::string_view word) { needs_person_ = word != kArm; }
 // Durable at once: a bridge that comes after this one must wait for the same person. What cannot be written shows in
 // the bridge's next tick.
 void Arming::note_person(std::string_view word, Time now) {
-  bridge_.note("person", {{"asks", word}}, now);
+  bridge_.note("person", {{"robot", skills_.name}, {"asks", word}}, now);
   (void)bridge_.commit(now);
 }
 

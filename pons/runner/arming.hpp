@@ -44,6 +44,8 @@ class Arming {
   // {"state", "cause", "standstill", "epoch", "needs"}: the last is what the arm waits for, empty when it works.
   [[nodiscard]] bridge::Json describe() const;
 
+  // It does not move again without a person.
+  [[nodiscard]] bool needs_person() const { return needs_person_; }
   // The arm is still being brought out of where a bridge that is no more has left it; nothing else may move it.
   [[nodiscard]] bool settles() const { return took_over_; }
   [[nodiscard]] std::int64_t stops() const { return stops_; }

@@ -80,6 +80,7 @@ void BodySide::run_body() {
   name_thread("pons_body");
   // A real body would have a computer of its own.
   refusals_.note(rt::make_realtime({.priority = kBodyPriority}));
+  RobotParts& robot = parts_.robots.front();
   body::Sensors sensors;
   const rt::MonotonicClock own;  // goes on when the run's clock stands still: someone has to set it going again
   rt::PeriodicLoop loop(own, kControlPeriod);
@@ -89,16 +90,16 @@ void BodySide::run_body() {
     const Asked& asked = asked_.read();
     const bool controlled = asked.set_points.torque_nm.size() > 0;
     if (const auto gone = loop_watch.hear(controlled ? std::optional(asked.at) : std::nullopt)) fail(*gone);
-    if (controlled) parts_.plant.body->write(asked.set_points);
+    if (controlled) robot.body->write(asked.set_points);
     // Until the loop has begun, the clock must go on for it to begin. What passed during its first tick stays passed:
     // the loop has gone by it, and would wait for ever on a clock that went back.
     reached = std::max(reached, controlled ? std::min(clock_.now(), asked.at + kLeash) : clock_.now());
     const Time now = reached;
     parts_.plant.advance(now);
     clock_.reach(now);
-    parts_.plant.body->read(sensors);
+    robot.body->read(sensors);
     measured_.write(sensors);
-    parts_.photographer->open_shutters(now, sensors);
+    parts_.photographer->open_shutters(now, {&sensors, 1});
     finished_.store(parts_.plant.finished());
     if (auto healthy = parts_.plant.health(); !healthy) fail(healthy.error());
     if (auto healthy = parts_.photographer->health(); !healthy) fail(healthy.error());
@@ -111,17 +112,18 @@ LoopFigures BodySide::run_loop() {
   name_thread("pons_loop");
   const rt::Grant grant = rt::make_realtime({.priority = kLoopPriority, .cpu = rt::loop_cpu()});
   refusals_.note(grant);
+  RobotParts& robot = parts_.robots.front();
   Asked asked;
-  rt::PeriodicLoop loop(clock_, kControlPeriod, parts_.link->emergency_word());
+  rt::PeriodicLoop loop(clock_, kControlPeriod, robot.link->emergency_word());
   loop.run([&](Time now) {
     const rt::InTick in_tick;
     if (!running_.load()) return false;  // the parts may be gone by now
     if (loop.gap() >= kStall)
-      parts_.cerebellum->log().write(now, "no tick began for {:.1f} ms, until {:.6f} s of CLOCK_MONOTONIC",
-                                     1e3 * to_s(loop.gap()), 1e-9 * static_cast<double>(loop.begun_ns()));
+      robot.cerebellum->log().write(now, "no tick began for {:.1f} ms, until {:.6f} s of CLOCK_MONOTONIC",
+                                    1e3 * to_s(loop.gap()), 1e-9 * static_cast<double>(loop.begun_ns()));
     const body::Sensors& sensors = measured_.read();
     if (sensors.position.size() > 0) {
-      parts_.cerebellum->step(now, sensors, *parts_.link, asked.set_points);
+      robot.cerebellum->step(now, sensors, *robot.link, asked.set_points);
       asked.at = now;
       asked_.write(asked);
     }

@@ -27,7 +27,7 @@ static_assert(kLoopPriority > kBodyPriority && kBodyPriority > kBridgePriority &
 
 class BodySide {
  public:
-  // Begins. `parts` and `clock`, which has kLeash, must outlive it; the body's thread paces the clock.
+  // Begins; of one robot. `parts` and `clock`, which has kLeash, must outlive it; the body's thread paces the clock.
   BodySide(BodyParts& parts, rt::MonotonicClock& clock);
   // Both threads have ended when it returns, but for a loop that end() has left behind.
   ~BodySide();

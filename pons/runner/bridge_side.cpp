@@ -20,13 +20,11 @@ constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
-BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills,
+BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots,
                        const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
-    : bridge_(bridge),
-      brain_(brain),
-      skills_(std::move(skills)),
-      arming_(bridge, skills_, zones, recovery),
-      visitors_(std::move(visitors)) {}
+    : bridge_(bridge), brain_(brain), visitors_(std::move(visitors)) {
+  for (SkillPort& port : robots) robots_.push_back(std::make_unique<Robot>(bridge, std::move(port), zones, recovery));
+}
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
@@ -37,46 +35,56 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   }
   const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
-  bool armed_before = false;
   for (const bridge::Event& event : *events) {
-    armed_before = armed_before || event.kind == "armed";
     if (event.kind == "ride") brain_.recall_ride(task::text_of(event.detail, "code"));
-    if (event.kind == "person") arming_.recall(task::text_of(event.detail, "asks"));
-    if (event.kind == "carries") carried_ = event.detail.value("load", Json{});
   }
-  skills_.refresh(now, {}, seen_.belt_seen);
-  arming_.take_over(now, armed_before);
-  skills_.restore(carried_);
-  return bridge_.recover(skills_.resume, now);
+  for (const auto& robot : robots_) {
+    bool armed_before = false;
+    for (const bridge::Event& event : *events) {
+      const std::string of = task::text_of(event.detail, "robot");
+      if (!of.empty() && of != robot->skills.name) continue;
+      armed_before = armed_before || event.kind == "armed";
+      if (event.kind == "person") robot->arming.recall(task::text_of(event.detail, "asks"));
+      if (event.kind == "carries") robot->carried = event.detail.value("load", Json{});
+    }
+    robot->skills.refresh(now, {}, seen_.belt_seen);
+    robot->arming.take_over(now, armed_before);
+    robot->skills.restore(robot->carried);
+  }
+  return bridge_.recover(first().resume, now);
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   if (const auto snapshot = observer.collect(now, std::exchange(forgotten_, {}))) take_in(*snapshot, now);
 
-  const double belt_travel_m = skills_.state().belt_travel_m;
+  const double belt_travel_m = first().state().belt_travel_m;
   const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
   std::vector<ObjectBelief> obstacles = objects;
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
-  skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
-  if (auto good = arming_.tick(now); !good) return good;
+  for (const auto& robot : robots_) robot->skills.refresh(now, obstacles, seen_.belt_seen);
+  for (const auto& robot : robots_) {
+    if (auto good = robot->arming.tick(now); !good) return good;
+  }
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What nobody sees must not ride by unread, nor into the arm.
   const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
-  // What stands beside an arm that is being brought out must not be pushed against it.
-  skills_.belt(belt_waits || blind || arming_.settles() || skills_.holds_belt(now) ? link::Belt::kWaits
-                                                                                   : link::Belt::kRuns);
+  tell_belt(belt_waits || blind, now);
   if (visitors_) visitors_(now);
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
-  if (!bridge_.uses_resources() && !arming_.settles()) skills_.rest(now);
-  if (auto noted = note_carried(now); !noted) return noted;
+  for (const auto& robot : robots_) {
+    if (!bridge_.uses_resources(robot->skills.robot) && !robot->arming.settles()) robot->skills.rest(now);
+    if (auto noted = note_carried(*robot, now); !noted) return noted;
+  }
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
     if (brain_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
-  for (const std::uint32_t track : skills_.take_forgotten()) {
-    gone_.push_back(track);
-    forgotten_.push_back(track);
+  for (const auto& robot : robots_) {
+    for (const std::uint32_t track : robot->skills.take_forgotten()) {
+      gone_.push_back(track);
+      forgotten_.push_back(track);
+    }
   }
   if (gone_.size() > kGoneRemembered) gone_.erase(gone_.begin(), gone_.end() - kGoneRemembered);
   return {};
@@ -90,7 +98,45 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
     }
   }
   seen_ = snapshot;
-  if (snapshot.base && skills_.locate) skills_.locate(*snapshot.base);
+  if (snapshot.base && first().locate) first().locate(*snapshot.base);
+}
+
+// One that will go on by itself is waited for; one that waits for a person may be passed, if there is room.
+bool BridgeSide::stands_in_the_way(const Robot& robot) const {
+  if (robot.arming.settles()) return true;
+  if (robot.operational() && !robot.arming.needs_person()) return false;
+  return !robot.arming.needs_person() || !robot.skills.lets_pass();
+}
+
+// What stands beside an arm that is being brought out must not be pushed against it. Of itself each arm sees to that
+// the belt stands while it is not operational.
+void BridgeSide::tell_belt(bool waits, Time now) {
+  for (const auto& robot : robots_) {
+    waits = waits || robot->arming.settles() || robot->skills.holds_belt(now);
+  }
+  for (const auto& robot : robots_) {
+    const bool blocked =
+        std::ranges::any_of(robots_, [&](const auto& other) { return other != robot && stands_in_the_way(*other); });
+    robot->skills.belt(waits || blocked ? link::Belt::kWaits : link::Belt::kRuns);
+  }
+}
+
+std::vector<Arming*> BridgeSide::armings() {
+  std::vector<Arming*> armings;
+  for (const auto& robot : robots_) armings.push_back(&robot->arming);
+  return armings;
+}
+
+std::int64_t BridgeSide::stops() const {
+  std::int64_t stops = 0;
+  for (const auto& robot : robots_) stops += robot->arming.stops();
+  return stops;
+}
+
+std::int64_t BridgeSide::interventions() const {
+  std::int64_t interventions = 0;
+  for (const auto& robot : robots_) interventions += robot->arming.interventions();
+  return interventions;
 }
 
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -99,7 +145,7 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
   for (ObjectBelief object : seen) {
     if (std::find(gone_.begin(), gone_.end(), object.track) != gone_.end()) continue;
     object.world_from_top.translation().x() += belt_travel_m - seen_.belt_travel_m;
-    object.velocity_m_s.x() = skills_.state().belt_speed_m_s;
+    object.velocity_m_s.x() = first().state().belt_speed_m_s;
     object.stamp = now;
     objects.push_back(std::move(object));
   }
@@ -110,6 +156,12 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
   if (stalls_ && stalls_->on(now)) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
   brain_heard_ = now;
+  std::optional<double> taken_until_m;
+  for (const auto& robot : robots_) {
+    if (!robot->arming.needs_person())
+      taken_until_m = std::max(taken_until_m.value_or(robot->skills.takes_until_m), robot->skills.takes_until_m);
+  }
+  if (taken_until_m) brain_.taken_until(*taken_until_m);
   const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
@@ -145,12 +197,12 @@ void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBeli
 }
 
 // Durable at once: a bridge that comes after this one must know what hangs there.
-Expected<void> BridgeSide::note_carried(Time now) {
-  Json carries = skills_.carries();
-  if (carries == carried_) return {};
-  const std::string code = task::text_of(carries.is_object() ? carries : carried_, "code");
-  carried_ = std::move(carries);
-  bridge_.note("carries", {{"load", carried_}}, now, code);
+Expected<void> BridgeSide::note_carried(Robot& robot, Time now) {
+  Json carries = robot.skills.carries();
+  if (carries == robot.carried) return {};
+  const std::string code = task::text_of(carries.is_object() ? carries : robot.carried, "code");
+  robot.carried = std::move(carries);
+  bridge_.note("carries", {{"robot", robot.skills.name}, {"load", robot.carried}}, now, code);
   return bridge_.commit(now);
 }
 

@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pons/brain/brain.hpp"
@@ -24,10 +26,10 @@ inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
 
 class BridgeSide {
  public:
-  // All must outlive it. `zones` are the world's. `visitors` is called once a period, before the bridge's tick:
-  // requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const std::vector<world::Zone>& zones,
-             Recovery recovery, std::function<void(Time)> visitors);
+  // All must outlive it. `robots` are those of the bridge, in its order; `zones` the world's. `visitors` is called once
+  // a period, before the bridge's tick: requests from outside.
+  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots,
+             const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors);
 
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
   // that one told it to, and takes up what is open; nothing starts before the arm was armed anew. Error: the journal.
@@ -46,8 +48,11 @@ class BridgeSide {
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
   [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
-  [[nodiscard]] std::int64_t stops() const { return arming_.stops(); }
-  [[nodiscard]] Arming& arming() { return arming_; }  // for a person's words
+  [[nodiscard]] std::int64_t stops() const;
+  [[nodiscard]] std::int64_t interventions() const;
+  // For a person's words; of a robot there is.
+  [[nodiscard]] Arming& arming(std::size_t robot = 0) { return robots_[robot]->arming; }
+  [[nodiscard]] std::vector<Arming*> armings();
 
  private:
   void take_in(const Snapshot& snapshot, Time now);
@@ -56,17 +61,28 @@ class BridgeSide {
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
   void note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now);
-  [[nodiscard]] Expected<void> note_carried(Time now);
+  // What is one a robot.
+  struct Robot {
+    Robot(bridge::Bridge& bridge, SkillPort port, const std::vector<world::Zone>& zones, Recovery recovery)
+        : skills(std::move(port)), arming(bridge, skills, zones, recovery) {}
+    SkillPort skills;
+    Arming arming;
+    bridge::Json carried = {};  // as last noted
+    [[nodiscard]] bool operational() const { return skills.state().safety == link::SafetyState::kOperational; }
+  };
+
+  [[nodiscard]] const SkillPort& first() const { return robots_.front()->skills; }
+  [[nodiscard]] bool stands_in_the_way(const Robot& robot) const;
+  void tell_belt(bool waits, Time now);
+  [[nodiscard]] Expected<void> note_carried(Robot& robot, Time now);
 
   bridge::Bridge& bridge_;
   brain::Brain& brain_;
-  SkillPort skills_;
-  Arming arming_;
+  std::vector<std::unique_ptr<Robot>> robots_;
   std::function<void(Time)> visitors_;
   Snapshot seen_;
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
-  bridge::Json carried_;                  // as last noted
   Time last_outcome_, brain_heard_;
   bool brain_holds_belt_ = false;  // as it last said
   std::optional<world::Spells> stalls_;

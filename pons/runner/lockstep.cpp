@@ -9,19 +9,21 @@ namespace pons::runner {
 Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
   const rt::MonotonicClock clock;  // measures the step; nothing depends on it
   rt::Histogram step_time;
-  body::Sensors sensors;
-  body::SetPoints set_points;
+  std::vector<RobotParts>& robots = parts.body.robots;
+  std::vector<body::Sensors> sensors(robots.size());
+  std::vector<body::SetPoints> set_points(robots.size());
   Ending ending(watch, *parts.bridge_side);
   RunResult result;
   for (Time now = Time(kControlPeriod);; now += kControlPeriod) {
     parts.body.plant.advance(now);
-    parts.body.plant.body->read(sensors);
+    for (std::size_t i = 0; i < robots.size(); ++i) robots[i].body->read(sensors[i]);
     parts.body.photographer->open_shutters(now, sensors);
-
-    const Time before = clock.now();
-    parts.body.cerebellum->step(now, sensors, *parts.body.link, set_points);
-    step_time.record(clock.now() - before);
-    parts.body.plant.body->write(set_points);
+    for (std::size_t i = 0; i < robots.size(); ++i) {
+      const Time before = clock.now();
+      robots[i].cerebellum->step(now, sensors[i], *robots[i].link, set_points[i]);
+      step_time.record(clock.now() - before);
+      robots[i].body->write(set_points[i]);
+    }
     ++result.loop.ticks;
 
     if (now.ns() % kBridgePeriod.count() != 0) continue;

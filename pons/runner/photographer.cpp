@@ -26,7 +26,7 @@ Photographer::Photographer(const world::World& world, std::vector<body::Camera*>
 
 Photographer::~Photographer() = default;
 
-void Photographer::open_shutters(Time now, const body::Sensors& sensors) {
+void Photographer::open_shutters(Time now, std::span<const body::Sensors> sensors) {
   for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
     if (now < next_shutter_[camera]) continue;
     next_shutter_[camera] += from_s(world_.cameras[camera].period_s);
@@ -34,7 +34,10 @@ void Photographer::open_shutters(Time now, const body::Sensors& sensors) {
     if (pace_ == Pace::kRealTime && !places_.is_free(camera)) continue;
     if (!wait_for_place(camera)) return;
     cameras_[camera]->begin(now);
-    places_.open(camera, {now, sensors.position, sensors.belt_travel_m});
+    link::Shot shot{.stamp = now, .belt_travel_m = sensors.front().belt_travel_m};
+    for (std::size_t robot = 0; robot < sensors.size(); ++robot)
+      shot.joint_position.of[robot] = sensors[robot].position;
+    places_.open(camera, shot);
     const std::lock_guard lock(mutex_);
     exposed_.push_back(camera);
     changed_.notify_all();

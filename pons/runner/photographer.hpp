@@ -7,6 +7,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <thread>
 #include <vector>
 
@@ -30,7 +31,8 @@ class Photographer {
 
   // On the thread that advances the body, after each advance. A camera that reads labels skips its turn while nothing
   // that it could read is known to lie unread.
-  void open_shutters(Time now, const body::Sensors& sensors);
+  // `sensors` are those of each robot, at least one.
+  void open_shutters(Time now, std::span<const body::Sensors> sensors);
 
   // Error: a camera failed; no frame comes any more. Any thread.
   [[nodiscard]] Expected<void> health() const;

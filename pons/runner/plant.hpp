@@ -11,7 +11,6 @@
 namespace pons::runner {
 
 struct Plant {
-  body::Body* body = nullptr;
   std::vector<body::Camera*> cameras;      // in the order of the world's
   std::function<void(Time)> advance;       // the body's physics up to that time
   std::function<bool()> finished;          // nothing more will come

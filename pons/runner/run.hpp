@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pons/cerebellum/cerebellum.hpp"
 #include "pons/core/error.hpp"
@@ -20,11 +21,18 @@ namespace pons::runner {
 
 inline constexpr Duration kControlPeriod = std::chrono::milliseconds(1);
 
-// On the robot's side of the link.
-struct BodyParts {
-  Plant plant;
+// What each robot has on its side of its link.
+struct RobotParts {
+  std::string name;  // before what its loop says; empty where there is no other
+  body::Body* body = nullptr;
   cerebellum::Cerebellum* cerebellum = nullptr;
   link::CerebellumEnd* link = nullptr;
+};
+
+// On the robots' side of the link.
+struct BodyParts {
+  Plant plant;
+  std::vector<RobotParts> robots;  // one; in lockstep at most kMaxArms
   Photographer* photographer = nullptr;
 };
 
@@ -67,9 +75,14 @@ struct RunResult {
   std::string degraded;  // real time only: what the operating system refused this process; empty when nothing
 };
 
-// Tells the watch what the control loop has said since the last time.
+// Tells the watch what the control loops have said since the last time.
 inline void pass_on_events(BodyParts& body, const Watch& watch) {
-  if (watch.said) body.cerebellum->log().drain(watch.said);
+  if (!watch.said) return;
+  for (const RobotParts& robot : body.robots) {
+    robot.cerebellum->log().drain([&](Time at, std::string_view text) {
+      watch.said(at, robot.name.empty() ? std::string(text) : robot.name + ": " + std::string(text));
+    });
+  }
 }
 
 }  // namespace pons::runner

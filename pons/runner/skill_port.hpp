@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "pons/bridge/bridge.hpp"
@@ -13,7 +14,10 @@
 
 namespace pons::runner {
 
+// Of one robot.
 struct SkillPort {
+  std::string name = "arm";  // the robot's, as the world has it
+  std::size_t robot = 0;     // as the bridge counts them
   // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
   // the belt was taken that they come from.
   std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
@@ -29,6 +33,9 @@ struct SkillPort {
   std::function<void()> halt;                                         // a protective stop
   std::function<void()> raise_emergency, release_emergency;           // the link's emergency word
   std::function<bridge::Json()> carries;                              // what is on the cups; null when nothing is
+  double takes_until_m = 0;                                           // where along the belt it takes hold last
+  // Of one that no longer works: whether what rides along the belt passes it where it stands.
+  std::function<bool()> lets_pass = [] { return true; };
   // After a bridge that is no more: believes what that one wrote of carries(); what becomes of a task that it had
   // begun; and, each tick once the arm is armed, brings it to where others may move it from: true when that is done.
   // What that bridge alone had seen counts as an obstacle from restore() on.

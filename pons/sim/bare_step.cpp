@@ -26,15 +26,16 @@ void BareStep::copy() {
   mj_copyModel(impl_->model.get(), cell.composed.model.get());
   mj_copyData(impl_->data.get(), cell.composed.model.get(), cell.data.get());
   impl_->stepped = cell.stepped;
-  impl_->set_points = cell.set_points;
+  impl_->set_points = cell.arm().set_points;
 }
 
 void BareStep::advance_to(Time time) {
   const Cell& cell = impl_->cell;
   while (impl_->stepped + cell.step_length <= time) {
-    for (std::size_t i = 0; i < cell.composed.arm_actuator.size(); ++i) {
+    const std::vector<int>& actuator = cell.composed.arms.front().actuator;
+    for (std::size_t i = 0; i < actuator.size(); ++i) {
       const double torque = impl_->set_points.power ? impl_->set_points.torque_nm[static_cast<Eigen::Index>(i)] : 0;
-      impl_->data->ctrl[cell.composed.arm_actuator[i]] = torque;
+      impl_->data->ctrl[actuator[i]] = torque;
     }
     mj_step(impl_->model.get(), impl_->data.get());
     impl_->stepped += cell.step_length;

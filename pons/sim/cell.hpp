@@ -22,25 +22,52 @@ namespace pons::sim {
 
 struct Cell;
 
-class SimBody final : public body::Body {
- public:
-  explicit SimBody(Cell* cell) : cell_(cell) {}
+// One arm of the cell: what it is told, what it measures, what holds it.
+struct SimArm final : body::Body {
+  SimArm(Cell& cell, std::size_t index, std::uint64_t seed);
+
   void read(body::Sensors& sensors) PONS_NONBLOCKING override;
-  void write(const body::SetPoints& set_points) PONS_NONBLOCKING override;
+  void write(const body::SetPoints& told) PONS_NONBLOCKING override;
   [[nodiscard]] Duration watchdog() const override;
+  // Set-points reach the drives.
+  void hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING;
+
+  // A physics step, in this order: what has come over the bus; the drives or the brakes; after it the measurements.
+  void listen();
+  void drive();
+  void push();
+  void measure();
+
+  Cell& cell;
+  const world::World& station;  // what it has of the world
+  const ComposedArm& composed;
+  Gripper gripper;
+  Curtains curtains;                 // of its mouths
+  Random noise;                      // of wrist and vacuum
+  Bus bus;                           // set-points on their way
+  body::SetPoints set_points;        // in force
+  body::Sensors measured;            // at the last step
+  Vector3 push_n = Vector3::Zero();  // of a person on the tip
+  Time heard;                        // when set-points last reached the drives
+  bool watchdog_tripped = false;     // until set-points without power are heard
+  AxisVector held;                   // where the brakes hold the arm; empty while it moves
 
  private:
-  Cell* cell_;
+  std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom
+
+  void brake();
 };
 
 struct Cell {
   Cell(const world::World& world, const world::Manifest& manifest, Composed composed, std::uint64_t seed,
        const world::FaultPlan& plan = {});
+  Cell(const Cell&) = delete;
+  Cell& operator=(const Cell&) = delete;
 
   // One physics step: feeder, belt, vacuum, drives, MuJoCo, measurements, account.
   void step();
-  // Set-points reach the drives.
-  void hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING;
+  [[nodiscard]] SimArm& arm(std::size_t i = 0) { return *arms[i]; }
+  [[nodiscard]] const SimArm& arm(std::size_t i = 0) const { return *arms[i]; }
 
   world::World world;
   Composed composed;
@@ -48,38 +75,23 @@ struct Cell {
   Faults faults;
   std::vector<Arrival> arrivals;
   BeltDrive belt;
-  Gripper gripper;
+  std::vector<std::unique_ptr<SimArm>> arms;
   Ledger ledger;
   Feeder feeder;
-  Curtains curtains;
   LabelStore labels;
   std::vector<std::unique_ptr<SimCamera>> cameras;
   std::vector<body::Camera*> camera_list;
-  SimBody body;
-  Random noise;                // of wrist and vacuum
-  Bus bus;                     // set-points on their way
-  body::SetPoints set_points;  // in force
-  body::Sensors measured;      // at the last step
   Duration step_length;
   Time stepped;  // end of the last step
   Time now;      // last time advanced to
   bool stop_pressed = false;
-  Vector3 push_n = Vector3::Zero();  // of a person on the tip
   std::vector<Visit> visits;
-  Time heard;                     // when set-points last reached the drives
-  bool watchdog_tripped = false;  // until set-points without power are heard
-  AxisVector held;                // where the brakes hold the arm; empty while it moves
-  std::string failure;            // what MuJoCo said when it gave up
+  std::string failure;  // what MuJoCo said when it gave up
 
  private:
-  std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom
-
   void drive_belt();
-  void watch_loop();
-  void drive();
-  void push();
-  void brake();
-  void measure();
+  [[nodiscard]] bool belt_may_run() const;
+  [[nodiscard]] std::vector<ArmStep> arm_steps() const;
 };
 
 }  // namespace pons::sim

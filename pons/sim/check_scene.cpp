@@ -69,8 +69,10 @@ Expected<void> check_mouth(const mjModel* model, const mjData* data, const world
 Expected<void> check_scene(const Composed& cell, const world::World& world) {
   const mjModel* model = cell.model.get();
   const DataPtr data(mj_makeData(model));
-  for (std::size_t axis = 0; axis < cell.arm_qpos.size(); ++axis)
-    data->qpos[cell.arm_qpos[axis]] = world.robot.home[static_cast<Eigen::Index>(axis)];
+  for (const ComposedArm& arm : cell.arms) {
+    for (std::size_t axis = 0; axis < arm.qpos.size(); ++axis)
+      data->qpos[arm.qpos[axis]] = world.robot.home[static_cast<Eigen::Index>(axis)];
+  }
   mj_kinematics(model, data.get());
   if (auto belt = check_belt(model, data.get(), cell.belt_geom, world); !belt) return belt;
   for (const world::Place& place : world.places) {

@@ -17,7 +17,13 @@ namespace {
 constexpr mjtSize kArenaBytes = 48 << 20;
 constexpr double kParkX = 40, kParkY = 40, kParkZ = 5, kParkPitch = 1.5;  // m; far from anything a camera sees
 
-constexpr int kArmBits = 4;
+constexpr int kArmBit = 4;  // of every arm: what it meets of scene and parcels
+
+// What one arm meets of the others.
+int bit_of(std::size_t arm) { return kArmBit << (1 + arm); }
+
+std::string arm_prefix(const world::World& station) { return station.arm + "/"; }
+std::string tool_prefix(const world::World& station) { return station.arm + "_tool/"; }
 
 void set_options(mjSpec* spec, const world::World& world) {
   set_solver(spec, world.physics_step_s);
@@ -26,11 +32,27 @@ void set_options(mjSpec* spec, const world::World& world) {
   spec->memory = kArenaBytes;
 }
 
+std::string drive_name(const world::World& station, Eigen::Index axis) {
+  return fmt::format("{}_drive_{}", station.arm, axis);
+}
+
+// Arms of one belt meet each other; the parts of one arm do not.
+void let_meet(mjsBody* body, std::size_t arm, std::size_t arms) {
+  int others = 0;
+  for (std::size_t other = 0; other < arms; ++other) others |= other == arm ? 0 : bit_of(other);
+  for (mjsElement* e = mjs_firstChild(body, mjOBJ_GEOM, 1); e != nullptr; e = mjs_nextChild(body, e, 1)) {
+    mjsGeom* geom = mjs_asGeom(e);
+    if ((geom->contype & kArmBit) == 0) continue;
+    geom->contype |= bit_of(arm);
+    geom->conaffinity |= others;
+  }
+}
+
 void paint_arm(mjsBody* body) {
   int index = 0;
   for (mjsElement* e = mjs_firstChild(body, mjOBJ_GEOM, 1); e != nullptr; e = mjs_nextChild(body, e, 1)) {
     mjsGeom* geom = mjs_asGeom(e);
-    geom->contype = kArmBits;
+    geom->contype = kArmBit;
     geom->conaffinity = 0;
     geom->group = 1;
     const bool joint_cover = index++ % 3 != 1;
@@ -40,29 +62,13 @@ void paint_arm(mjsBody* body) {
   }
 }
 
-Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::World& world) {
-  const world::Robot& robot = world.robot;
-  mjsFrame* base = mjs_addFrame(mjs_findBody(scene, "world"), nullptr);
-  to_mujoco(robot.world_from_base, base->pos, base->quat);
-  auto arm_root = attach(base, arm, "arm/", robot.urdf);
-  if (!arm_root) return std::unexpected(arm_root.error());
-  (*arm_root)->sleep = mjSLEEP_AUTO;
-  paint_arm(*arm_root);
-
-  mjsBody* flange = mjs_findBody(scene, ("arm/" + robot.flange_link).c_str());
-  if (flange == nullptr) {
-    return fail(fmt::format("link '{}' is missing", robot.flange_link), robot.urdf.string(),
-                "name the last link as robot.flange_link in world.yaml");
-  }
-  mjsFrame* at_flange = mjs_addFrame(flange, nullptr);
-  auto tool_root = attach(at_flange, tool, "tool/", robot.tool.mjcf);
-  if (!tool_root) return std::unexpected(tool_root.error());
-
+Expected<void> add_drives(mjSpec* scene, const world::World& station) {
+  const world::Robot& robot = station.robot;
   Eigen::Index axis = 0;
   for (mjsElement* e = mjs_firstElement(scene, mjOBJ_JOINT); e != nullptr; e = mjs_nextElement(scene, e)) {
     // MuJoCo's own std::string is of another library: only its accessor may look inside.
     const std::string joint_name = mjs_getString(mjs_getName(e));
-    if (!joint_name.starts_with("arm/")) continue;
+    if (!joint_name.starts_with(arm_prefix(station))) continue;
     mjsJoint* joint = mjs_asJoint(e);
     if (axis >= robot.limits.torque_nm.size()) break;
     joint->armature = robot.rotor_inertia_kg_m2[axis];
@@ -72,7 +78,7 @@ Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::
     joint->actfrclimited = mjLIMITED_FALSE;
     mjsActuator* motor = mjs_addActuator(scene, nullptr);
     mjs_setToMotor(motor);
-    mjs_setName(motor->element, fmt::format("drive_{}", axis).c_str());
+    mjs_setName(motor->element, drive_name(station, axis).c_str());
     mjs_setString(motor->target, joint_name.c_str());
     motor->trntype = mjTRN_JOINT;
     motor->ctrllimited = mjLIMITED_TRUE;
@@ -85,6 +91,38 @@ Expected<void> add_robot(mjSpec* scene, mjSpec* arm, mjSpec* tool, const world::
                 robot.urdf.string(), "give one limit a joint");
   }
   return {};
+}
+
+// What is attached must live until the scene is compiled.
+struct Attached {
+  SpecPtr arm, tool;
+};
+
+Expected<Attached> add_robot(mjSpec* scene, const world::World& station, std::size_t index, std::size_t arms) {
+  const world::Robot& robot = station.robot;
+  auto arm = parse(robot.urdf);
+  if (!arm) return std::unexpected(arm.error());
+  auto tool = parse(robot.tool.mjcf);
+  if (!tool) return std::unexpected(tool.error());
+  mjsFrame* base = mjs_addFrame(mjs_findBody(scene, "world"), nullptr);
+  to_mujoco(robot.world_from_base, base->pos, base->quat);
+  auto arm_root = attach(base, arm->get(), arm_prefix(station).c_str(), robot.urdf);
+  if (!arm_root) return std::unexpected(arm_root.error());
+  (*arm_root)->sleep = mjSLEEP_AUTO;
+  paint_arm(*arm_root);
+  let_meet(*arm_root, index, arms);
+
+  mjsBody* flange = mjs_findBody(scene, (arm_prefix(station) + robot.flange_link).c_str());
+  if (flange == nullptr) {
+    return fail(fmt::format("link '{}' is missing", robot.flange_link), robot.urdf.string(),
+                "name the last link as robot.flange_link in world.yaml");
+  }
+  mjsFrame* at_flange = mjs_addFrame(flange, nullptr);
+  auto tool_root = attach(at_flange, tool->get(), tool_prefix(station).c_str(), robot.tool.mjcf);
+  if (!tool_root) return std::unexpected(tool_root.error());
+  let_meet(*tool_root, index, arms);
+  if (auto added = add_drives(scene, station); !added) return std::unexpected(added.error());
+  return Attached{std::move(*arm), std::move(*tool)};
 }
 
 mjsGeom* add_parcel_geom(mjsBody* body, const std::string& name, mjtGeom type, int bits) {
@@ -171,39 +209,53 @@ Expected<int> id_of(const mjModel* model, mjtObj type, const std::string& name, 
   return fail(fmt::format("{} '{}' is missing", mju_type2Str(type), name), file.string(), "add it");
 }
 
-void find_arm(Composed& cell) {
-  const mjModel* model = cell.model.get();
-  for (int actuator = 0; actuator < model->nu; ++actuator) {
-    if (model->actuator_trntype[actuator] != mjTRN_JOINT) continue;
+void find_drives(ComposedArm& arm, const mjModel* model, const world::World& station) {
+  for (Eigen::Index axis = 0; axis < station.robot.home.size(); ++axis) {
+    const int actuator = mj_name2id(model, mjOBJ_ACTUATOR, drive_name(station, axis).c_str());
     const int joint = model->actuator_trnid[2 * actuator];
-    cell.arm_actuator.push_back(actuator);
-    cell.arm_qpos.push_back(model->jnt_qposadr[joint]);
-    cell.arm_dof.push_back(model->jnt_dofadr[joint]);
+    arm.actuator.push_back(actuator);
+    arm.qpos.push_back(model->jnt_qposadr[joint]);
+    arm.dof.push_back(model->jnt_dofadr[joint]);
   }
 }
 
-Expected<void> find_tool(Composed& cell, const world::World& world) {
-  const mjModel* model = cell.model.get();
-  const auto& file = world.robot.tool.mjcf;
-  for (std::size_t i = 0; i < world.robot.tool.cups_m.size(); ++i) {
-    auto body = id_of(model, mjOBJ_BODY, fmt::format("tool/cup_{}", i), file);
-    auto geom = id_of(model, mjOBJ_GEOM, fmt::format("tool/lip_{}", i), file);
-    auto actuator = id_of(model, mjOBJ_ACTUATOR, fmt::format("tool/vacuum_{}", i), file);
+Expected<void> find_tool(ComposedArm& arm, const mjModel* model, const world::World& station) {
+  const auto& file = station.robot.tool.mjcf;
+  const std::string tool = tool_prefix(station);
+  for (std::size_t i = 0; i < station.robot.tool.cups_m.size(); ++i) {
+    auto body = id_of(model, mjOBJ_BODY, fmt::format("{}cup_{}", tool, i), file);
+    auto geom = id_of(model, mjOBJ_GEOM, fmt::format("{}lip_{}", tool, i), file);
+    auto actuator = id_of(model, mjOBJ_ACTUATOR, fmt::format("{}vacuum_{}", tool, i), file);
     for (const auto* id : {&body, &geom, &actuator}) {
       if (!*id) return std::unexpected(id->error());
     }
-    cell.cups.push_back({*body, *geom, *actuator});
+    arm.cups.push_back({*body, *geom, *actuator});
   }
-  auto site = id_of(model, mjOBJ_SITE, "tool/wrist", file);
-  auto force = id_of(model, mjOBJ_SENSOR, "tool/wrist_force", file);
-  auto torque = id_of(model, mjOBJ_SENSOR, "tool/wrist_torque", file);
+  auto site = id_of(model, mjOBJ_SITE, tool + "wrist", file);
+  auto force = id_of(model, mjOBJ_SENSOR, tool + "wrist_force", file);
+  auto torque = id_of(model, mjOBJ_SENSOR, tool + "wrist_torque", file);
   for (const auto* id : {&site, &force, &torque}) {
     if (!*id) return std::unexpected(id->error());
   }
-  cell.wrist_site = *site;
-  cell.tool_body = model->site_bodyid[*site];
-  cell.force_sensor = model->sensor_adr[*force];
-  cell.torque_sensor = model->sensor_adr[*torque];
+  arm.wrist_site = *site;
+  arm.tool_body = model->site_bodyid[*site];
+  arm.force_sensor = model->sensor_adr[*force];
+  arm.torque_sensor = model->sensor_adr[*torque];
+  return {};
+}
+
+Expected<void> find_arms(Composed& cell, const world::World& world) {
+  const mjModel* model = cell.model.get();
+  for (const world::World& station : world.arms()) {
+    ComposedArm& arm = cell.arms.emplace_back();
+    find_drives(arm, model, station);
+    if (auto found = find_tool(arm, model, station); !found) return found;
+    const int own = model->body_rootid[arm.tool_body];
+    for (int geom = 0; geom < model->ngeom; ++geom) {
+      if (model->body_rootid[model->geom_bodyid[geom]] == own && (model->geom_contype[geom] & kArmBit) != 0)
+        arm.geoms.push_back(geom);
+    }
+  }
   return {};
 }
 
@@ -230,9 +282,11 @@ void classify(Composed& cell) {
   cell.parts.assign(static_cast<std::size_t>(model->ngeom), Part::kFixed);
   cell.slot_of_geom.assign(static_cast<std::size_t>(model->ngeom), -1);
   for (int geom = 0; geom < model->ngeom; ++geom) {
-    if ((model->geom_contype[geom] & kArmBits) != 0) cell.parts[static_cast<std::size_t>(geom)] = Part::kArm;
+    if ((model->geom_contype[geom] & kArmBit) != 0) cell.parts[static_cast<std::size_t>(geom)] = Part::kArm;
   }
-  for (const Cup& cup : cell.cups) cell.parts[static_cast<std::size_t>(cup.geom)] = Part::kCup;
+  for (const ComposedArm& arm : cell.arms) {
+    for (const Cup& cup : arm.cups) cell.parts[static_cast<std::size_t>(cup.geom)] = Part::kCup;
+  }
   cell.parts[static_cast<std::size_t>(cell.belt_geom)] = Part::kBelt;
   for (int i = 0; i < kSlots; ++i) {
     const Slot& slot = cell.slots[static_cast<std::size_t>(i)];
@@ -259,8 +313,7 @@ Expected<Composed> compile_and_find(mjSpec* scene, const world::World& world) {
   for (const world::CameraSpec& camera : world.cameras) {
     cell.cameras.push_back(mj_name2id(model, mjOBJ_CAMERA, ("camera/" + camera.name).c_str()));
   }
-  find_arm(cell);
-  if (auto found = find_tool(cell, world); !found) return std::unexpected(found.error());
+  if (auto found = find_arms(cell, world); !found) return std::unexpected(found.error());
   find_slots(cell);
   cell.cling = mj_name2id(model, mjOBJ_EQUALITY, "cling");
   classify(cell);
@@ -275,13 +328,13 @@ Expected<Composed> compose(const world::World& world, const world::FaultPlan& fa
   try {
     auto scene = parse(world.scene_mjcf);
     if (!scene) return std::unexpected(scene.error());
-    auto arm = parse(world.robot.urdf);
-    if (!arm) return std::unexpected(arm.error());
-    auto tool = parse(world.robot.tool.mjcf);
-    if (!tool) return std::unexpected(tool.error());
     set_options(scene->get(), world);
-    if (auto added = add_robot(scene->get(), arm->get(), tool->get(), world); !added) {
-      return std::unexpected(added.error());
+    const auto arms = world.arms();
+    std::vector<Attached> attached;
+    for (std::size_t i = 0; i < arms.size(); ++i) {
+      auto added = add_robot(scene->get(), arms[i], i, arms.size());
+      if (!added) return std::unexpected(added.error());
+      attached.push_back(std::move(*added));
     }
     const Labels labels = faults[world::Fault::kDoubleLabel].often > 0 ? Labels::kTwo : Labels::kOne;
     for (int i = 0; i < kSlots; ++i) add_slot(scene->get(), i, labels);

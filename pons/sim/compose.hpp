@@ -29,12 +29,18 @@ struct Cup {
   int body = 0, geom = 0, actuator = 0;
 };
 
-struct Composed {
-  ModelPtr model;
-  std::vector<int> arm_qpos, arm_dof, arm_actuator;  // one an axis
+// One arm with its tool.
+struct ComposedArm {
+  std::vector<int> qpos, dof, actuator;  // one an axis
   std::vector<Cup> cups;
+  std::vector<int> geoms;  // of arm and tool
   int tool_body = 0, wrist_site = 0;
   int force_sensor = 0, torque_sensor = 0;  // addresses in sensordata
+};
+
+struct Composed {
+  ModelPtr model;
+  std::vector<ComposedArm> arms;  // in the order of world.arms()
   int belt_geom = 0;
   std::vector<Slot> slots;
   std::vector<Part> parts;        // of each geom

@@ -58,37 +58,38 @@ void Faults::add_labels(const world::World& world, const world::Manifest& manife
   }
 }
 
-void Faults::begin_attempt() {
-  attempt_ = {};
-  attempt_.misses = draws(Fault::kMissedGrasp);
-  attempt_.leaks = draws(Fault::kWeakVacuum);
-  attempt_.drops = draws(Fault::kDrop);
-  if (attempt_.leaks)
-    attempt_.leak_kpa = streams_[static_cast<std::size_t>(Fault::kWeakVacuum)].uniform(kLeakLeast_kpa, kLeakMost_kpa);
-  if (attempt_.drops)
-    attempt_.drops_after =
+void Faults::begin_attempt(Attempt& attempt) {
+  attempt = {.vacuum_on = attempt.vacuum_on};
+  attempt.misses = draws(Fault::kMissedGrasp);
+  attempt.leaks = draws(Fault::kWeakVacuum);
+  attempt.drops = draws(Fault::kDrop);
+  if (attempt.leaks)
+    attempt.leak_kpa = streams_[static_cast<std::size_t>(Fault::kWeakVacuum)].uniform(kLeakLeast_kpa, kLeakMost_kpa);
+  if (attempt.drops)
+    attempt.drops_after =
         from_s(streams_[static_cast<std::size_t>(Fault::kDrop)].uniform(kDropsSoonest_s, kDropsLatest_s));
   if (draws(Fault::kDoublePick)) ++owed_doubles_;
 }
 
-Suction Faults::suction(std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger, Time now) {
-  if (vacuum_on_ == 0 && vacuum_on != 0) begin_attempt();
-  vacuum_on_ = vacuum_on;
+Suction Faults::suction(std::size_t arm, std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger,
+                        Time now) {
+  Attempt& attempt = attempts_[arm];
+  if (std::exchange(attempt.vacuum_on, vacuum_on) == 0 && vacuum_on != 0) begin_attempt(attempt);
   if (vacuum_on == 0) return {};
   const int slot = gripper.touched();
-  if (attempt_.misses) {
-    if (slot >= 0 && !std::exchange(attempt_.missed, true)) ++counts_[Fault::kMissedGrasp];
+  if (attempt.misses) {
+    if (slot >= 0 && !std::exchange(attempt.missed, true)) ++counts_[Fault::kMissedGrasp];
     return {.seals = false};
   }
   if (slot >= 0 && ledger.lifted(slot)) {
-    if (!attempt_.lifted) attempt_.lifted = now;
-    if (attempt_.drops && now >= *attempt_.lifted + attempt_.drops_after && !std::exchange(attempt_.dropped, true))
+    if (!attempt.lifted) attempt.lifted = now;
+    if (attempt.drops && now >= *attempt.lifted + attempt.drops_after && !std::exchange(attempt.dropped, true))
       ++counts_[Fault::kDrop];
   }
-  if (attempt_.dropped) return {.seals = false};
-  if (!attempt_.leaks) return {};
-  if (slot >= 0 && !std::exchange(attempt_.leaked, true)) ++counts_[Fault::kWeakVacuum];
-  return {.sealed_kpa = attempt_.leak_kpa};
+  if (attempt.dropped) return {.seals = false};
+  if (!attempt.leaks) return {};
+  if (slot >= 0 && !std::exchange(attempt.leaked, true)) ++counts_[Fault::kWeakVacuum];
+  return {.sealed_kpa = attempt.leak_kpa};
 }
 
 // The nearest that lies on the belt beside it; -1: none is near.
@@ -105,18 +106,28 @@ int Faults::neighbour(const Composed& cell, mjData* data, int slot, const Ledger
   return nearest;
 }
 
+// What a gripper has hold of and has not lifted yet; -1: none.
+int Faults::newly_held(std::span<const ArmStep> arms, const Ledger& ledger) const {
+  for (const ArmStep& arm : arms) {
+    const int held = arm.gripper.touched();
+    if (held >= 0 && arm.gripper.grip(held) >= kSteadyCups && !ledger.lifted(held)) return held;
+  }
+  return -1;
+}
+
 // Tape, a flap or film that hooks: the two stay as they lie to each other, until the first is let go of.
-void Faults::cling(Composed& cell, mjData* data, const Gripper& gripper, const Ledger& ledger) {
+void Faults::cling(Composed& cell, mjData* data, std::span<const ArmStep> arms, const Ledger& ledger) {
   if (cell.cling < 0) return;
   if (clings_to_ >= 0) {
-    if (gripper.grip(clings_to_) > 0 && ledger.parcel_in(clings_) >= 0) return;
+    const bool held = std::ranges::any_of(arms, [&](const ArmStep& arm) { return arm.gripper.grip(clings_to_) > 0; });
+    if (held && ledger.parcel_in(clings_) >= 0) return;
     data->eq_active[cell.cling] = 0;
     wake(data, cell.slots[static_cast<std::size_t>(clings_)]);
     clings_to_ = clings_ = -1;
     return;
   }
-  const int held = gripper.touched();
-  if (owed_doubles_ == 0 || held < 0 || gripper.grip(held) < kSteadyCups || ledger.lifted(held)) return;
+  const int held = owed_doubles_ == 0 ? -1 : newly_held(arms, ledger);
+  if (held < 0) return;
   const int beside = neighbour(cell, data, held, ledger);
   if (beside < 0) return;
   --owed_doubles_;

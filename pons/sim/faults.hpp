@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pons/core/pose.hpp"
@@ -37,8 +38,9 @@ class Faults {
   // Second labels, before the first parcel is put down: its own code once more, or another parcel's.
   void add_labels(const world::World& world, const world::Manifest& manifest, std::vector<Arrival>& arrivals) const;
   // Before each physics step: how well the cups seal then; what clings to what they lift.
-  [[nodiscard]] Suction suction(std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger, Time now);
-  void cling(Composed& cell, mjData* data, const Gripper& gripper, const Ledger& ledger);
+  [[nodiscard]] Suction suction(std::size_t arm, std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger,
+                                Time now);
+  void cling(Composed& cell, mjData* data, std::span<const ArmStep> arms, const Ledger& ledger);
   // Whether the belt stands although it is told to run.
   [[nodiscard]] bool belt_jams(Time now) { return jams_.on(now); }
   // What the belt's cameras see now.
@@ -50,6 +52,7 @@ class Faults {
  private:
   // From switching the vacuum on to switching it off.
   struct Attempt {
+    std::uint32_t vacuum_on = 0;
     bool misses = false, leaks = false, drops = false;
     double leak_kpa = 0;
     Duration drops_after{0};                               // being lifted
@@ -57,7 +60,8 @@ class Faults {
     std::optional<Time> lifted;
   };
   [[nodiscard]] bool draws(world::Fault fault);
-  void begin_attempt();
+  void begin_attempt(Attempt& attempt);
+  [[nodiscard]] int newly_held(std::span<const ArmStep> arms, const Ledger& ledger) const;
   [[nodiscard]] int neighbour(const Composed& cell, mjData* data, int slot, const Ledger& ledger) const;
 
   world::FaultPlan plan_;
@@ -65,8 +69,7 @@ class Faults {
   std::array<Random, world::kFaults> streams_;
   world::Spells jams_, occlusions_, blackouts_, shifts_;
   world::FaultCounts counts_;
-  std::uint32_t vacuum_on_ = 0;
-  Attempt attempt_;
+  std::array<Attempt, kMaxArms> attempts_;       // of each arm
   int owed_doubles_ = 0;                         // of picks that had no neighbour
   int clings_to_ = -1, clings_ = -1;             // slots
   std::int64_t hidden_by_ = 0, shifted_by_ = 0;  // the spell that the patch and the shift were drawn for

@@ -58,7 +58,7 @@ struct Bench {
   explicit Bench(const world::FaultPlan& plan, int count = 1)
       : world(without_cameras()), cell(world, boxes(count), composed(world, plan), 3, plan), puppet(cell) {
     for (Eigen::Index i = 0; i < world.robot.home.size(); ++i)
-      cell.data->qpos[cell.composed.arm_qpos[static_cast<std::size_t>(i)]] = world.robot.home[i];
+      cell.data->qpos[cell.arm().composed.qpos[static_cast<std::size_t>(i)]] = world.robot.home[i];
     mj_forward(cell.composed.model.get(), cell.data.get());
     puppet.hold(0.002);
     for (int i = 0; i < 40 && at(0).x() < -0.1; ++i) puppet.hold(0.2);
@@ -88,7 +88,7 @@ struct Bench {
 TEST(Faults, AMissedGraspDoesNotSealUntilTheNextAttempt) {
   Bench bench(only(Fault::kMissedGrasp, {.often = 1}));
   bench.touch();
-  EXPECT_NEAR(bench.cell.measured.cup_vacuum_kpa[0], 8, 2) << "like a cup that touches nothing";
+  EXPECT_NEAR(bench.cell.arm().measured.cup_vacuum_kpa[0], 8, 2) << "like a cup that touches nothing";
   EXPECT_EQ(bench.count(Fault::kMissedGrasp), 1);
   bench.lift();
   EXPECT_EQ(bench.cell.ledger.parcels()[0].picks, 0);
@@ -101,8 +101,8 @@ TEST(Faults, AMissedGraspDoesNotSealUntilTheNextAttempt) {
 TEST(Faults, ALeakLeavesLessThanTheFullVacuum) {
   Bench bench(only(Fault::kWeakVacuum, {.often = 1}));
   bench.touch();
-  EXPECT_GT(bench.cell.measured.cup_vacuum_kpa[0], 15);
-  EXPECT_LT(bench.cell.measured.cup_vacuum_kpa[0], 47);
+  EXPECT_GT(bench.cell.arm().measured.cup_vacuum_kpa[0], 15);
+  EXPECT_LT(bench.cell.arm().measured.cup_vacuum_kpa[0], 47);
   EXPECT_EQ(bench.count(Fault::kWeakVacuum), 1);
 }
 
@@ -280,11 +280,11 @@ TEST(Faults, PicksAreDrawnInTheirShare) {
   Faults faults(plan, 11);
   bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.05), 1.0, 0.1);
   bench.puppet.move_tip(bench.top - Vector3(0, 0, 0.004), 0.6, 0.3);
-  ASSERT_GE(bench.cell.gripper.touched(), 0);
+  ASSERT_GE(bench.cell.arm().gripper.touched(), 0);
   int missed = 0;
   for (int i = 0; i < 4000; ++i) {
-    (void)faults.suction(0, bench.cell.gripper, bench.cell.ledger, Time{});
-    missed += faults.suction(0xf, bench.cell.gripper, bench.cell.ledger, Time{}).seals ? 0 : 1;
+    (void)faults.suction(0, 0, bench.cell.arm().gripper, bench.cell.ledger, Time{});
+    missed += faults.suction(0, 0xf, bench.cell.arm().gripper, bench.cell.ledger, Time{}).seals ? 0 : 1;
   }
   EXPECT_NEAR(missed / 4000.0, 0.25, 0.03);
   EXPECT_EQ(faults.counts()[Fault::kMissedGrasp], missed);

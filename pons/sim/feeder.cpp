@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "pons/core/random.hpp"
 #include "pons/sim/labels.hpp"
@@ -26,11 +27,12 @@ Vector3 position(const mjData* data, const Slot& slot) {
 
 // Where the front of what is put down may lie without a camera seeing it appear.
 double hidden_end_m(const world::World& world) {
-  double end_m = world.belt.x_start_m;
+  std::optional<double> view_m;
   for (const world::CameraSpec& camera : world.cameras) {
-    if (const auto seen = world::seen_of_belt(camera, world.belt)) end_m = std::max(end_m, seen->from_m - kHidden_m);
+    if (const auto seen = world::seen_of_belt(camera, world.belt))
+      view_m = std::min(view_m.value_or(seen->from_m), seen->from_m);
   }
-  return end_m;
+  return view_m ? std::max(world.belt.x_start_m, *view_m - kHidden_m) : world.belt.x_start_m;
 }
 
 }  // namespace

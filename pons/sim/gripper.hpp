@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "pons/core/axes.hpp"
 #include "pons/sim/compose.hpp"
@@ -19,6 +20,7 @@ struct Suction {
 // constant of 20 ms; an open one draws 8 kPa; switched off, air returns with 12 ms. The adhesion follows the pressure.
 class Gripper {
  public:
+  explicit Gripper(const ComposedArm& arm) : arm_(&arm), count_(arm.cups.size()) {}
   // Before each step; looks at the contacts of the last one.
   void update(const Composed& cell, mjData* data, std::uint32_t vacuum_on, const Suction& suction, double step_s);
 
@@ -32,9 +34,11 @@ class Gripper {
   // Adhesion that pulls on each of the cup's contacts in the step just done, N.
   [[nodiscard]] double pull_n(std::size_t cup) const { return cups_[cup].pull_n; }
   // After a step: adhesion shares of the cups.
-  void measure(const Composed& cell, const mjData* data);
+  void measure(const mjData* data);
   // What tool and load exert on the flange, in the flange's frame, without noise: force, then torque.
-  [[nodiscard]] std::array<double, 6> wrist(const Composed& cell, const mjData* data) const;
+  [[nodiscard]] std::array<double, 6> wrist(const mjData* data) const;
+  // The cup that the geom is the lip of; nothing when it is none of this gripper's.
+  [[nodiscard]] std::optional<std::size_t> cup_of(int geom) const;
 
  private:
   struct Cup {
@@ -42,8 +46,9 @@ class Gripper {
     int slot = -1;
     double pull_n = 0;
   };
+  const ComposedArm* arm_;
   std::array<Cup, kMaxCups> cups_{};
-  std::size_t count_ = 0;
+  std::size_t count_;
   int touched_ = -1;
 };
 

@@ -22,6 +22,7 @@ constexpr Duration kTrayCleared = from_s(6.0);   // long enough for the camera o
 constexpr Duration kStrayCleared = from_s(8.0);  // at rest where nothing belongs
 constexpr double kRimSlack_m = 0.02;
 constexpr double kWithinLimit = 1.001;
+constexpr double kFarApart_m = 1;   // arms further from each other are not measured
 constexpr std::size_t kWindow = 5;  // steps of the mean acceleration at 2 ms
 
 bool above(const world::Place& place, const Vector3& point) {
@@ -52,28 +53,36 @@ struct Ledger::Impl {
   world::World world;
   std::vector<ParcelTruth> parcels;
   std::vector<int> slot_of;
-  ArmTruth arm;
+  std::vector<ArmTruth> arms;
+  double least_between_arms_m = kFarApart_m;
   std::array<Track, kSlots> tracks;
   std::vector<int> leaving;
   int in_transit = 0;
   bool belt_stands = false;
-  AxisVector last_speed;
-  std::array<AxisVector, kWindow> window;
+  struct Speeds {
+    AxisVector last;
+    std::array<AxisVector, kWindow> window;
+  };
+  std::vector<Speeds> speeds;  // of each arm
   std::size_t window_at = 0;
 
-  void feel(const Composed& cell, const mjData* data, const Gripper& gripper, std::array<Touch, kSlots>& touches) const;
-  void follow_grip(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed, int grip,
-                   std::uint32_t vacuum_on);
+  void feel(const Composed& cell, const mjData* data, std::span<const ArmStep> arms,
+            std::array<Touch, kSlots>& touches) const;
+  void follow_grip(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed,
+                   std::span<const ArmStep> arms, int slot);
   void follow_fall(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed) const;
   void locate(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed, Time now) const;
   [[nodiscard]] const world::Place* place_around(const Vector3& at) const;
   [[nodiscard]] bool leaves(const Track& track, const ParcelTruth& parcel, Time now) const;
-  void work(const Composed& cell, const mjData* data, const AxisVector& torque_nm);
+  void work(std::size_t arm, const mjData* data, const ArmStep& step);
+  void keep_apart(const Composed& cell, mjData* data, std::span<const ArmStep> arms);
 };
 
 Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const std::vector<Arrival>& arrivals)
     : impl_(std::make_unique<Impl>()) {
   impl_->world = world;
+  impl_->arms.resize(world.arms().size());
+  impl_->speeds.resize(world.arms().size());
   impl_->slot_of.assign(manifest.size(), -1);
   impl_->parcels.resize(manifest.size());
   for (std::size_t i = 0; i < manifest.size(); ++i) {
@@ -109,7 +118,7 @@ void Ledger::offered(std::size_t parcel, int slot, Time now) {
   ++impl_->in_transit;
 }
 
-void Ledger::Impl::feel(const Composed& cell, const mjData* data, const Gripper& gripper,
+void Ledger::Impl::feel(const Composed& cell, const mjData* data, std::span<const ArmStep> steps,
                         std::array<Touch, kSlots>& touches) const {
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
@@ -130,19 +139,21 @@ void Ledger::Impl::feel(const Composed& cell, const mjData* data, const Gripper&
       }
       // Adhesion presses lip and parcel together without pressing on the parcel as a whole.
       double pull = 0;
-      for (std::size_t cup = 0; cup < cell.cups.size(); ++cup) {
-        if (cell.cups[cup].geom == contact.geom[1 - side]) pull = gripper.pull_n(cup);
+      for (const ArmStep& step : steps) {
+        if (const auto cup = step.gripper.cup_of(contact.geom[1 - side])) pull = step.gripper.pull_n(*cup);
       }
       (pull > 0 ? touch.cups_n : touch.press_n) += force[0] - pull;
     }
   }
 }
 
-void Ledger::Impl::follow_grip(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed, int grip,
-                               std::uint32_t vacuum_on) {
-  if (grip > 0) {
+void Ledger::Impl::follow_grip(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed,
+                               std::span<const ArmStep> steps, int slot) {
+  const auto holder = std::ranges::find_if(steps, [&](const ArmStep& step) { return step.gripper.grip(slot) > 0; });
+  if (holder != steps.end()) {
     if (!track.gripped) track.gripped_at_m = at.z();
     track.gripped = true;
+    parcel.arm = static_cast<int>(holder - steps.begin());
     if (!track.lifted && at.z() - track.gripped_at_m > kLifted_m) {
       track.lifted = true;
       ++parcel.picks;
@@ -150,7 +161,7 @@ void Ledger::Impl::follow_grip(Track& track, ParcelTruth& parcel, const Vector3&
     return;
   }
   if (track.lifted) {
-    if (vacuum_on != 0) ++parcel.drops;
+    if (steps[static_cast<std::size_t>(parcel.arm)].vacuum_on != 0) ++parcel.drops;
     track.sinking = true;
     track.fell_from_m = at.z() + (speed.z() > 0 ? speed.z() * speed.z() / (2 * kGravity) : 0);
   }
@@ -239,12 +250,14 @@ bool Ledger::Impl::leaves(const Track& track, const ParcelTruth& parcel, Time no
   }
 }
 
-void Ledger::Impl::work(const Composed& cell, const mjData* data, const AxisVector& torque_nm) {
-  const AxisLimits& limits = world.robot.limits;
-  const auto axes = static_cast<Eigen::Index>(cell.arm_dof.size());
+void Ledger::Impl::work(std::size_t index, const mjData* data, const ArmStep& step) {
+  const AxisLimits& limits = world.arms()[index].robot.limits;
+  const auto axes = static_cast<Eigen::Index>(step.composed.dof.size());
   const double step_s = world.physics_step_s;
+  ArmTruth& arm = arms[index];
+  auto& [last_speed, window] = speeds[index];
   AxisVector speed(axes);
-  for (Eigen::Index i = 0; i < axes; ++i) speed[i] = data->qvel[cell.arm_dof[static_cast<std::size_t>(i)]];
+  for (Eigen::Index i = 0; i < axes; ++i) speed[i] = data->qvel[step.composed.dof[static_cast<std::size_t>(i)]];
   if (arm.steps == 0) {
     last_speed = speed;
     window.fill(speed);
@@ -254,7 +267,7 @@ void Ledger::Impl::work(const Composed& cell, const mjData* data, const AxisVect
     if (violations != nullptr && now_ratio > kWithinLimit) ++*violations;
   };
   for (Eigen::Index i = 0; i < axes; ++i) {
-    const double position = data->qpos[cell.arm_qpos[static_cast<std::size_t>(i)]];
+    const double position = data->qpos[step.composed.qpos[static_cast<std::size_t>(i)]];
     const double outside = std::max(limits.position_min[i] - position, position - limits.position_max[i]);
     const double mean = (speed[i] - window[window_at][i]) / (static_cast<double>(kWindow) * step_s);
     worst(arm.worst_speed_ratio, &arm.speed_violations, std::abs(speed[i]) / limits.speed_rad_s[i]);
@@ -262,23 +275,52 @@ void Ledger::Impl::work(const Composed& cell, const mjData* data, const AxisVect
           std::abs(speed[i] - last_speed[i]) / step_s / limits.acceleration_rad_s2[i]);
     worst(arm.worst_mean_acceleration_ratio, &arm.acceleration_violations,
           std::abs(mean) / limits.acceleration_rad_s2[i]);
-    worst(arm.worst_torque_ratio, &arm.torque_violations, std::abs(torque_nm[i]) / limits.torque_nm[i]);
+    worst(arm.worst_torque_ratio, &arm.torque_violations, std::abs(step.torque_nm[i]) / limits.torque_nm[i]);
     if (outside > 0) worst(arm.worst_position_ratio, nullptr, 1 + outside);
   }
   window[window_at] = speed;
-  window_at = (window_at + 1) % kWindow;
   last_speed = speed;
   ++arm.steps;
 }
 
-void Ledger::update(const Composed& cell, const mjData* data, const Gripper& gripper, std::uint32_t vacuum_on,
-                    const AxisVector& torque_nm, Time now) {
-  impl_->work(cell, data, torque_nm);
+// The least distance between any two arms, with their tools and what hangs on them.
+void Ledger::Impl::keep_apart(const Composed& cell, mjData* data, std::span<const ArmStep> steps) {
+  std::vector<std::vector<int>> geoms;
+  for (const ArmStep& step : steps) {
+    geoms.push_back(step.composed.geoms);
+    for (std::size_t slot = 0; slot < kSlots; ++slot) {
+      if (tracks[slot].lifted && step.gripper.grip(static_cast<int>(slot)) > 0)
+        geoms.back().push_back(cell.slots[slot].main);
+    }
+  }
+  const mjModel* model = cell.model.get();
+  const auto near = [&](int one, int other) {
+    const double apart_m = (Vector3::Map(data->geom_xpos + 3 * one) - Vector3::Map(data->geom_xpos + 3 * other)).norm();
+    return apart_m - model->geom_rbound[one] - model->geom_rbound[other] < least_between_arms_m;
+  };
+  for (std::size_t i = 0; i < geoms.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      for (const int one : geoms[i]) {
+        for (const int other : geoms[j]) {
+          double between[6];
+          if (near(one, other))
+            least_between_arms_m =
+                std::min(least_between_arms_m, mj_geomDistance(model, data, one, other, least_between_arms_m, between));
+        }
+      }
+    }
+  }
+}
+
+void Ledger::update(const Composed& cell, mjData* data, std::span<const ArmStep> arms, Time now) {
+  for (std::size_t i = 0; i < arms.size(); ++i) impl_->work(i, data, arms[i]);
+  impl_->window_at = (impl_->window_at + 1) % kWindow;
+  if (arms.size() > 1 && impl_->window_at == 0) impl_->keep_apart(cell, data, arms);
   impl_->belt_stands = cell.model->geom_surfacevel[6 * cell.belt_geom] == 0;
   impl_->leaving.clear();
   impl_->in_transit = 0;
   std::array<Touch, kSlots> touches{};
-  impl_->feel(cell, data, gripper, touches);
+  impl_->feel(cell, data, arms, touches);
   for (std::size_t i = 0; i < kSlots; ++i) {
     Track& track = impl_->tracks[i];
     if (track.parcel < 0) continue;
@@ -290,7 +332,7 @@ void Ledger::update(const Composed& cell, const mjData* data, const Gripper& gri
     const double press_n = std::accumulate(track.press_n.begin(), track.press_n.end(), 0.0) / kWindow;
     parcel.max_press_n = std::max(parcel.max_press_n, press_n);
     parcel.max_squeeze_n = std::max(parcel.max_squeeze_n, touches[i].squeeze_n);
-    impl_->follow_grip(track, parcel, at, speed, gripper.grip(static_cast<int>(i)), vacuum_on);
+    impl_->follow_grip(track, parcel, at, speed, arms, static_cast<int>(i));
     impl_->follow_fall(track, parcel, at, speed);
     impl_->locate(track, parcel, at, speed, now);
     if (parcel.where == Whereabouts::kBelt || parcel.where == Whereabouts::kHeld ||
@@ -315,6 +357,7 @@ bool Ledger::lifted(int slot) const { return impl_->tracks[static_cast<std::size
 std::size_t Ledger::size() const { return impl_->parcels.size(); }
 int Ledger::in_transit() const { return impl_->in_transit; }
 const std::vector<ParcelTruth>& Ledger::parcels() const { return impl_->parcels; }
-const ArmTruth& Ledger::arm() const { return impl_->arm; }
+const std::vector<ArmTruth>& Ledger::arms() const { return impl_->arms; }
+double Ledger::least_between_arms_m() const { return impl_->least_between_arms_m; }
 
 }  // namespace pons::sim

@@ -3,7 +3,9 @@
 // through truth.hpp. Private to pons/sim.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "pons/core/axes.hpp"
@@ -17,15 +19,22 @@ namespace pons::sim {
 struct ParcelTruth;
 struct ArmTruth;
 
+// What one arm was told, and does, in a step.
+struct ArmStep {
+  const ComposedArm& composed;
+  const Gripper& gripper;
+  std::uint32_t vacuum_on;
+  const AxisVector& torque_nm;  // asked of the drives
+};
+
 class Ledger {
  public:
   Ledger(const world::World& world, const world::Manifest& manifest, const std::vector<Arrival>& arrivals);
   ~Ledger();
 
   void offered(std::size_t parcel, int slot, Time now);
-  // After each step. `torque_nm` is what was asked of the drives.
-  void update(const Composed& cell, const mjData* data, const Gripper& gripper, std::uint32_t vacuum_on,
-              const AxisVector& torque_nm, Time now);
+  // After each step.
+  void update(const Composed& cell, mjData* data, std::span<const ArmStep> arms, Time now);
   // Slots whose parcel is to be carried off now; each is named once, and is free afterwards.
   [[nodiscard]] const std::vector<int>& leaving() const;
 
@@ -37,7 +46,8 @@ class Ledger {
   [[nodiscard]] std::size_t size() const;               // parcels of the manifest
 
   [[nodiscard]] const std::vector<ParcelTruth>& parcels() const;
-  [[nodiscard]] const ArmTruth& arm() const;
+  [[nodiscard]] const std::vector<ArmTruth>& arms() const;
+  [[nodiscard]] double least_between_arms_m() const;
 
  private:
   struct Impl;

@@ -10,8 +10,8 @@ namespace {
 using Jacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
 Vector3 tip_of(const Cell& cell, const mjData* data, Vector3& axis) {
-  const double* r = data->site_xmat + 9 * cell.composed.wrist_site;
-  const double* p = data->site_xpos + 3 * cell.composed.wrist_site;
+  const double* r = data->site_xmat + 9 * cell.arm().composed.wrist_site;
+  const double* p = data->site_xpos + 3 * cell.arm().composed.wrist_site;
   axis = Vector3(r[2], r[5], r[8]);
   return Vector3(p[0], p[1], p[2]) + cell.world.robot.tool.flange_from_tip.translation().z() * axis;
 }
@@ -28,21 +28,21 @@ Vector3 Puppet::tip() const {
 AxisVector Puppet::solve(const Vector3& at) {
   const mjModel* model = cell_.composed.model.get();
   const DataPtr scratch(mj_makeData(model));
-  const auto axes = static_cast<Eigen::Index>(cell_.composed.arm_dof.size());
+  const auto axes = static_cast<Eigen::Index>(cell_.arm().composed.dof.size());
   AxisVector q = position_;
   for (int iteration = 0; iteration < 200; ++iteration) {
     for (Eigen::Index i = 0; i < axes; ++i) {
-      scratch->qpos[cell_.composed.arm_qpos[static_cast<std::size_t>(i)]] = q[i];
+      scratch->qpos[cell_.arm().composed.qpos[static_cast<std::size_t>(i)]] = q[i];
     }
     mj_kinematics(model, scratch.get());
     mj_comPos(model, scratch.get());
     Vector3 axis;
     const Vector3 tip = tip_of(cell_, scratch.get(), axis);
     Jacobian linear(3, model->nv), angular(3, model->nv);
-    mj_jac(model, scratch.get(), linear.data(), angular.data(), tip.data(), cell_.composed.tool_body);
+    mj_jac(model, scratch.get(), linear.data(), angular.data(), tip.data(), cell_.arm().composed.tool_body);
     Eigen::Matrix<double, 6, Eigen::Dynamic> both(6, axes);
     for (Eigen::Index i = 0; i < axes; ++i) {
-      const int dof = cell_.composed.arm_dof[static_cast<std::size_t>(i)];
+      const int dof = cell_.arm().composed.dof[static_cast<std::size_t>(i)];
       both.col(i) << linear.col(dof), angular.col(dof);
     }
     Eigen::Matrix<double, 6, 1> error;
@@ -56,23 +56,23 @@ AxisVector Puppet::solve(const Vector3& at) {
 
 void Puppet::step(const AxisVector& position, const AxisVector& speed) {
   const mjModel* model = cell_.composed.model.get();
-  const auto axes = static_cast<Eigen::Index>(cell_.composed.arm_dof.size());
+  const auto axes = static_cast<Eigen::Index>(cell_.arm().composed.dof.size());
   std::vector<double> error(static_cast<std::size_t>(model->nv), 0.0), torque(error);
   for (Eigen::Index i = 0; i < axes; ++i) {
     const auto index = static_cast<std::size_t>(i);
-    const int dof = cell_.composed.arm_dof[index];
-    error[static_cast<std::size_t>(dof)] = 900 * (position[i] - cell_.data->qpos[cell_.composed.arm_qpos[index]]) +
+    const int dof = cell_.arm().composed.dof[index];
+    error[static_cast<std::size_t>(dof)] = 900 * (position[i] - cell_.data->qpos[cell_.arm().composed.qpos[index]]) +
                                            60 * (speed[i] - cell_.data->qvel[dof]);
   }
   mj_mulM(model, cell_.data.get(), torque.data(), error.data());
-  cell_.set_points.torque_nm.resize(axes);
+  cell_.arm().set_points.torque_nm.resize(axes);
   for (Eigen::Index i = 0; i < axes; ++i) {
-    const int dof = cell_.composed.arm_dof[static_cast<std::size_t>(i)];
-    cell_.set_points.torque_nm[i] = torque[static_cast<std::size_t>(dof)] + cell_.data->qfrc_bias[dof];
+    const int dof = cell_.arm().composed.dof[static_cast<std::size_t>(i)];
+    cell_.arm().set_points.torque_nm[i] = torque[static_cast<std::size_t>(dof)] + cell_.data->qfrc_bias[dof];
   }
-  cell_.set_points.vacuum_on = vacuum_;
-  cell_.set_points.power = cell_.set_points.belt_runs = true;
-  cell_.heard = cell_.stepped;
+  cell_.arm().set_points.vacuum_on = vacuum_;
+  cell_.arm().set_points.power = cell_.arm().set_points.belt_runs = true;
+  cell_.arm().heard = cell_.stepped;
   cell_.step();
 }
 

@@ -28,6 +28,19 @@ std::vector<Arrival> arriving(const world::World& world, const world::Manifest& 
 
 }  // namespace
 
+SimArm::SimArm(Cell& the_cell, std::size_t index, std::uint64_t seed)
+    : cell(the_cell),
+      station(cell.world.arms()[index]),
+      composed(cell.composed.arms[index]),
+      gripper(composed),
+      curtains(station),
+      noise(Random(seed).fork(kNoiseStream + index)),
+      bus(from_s(station.robot.drive_delay_s)),
+      brake_acceleration_(static_cast<std::size_t>(cell.composed.model->nv)),
+      brake_torque_(brake_acceleration_) {
+  set_points.torque_nm = AxisVector::Zero(station.robot.home.size());
+}
+
 Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Composed the_composed, std::uint64_t seed,
            const world::FaultPlan& plan)
     : world(the_world),
@@ -38,14 +51,8 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
       belt(world.belt, seed),
       ledger(world, manifest, arrivals),
       feeder(world, manifest, arrivals),
-      curtains(world),
-      body(this),
-      noise(Random(seed).fork(kNoiseStream)),
-      bus(from_s(world.robot.drive_delay_s)),
-      step_length(from_s(world.physics_step_s)),
-      brake_acceleration_(static_cast<std::size_t>(composed.model->nv)),
-      brake_torque_(brake_acceleration_) {
-  set_points.torque_nm = AxisVector::Zero(world.robot.home.size());
+      step_length(from_s(world.physics_step_s)) {
+  for (std::size_t i = 0; i < composed.arms.size(); ++i) arms.push_back(std::make_unique<SimArm>(*this, i, seed));
   for (int i = 0; i < kSlots; ++i) {
     const Slot& slot = composed.slots[static_cast<std::size_t>(i)];
     park(composed.model.get(), data.get(), slot, i);
@@ -59,23 +66,44 @@ Cell::Cell(const world::World& the_world, const world::Manifest& manifest, Compo
 void Cell::step() {
   mjModel* model = composed.model.get();
   feeder.step(composed, model, data.get(), ledger, labels, belt, stepped);
-  for (; const Bus::Told* told = bus.next(stepped + step_length); bus.drop_oldest()) hear(told->set_points, told->acts);
-  watch_loop();
+  for (const auto& one : arms) one->listen();
   drive_belt();
-  const Suction suction = faults.suction(set_points.vacuum_on, gripper, ledger, stepped);
-  gripper.update(composed, data.get(), set_points.vacuum_on, suction, world.physics_step_s);
-  faults.cling(composed, data.get(), gripper, ledger);
-  drive();
-  push();
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const std::uint32_t vacuum_on = arms[i]->set_points.vacuum_on;
+    const Suction suction = faults.suction(i, vacuum_on, arms[i]->gripper, ledger, stepped);
+    arms[i]->gripper.update(composed, data.get(), vacuum_on, suction, world.physics_step_s);
+  }
+  faults.cling(composed, data.get(), arm_steps(), ledger);
+  for (const auto& one : arms) {
+    one->drive();
+    one->push();
+  }
   mj_step(model, data.get());
   stepped += step_length;
-  gripper.measure(composed, data.get());
-  measure();
-  ledger.update(composed, data.get(), gripper, set_points.vacuum_on, set_points.torque_nm, stepped);
+  for (const auto& one : arms) {
+    one->gripper.measure(data.get());
+    one->measure();
+  }
+  ledger.update(composed, data.get(), arm_steps(), stepped);
+}
+
+std::vector<ArmStep> Cell::arm_steps() const {
+  std::vector<ArmStep> steps;
+  for (const auto& one : arms)
+    steps.push_back({one->composed, one->gripper, one->set_points.vacuum_on, one->set_points.torque_nm});
+  return steps;
+}
+
+// As an interlock has it: some arm lets it run, and none that has power wants it to stand. One without power is braked:
+// that it stands clear, see those who let the belt run.
+bool Cell::belt_may_run() const {
+  const auto lets = [](const auto& one) { return one->set_points.belt_runs; };
+  return std::ranges::any_of(arms, lets) &&
+         std::ranges::all_of(arms, [&](const auto& one) { return lets(one) || !one->set_points.power; });
 }
 
 void Cell::drive_belt() {
-  set_points.belt_runs && !faults.belt_jams(stepped) ? belt.let_run() : belt.stop();
+  belt_may_run() && !faults.belt_jams(stepped) ? belt.let_run() : belt.stop();
   if (belt.starts()) {
     for (int i = 0; i < kSlots; ++i) {
       if (ledger.on_belt(i)) wake(data.get(), composed.slots[static_cast<std::size_t>(i)]);
@@ -84,38 +112,43 @@ void Cell::drive_belt() {
   belt.step(composed.model.get(), composed.belt_geom, stepped, world.physics_step_s);
 }
 
-void Cell::hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING {
+void SimArm::hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING {
   set_points = told;
   heard = at;
   if (!told.power) watchdog_tripped = false;
   if (watchdog_tripped) set_points.power = set_points.belt_runs = false;
 }
 
-void Cell::watch_loop() {
-  if (!set_points.power || stepped + step_length - heard <= body.watchdog()) return;
+void SimArm::listen() {
+  const Time until = cell.stepped + cell.step_length;
+  for (const Bus::Told* told = bus.next(until); told != nullptr; bus.drop_oldest(), told = bus.next(until))
+    hear(told->set_points, told->acts);
+  if (!set_points.power || until - heard <= watchdog()) return;
   watchdog_tripped = true;
   set_points.power = set_points.belt_runs = false;
 }
 
-void Cell::drive() {
-  for (std::size_t i = 0; i < composed.arm_actuator.size(); ++i) {
+void SimArm::drive() {
+  mjData* data = cell.data.get();
+  for (std::size_t i = 0; i < composed.actuator.size(); ++i) {
     const double torque = set_points.power ? set_points.torque_nm[static_cast<Eigen::Index>(i)] : 0;
-    data->ctrl[composed.arm_actuator[i]] = torque;
+    data->ctrl[composed.actuator[i]] = torque;
   }
   if (set_points.power) {
     held.resize(0);
-    for (const int dof : composed.arm_dof) data->qfrc_applied[dof] = 0;
+    for (const int dof : composed.dof) data->qfrc_applied[dof] = 0;
   } else {
     brake();
   }
 }
 
-void Cell::push() {
+void SimArm::push() {
+  mjData* data = cell.data.get();
   const int body_id = composed.tool_body;
   const double* turn = data->site_xmat + 9 * composed.wrist_site;
   const Eigen::Map<const Vector3> flange(data->site_xpos + 3 * composed.wrist_site), com(data->xipos + 3 * body_id);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> world_from_flange(turn);
-  const Vector3 tip = flange + world_from_flange * world.robot.tool.flange_from_tip.translation();
+  const Vector3 tip = flange + world_from_flange * station.robot.tool.flange_from_tip.translation();
   const Vector3 moment = Vector3(tip - com).cross(push_n);
   double* applied = data->xfrc_applied + 6 * body_id;
   std::copy_n(push_n.data(), 3, applied);
@@ -124,77 +157,79 @@ void Cell::push() {
 
 // Brakes slow the joints at once and then hold them where they stand, with at most kBrake times the drives' torque. Dry
 // friction as a constraint creeps under the arm's weight, or makes the solver stumble when it is made stiff.
-void Cell::brake() {
-  const mjModel* model = composed.model.get();
-  const auto axes = static_cast<Eigen::Index>(composed.arm_dof.size());
+void SimArm::brake() {
+  const mjModel* model = cell.composed.model.get();
+  mjData* data = cell.data.get();
+  const auto axes = static_cast<Eigen::Index>(composed.dof.size());
   double fastest = 0;
-  for (const int dof : composed.arm_dof) fastest = std::max(fastest, std::abs(data->qvel[dof]));
+  for (const int dof : composed.dof) fastest = std::max(fastest, std::abs(data->qvel[dof]));
   if (held.size() == 0 && fastest < kBrakeHolds_rad_s) {
     held.resize(axes);
-    for (Eigen::Index i = 0; i < axes; ++i) held[i] = data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
+    for (Eigen::Index i = 0; i < axes; ++i) held[i] = data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
   }
   std::fill(brake_acceleration_.begin(), brake_acceleration_.end(), 0.0);
   for (Eigen::Index i = 0; i < axes; ++i) {
-    const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
-    const double away = held.size() == 0 ? 0 : held[i] - data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
+    const int dof = composed.dof[static_cast<std::size_t>(i)];
+    const double away = held.size() == 0 ? 0 : held[i] - data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
     brake_acceleration_[static_cast<std::size_t>(dof)] = kBrakeStiffness * away - kBrakeDamping * data->qvel[dof];
   }
-  mj_mulM(model, data.get(), brake_torque_.data(), brake_acceleration_.data());
+  mj_mulM(model, data, brake_torque_.data(), brake_acceleration_.data());
   for (Eigen::Index i = 0; i < axes; ++i) {
-    const int dof = composed.arm_dof[static_cast<std::size_t>(i)];
-    const double most = kBrake * world.robot.limits.torque_nm[i];
+    const int dof = composed.dof[static_cast<std::size_t>(i)];
+    const double most = kBrake * station.robot.limits.torque_nm[i];
     data->qfrc_applied[dof] =
         std::clamp(brake_torque_[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof], -most, most);
   }
 }
 
-void Cell::measure() {
-  const auto axes = static_cast<Eigen::Index>(composed.arm_qpos.size());
+void SimArm::measure() {
+  const mjData* data = cell.data.get();
+  const auto axes = static_cast<Eigen::Index>(composed.qpos.size());
   measured.position.resize(axes);
   measured.speed.resize(axes);
   for (Eigen::Index i = 0; i < axes; ++i) {
-    measured.position[i] = data->qpos[composed.arm_qpos[static_cast<std::size_t>(i)]];
-    measured.speed[i] = data->qvel[composed.arm_dof[static_cast<std::size_t>(i)]];
+    measured.position[i] = data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
+    measured.speed[i] = data->qvel[composed.dof[static_cast<std::size_t>(i)]];
   }
-  const std::array<double, 6> wrist = gripper.wrist(composed, data.get());
-  for (std::size_t i = 0; i < 3 && world.robot.wrist_sensor; ++i) {
+  const std::array<double, 6> wrist = gripper.wrist(data);
+  for (std::size_t i = 0; i < 3 && station.robot.wrist_sensor; ++i) {
     measured.wrist_force_n[i] = wrist[i] + kForceNoise_n * noise.normal();
     measured.wrist_torque_nm[i] = wrist[i + 3] + kTorqueNoise_nm * noise.normal();
   }
   for (std::size_t i = 0; i < composed.cups.size(); ++i) {
     measured.cup_vacuum_kpa[i] = gripper.pressure_kpa(i) + kVacuumNoise_kpa * noise.normal();
   }
-  measured.belt_travel_m = belt.travel_m();
-  measured.belt_speed_m_s = belt.speed_m_s();
-  measured.photo_eye_blocked = feeder.photo_eye(composed, data.get(), ledger);
-  curtains.update(composed, data.get(), ledger);
+  measured.belt_travel_m = cell.belt.travel_m();
+  measured.belt_speed_m_s = cell.belt.speed_m_s();
+  measured.photo_eye_blocked = cell.feeder.photo_eye(cell.composed, data, cell.ledger);
+  curtains.update(cell.composed, data, cell.ledger);
   measured.fallen_into = curtains.counts();
 }
 
-void SimBody::read(body::Sensors& sensors) {
-  sensors = cell_->measured;
-  const double since_s = to_s(cell_->now - cell_->stepped);
+void SimArm::read(body::Sensors& sensors) {
+  sensors = measured;
+  const double since_s = to_s(cell.now - cell.stepped);
   if (since_s > 0) {
     sensors.position += since_s * sensors.speed;
     sensors.belt_travel_m += since_s * sensors.belt_speed_m_s;
   }
-  sensors.stamp = cell_->now;
-  sensors.stop_input = cell_->stop_pressed;
-  sensors.watchdog_tripped = cell_->watchdog_tripped;
+  sensors.stamp = cell.now;
+  sensors.stop_input = cell.stop_pressed;
+  sensors.watchdog_tripped = watchdog_tripped;
   sensors.zones_occupied = 0;
-  for (const Visit& visit : cell_->visits) {
-    if (cell_->now >= visit.from && cell_->now < visit.from + visit.stays) sensors.zones_occupied |= 1U << visit.zone;
+  for (const Visit& visit : cell.visits) {
+    if (cell.now >= visit.from && cell.now < visit.from + visit.stays) sensors.zones_occupied |= 1U << visit.zone;
   }
 }
 
-void SimBody::write(const body::SetPoints& set_points) {
-  if (cell_->bus.delay() > Duration{0})
-    cell_->bus.send(set_points, cell_->now);
+void SimArm::write(const body::SetPoints& told) {
+  if (bus.delay() > Duration{0})
+    bus.send(told, cell.now);
   else
-    cell_->hear(set_points, cell_->now);
+    hear(told, cell.now);
 }
 
-Duration SimBody::watchdog() const { return from_s(cell_->world.robot.watchdog_s); }
+Duration SimArm::watchdog() const { return from_s(station.robot.watchdog_s); }
 
 Simulation::Simulation(std::unique_ptr<Cell> cell) : cell_(std::move(cell)) {}
 Simulation::~Simulation() = default;
@@ -213,7 +248,7 @@ Expected<std::unique_ptr<Simulation>> Simulation::create(const world::World& wor
     cell->cameras.push_back(std::move(*camera));
   }
   std::unique_ptr<Simulation> simulation(new Simulation(std::move(cell)));
-  simulation->set_arm(world.robot.home);
+  for (std::size_t i = 0; i < world.arms().size(); ++i) simulation->set_arm(world.arms()[i].robot.home, i);
   return simulation;
 }
 
@@ -227,28 +262,30 @@ void Simulation::advance_to(Time time) {
   if (time > cell.now) cell.now = time;
 }
 
-body::Body& Simulation::body() { return cell_->body; }
+body::Body& Simulation::body(std::size_t arm) { return cell_->arm(arm); }
 const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
 void Simulation::run_belt() {
-  cell_->body.write({.torque_nm = AxisVector::Zero(cell_->world.robot.home.size()), .belt_runs = true});
+  for (const auto& arm : cell_->arms)
+    arm->write({.torque_nm = AxisVector::Zero(arm->station.robot.home.size()), .belt_runs = true});
 }
 void Simulation::press_stop(bool pressed) { cell_->stop_pressed = pressed; }
 
-void Simulation::push_tip(const Vector3& force_n) { cell_->push_n = force_n; }
+void Simulation::push_tip(const Vector3& force_n) { cell_->arm().push_n = force_n; }
 
 void Simulation::expect_visits(std::vector<Visit> visits) { cell_->visits = std::move(visits); }
 
-void Simulation::set_arm(const AxisVector& position) {
+void Simulation::set_arm(const AxisVector& position, std::size_t index) {
   Cell& cell = *cell_;
-  const auto axes = static_cast<Eigen::Index>(cell.composed.arm_qpos.size());
+  SimArm& arm = cell.arm(index);
+  const auto axes = static_cast<Eigen::Index>(arm.composed.qpos.size());
   for (Eigen::Index i = 0; i < axes; ++i) {
-    cell.data->qpos[cell.composed.arm_qpos[static_cast<std::size_t>(i)]] = position[i];
-    cell.data->qvel[cell.composed.arm_dof[static_cast<std::size_t>(i)]] = 0;
+    cell.data->qpos[arm.composed.qpos[static_cast<std::size_t>(i)]] = position[i];
+    cell.data->qvel[arm.composed.dof[static_cast<std::size_t>(i)]] = 0;
   }
   mj_forward(cell.composed.model.get(), cell.data.get());
-  cell.held.resize(0);
-  cell.measured.position = position;
-  cell.measured.speed = AxisVector::Zero(axes);
+  arm.held.resize(0);
+  arm.measured.position = position;
+  arm.measured.speed = AxisVector::Zero(axes);
 }
 
 int Simulation::offered() const { return cell_->feeder.offered(); }

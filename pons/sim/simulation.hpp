@@ -1,5 +1,5 @@
-// A world's cell in MuJoCo behind the body contract: arm, tool, belt, feeder, cameras. Truth about parcels is not here
-// but in truth.hpp, which only the referee, tests and apps may include.
+// A world's cell in MuJoCo behind the body contract, an arm a body: arm, tool, belt, feeder, cameras. Truth about
+// parcels is not here but in truth.hpp, which only the referee, tests and apps may include.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,8 @@ struct Visit {
 // states to the byte.
 class Simulation {
  public:
-  // Composes scene, arm, tool and parcels, puts the arm at home with its brakes on, and opens the cameras. Errors: a
-  // file that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
+  // Composes scene, arms, tools and parcels, puts the arms at home with their brakes on, and opens the cameras. Errors:
+  // a file that MuJoCo refuses, a name the world needs and the scene lacks, no OpenGL library.
   [[nodiscard]] static Expected<std::unique_ptr<Simulation>> create(const world::World& world,
                                                                     const world::Manifest& manifest, std::uint64_t seed,
                                                                     const world::FaultPlan& faults = {});
@@ -40,8 +40,9 @@ class Simulation {
   // Steps the physics while a whole step ends at or before `time`. Earlier times do nothing.
   void advance_to(Time time);
 
-  // Measurements hold at the time last advanced to: between two physics steps positions are carried on by their speeds.
-  [[nodiscard]] body::Body& body();
+  // Of that one of world.arms(). Measurements hold at the time last advanced to: between two physics steps positions
+  // are carried on by their speeds.
+  [[nodiscard]] body::Body& body(std::size_t arm = 0);
   // In the order of world.cameras. They live as long as the simulation.
   [[nodiscard]] const std::vector<body::Camera*>& cameras() const;
 
@@ -49,12 +50,12 @@ class Simulation {
   void run_belt();
   // The stop input as a person presses (true) or releases (false) it.
   void press_stop(bool pressed);
-  // A person pushes the tip with this force, N, world frame, until told otherwise.
+  // A person pushes the (first) tip with this force, N, world frame, until told otherwise.
   void push_tip(const Vector3& force_n);
   // Who will come, told by the safety scanner's bits in body::Sensors.
   void expect_visits(std::vector<Visit> visits);
-  // Places the arm at rest there, without moving through space; `position` must have one value an axis.
-  void set_arm(const AxisVector& position);
+  // Places an arm at rest there, without moving through space; `position` must have one value an axis.
+  void set_arm(const AxisVector& position, std::size_t arm = 0);
 
   // How many parcels of the manifest have been put on the belt; whether all have been and none is on the belt, in the
   // gripper or falling any more.

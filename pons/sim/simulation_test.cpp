@@ -133,7 +133,7 @@ TEST(Simulation, ThirtySecondsOfFeedingRaiseNoWarningAndRepeatToTheByte) {
     const auto health = simulation->health();
     EXPECT_TRUE(health) << health.error().line();
     EXPECT_GT(simulation->offered(), 5);
-    EXPECT_LT(Truth(*simulation).arm().worst_speed_ratio, 0.01) << "the brakes hold";
+    EXPECT_LT(Truth(*simulation).arms().front().worst_speed_ratio, 0.01) << "the brakes hold";
     digest = simulation->state_digest();
   }
   EXPECT_EQ(digests[0], digests[1]);
@@ -195,7 +195,7 @@ struct Bench {
   explicit Bench(double mass_kg)
       : world(without_cameras("parcel_cell")), cell(world, one_box(mass_kg), composed(world), 3), puppet(cell) {
     for (Eigen::Index i = 0; i < world.robot.home.size(); ++i) {
-      cell.data->qpos[cell.composed.arm_qpos[static_cast<std::size_t>(i)]] = world.robot.home[i];
+      cell.data->qpos[cell.arm().composed.qpos[static_cast<std::size_t>(i)]] = world.robot.home[i];
     }
     mj_forward(cell.composed.model.get(), cell.data.get());
     puppet.hold(0.002);
@@ -228,17 +228,17 @@ TEST_P(Lift, CupsSealCarryAndReleaseIntoAChute) {
   Bench bench(mass);
   const auto& [world, cell, puppet, top] = bench;
   bench.puppet.move_tip(top + Vector3(0, 0, 0.05), 1.0, 0.2);
-  EXPECT_LT(cell.measured.cup_vacuum_kpa[0], 2.0);
+  EXPECT_LT(cell.arm().measured.cup_vacuum_kpa[0], 2.0);
   bench.puppet.set_vacuum(0xf);
   bench.puppet.hold(0.2);
-  EXPECT_NEAR(cell.measured.cup_vacuum_kpa[0], 8.0, 2.0) << "open cups draw little";
+  EXPECT_NEAR(cell.arm().measured.cup_vacuum_kpa[0], 8.0, 2.0) << "open cups draw little";
   bench.puppet.move_tip(top - Vector3(0, 0, 0.004), 0.6, 0.3);
-  for (std::size_t cup = 0; cup < 4; ++cup) EXPECT_GT(cell.measured.cup_vacuum_kpa[cup], 50.0) << cup;
+  for (std::size_t cup = 0; cup < 4; ++cup) EXPECT_GT(cell.arm().measured.cup_vacuum_kpa[cup], 50.0) << cup;
   bench.puppet.move_tip(top + Vector3(0, 0, 0.20), 0.8, 0.5);
   const ParcelTruth& truth = bench.truth();
   EXPECT_EQ(truth.where, Whereabouts::kHeld);
   EXPECT_EQ(truth.picks, 1);
-  EXPECT_NEAR(cell.measured.wrist_force_n[2], (world.robot.tool.mass_kg + mass) * 9.81, 0.8 + 0.02 * mass * 9.81);
+  EXPECT_NEAR(cell.arm().measured.wrist_force_n[2], (world.robot.tool.mass_kg + mass) * 9.81, 0.8 + 0.02 * mass * 9.81);
 
   bench.puppet.move_tip(world.place("chute_2")->center_m + Vector3(0, 0, 0.22), 1.5, 0.2);
   EXPECT_EQ(truth.where, Whereabouts::kHeld);
@@ -251,7 +251,7 @@ TEST_P(Lift, CupsSealCarryAndReleaseIntoAChute) {
   EXPECT_LT(truth.max_drop_m, world.rules.max_drop_m);
   EXPECT_LT(truth.max_press_n, world.rules.max_press_n);
   EXPECT_GT(truth.max_press_n, 0);
-  EXPECT_LT(cell.ledger.arm().worst_speed_ratio, 1.0);
+  EXPECT_LT(cell.ledger.arms().front().worst_speed_ratio, 1.0);
   for (const mjWarningStat& warning : cell.data->warning) EXPECT_EQ(warning.number, 0);
 }
 
@@ -264,7 +264,7 @@ TEST(Truth, AParcelLostUnderVacuumIsADrop) {
   bench.puppet.move_tip(bench.top - Vector3(0, 0, 0.004), 0.6, 0.3);
   bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.20), 0.8, 0.2);
   ASSERT_EQ(bench.truth().where, Whereabouts::kHeld);
-  for (const sim::Cup& cup : bench.cell.composed.cups) {
+  for (const sim::Cup& cup : bench.cell.arm().composed.cups) {
     bench.cell.composed.model->actuator_gainprm[mjNGAIN * cup.actuator] = 0;
   }
   bench.puppet.hold(2.0);
@@ -303,7 +303,7 @@ TEST(Simulation, DrivesHaveTheRotorsOfTheWorldsFile) {
   const auto composed = compose(world);
   ASSERT_TRUE(composed);
   for (Eigen::Index axis = 0; axis < 7; ++axis) {
-    const int dof = composed->arm_dof[static_cast<std::size_t>(axis)];
+    const int dof = composed->arms.front().dof[static_cast<std::size_t>(axis)];
     EXPECT_EQ(composed->model->dof_armature[dof], world.robot.rotor_inertia_kg_m2[axis]) << axis;
   }
 }

@@ -22,7 +22,8 @@ std::string_view name(Whereabouts where) {
 Truth::Truth(const Simulation& simulation) : simulation_(&simulation) {}
 
 const std::vector<ParcelTruth>& Truth::parcels() const { return simulation_->cell_->ledger.parcels(); }
-const ArmTruth& Truth::arm() const { return simulation_->cell_->ledger.arm(); }
+const std::vector<ArmTruth>& Truth::arms() const { return simulation_->cell_->ledger.arms(); }
+double Truth::least_between_arms_m() const { return simulation_->cell_->ledger.least_between_arms_m(); }
 
 std::optional<Pose> Truth::top(std::size_t parcel) const {
   const Cell& cell = *simulation_->cell_;
@@ -50,8 +51,8 @@ std::uint32_t Truth::cups_on() const {
   constexpr double kDriven_kpa = 4;  // half of what an open cup that is driven draws
   const Cell& cell = *simulation_->cell_;
   std::uint32_t on = 0;
-  for (std::size_t i = 0; i < cell.composed.cups.size(); ++i)
-    on |= cell.gripper.pressure_kpa(i) > kDriven_kpa ? 1U << i : 0U;
+  for (std::size_t i = 0; i < cell.arm().composed.cups.size(); ++i)
+    on |= cell.arm().gripper.pressure_kpa(i) > kDriven_kpa ? 1U << i : 0U;
   return on;
 }
 

@@ -41,6 +41,7 @@ struct ParcelTruth {
   double max_drop_m = 0;     // deepest fall: from where it began to sink unheld to where it stopped
   int picks = 0;             // times it was lifted off by the cups
   int drops = 0;             // times it was lost although the vacuum was on
+  int arm = -1;              // whose cups last held it, in the order of world.arms(); -1: none has
 };
 
 // How hard the arm really worked, over every physics step so far. Ratios to world limits; above 1 is a violation.
@@ -62,15 +63,17 @@ class Truth {
   explicit Truth(const Simulation& simulation);
 
   [[nodiscard]] const std::vector<ParcelTruth>& parcels() const;
-  [[nodiscard]] const ArmTruth& arm() const;
+  [[nodiscard]] const std::vector<ArmTruth>& arms() const;  // in the order of world.arms()
+  // The least that any two arms, with what hung on them, were ever apart, looked at every fifth step; at most 1.
+  [[nodiscard]] double least_between_arms_m() const;
   // World pose of the middle of the parcel's top face as the parcel was put down, x along its length; nothing while it
   // is not in the cell.
   [[nodiscard]] std::optional<Pose> top(std::size_t parcel) const;
   // Speed of that parcel's middle, world frame; zero when it is not in the cell.
   [[nodiscard]] Vector3 velocity_m_s(std::size_t parcel) const;
-  // Which cups are driven, bit i = cup i.
+  // Which cups of the first arm are driven, bit i = cup i.
   [[nodiscard]] std::uint32_t cups_on() const;
-  // What everything else exerts on arm and tool through contacts at this moment: N, world frame.
+  // What everything else exerts on all arms and tools through contacts at this moment: N, world frame.
   [[nodiscard]] Vector3 force_on_arm_n() const;
   // How many of the manifest lie on the belt, unheld.
   [[nodiscard]] int on_belt() const;

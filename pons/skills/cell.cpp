@@ -37,6 +37,10 @@ constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
 constexpr double kAside_m = 0.36;     // over the belt, and over what may stand on it
+constexpr double kTaking_s = 1.6;     // from setting out, roughly, until an arm has come down on something
+constexpr double kComing_s = 2.0;     // before it comes into the zone an arm sets out for it
+constexpr double kAround_m = 0.25;    // a mouth: there arm and load may be in another's way
+constexpr double kTallest_m = 0.30;   // of what rides along the belt
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
 // Belt speed changes within seconds; its slope is smoothed over about this long.
@@ -249,6 +253,48 @@ bool Cell::step_aside(Time now) {
   const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
   const auto way = router.route(state, from, end, nullptr, objects_, limits_empty());
   return way && arm.stream(*way);
+}
+
+// Before the last arm the belt waits; by the others things ride.
+task::Chance Cell::chance(std::string_view code) const {
+  const ObjectBelief* const object = find(code);
+  if (object == nullptr) return task::Chance::kNow;
+  const double x_m = object->world_from_top.translation().x();
+  const double rides_m = world.next_arm.empty() ? 0 : kTaking_s * belt_speed_m_s();
+  if (x_m + rides_m > world.belt.pick_x_max_m) return task::Chance::kGone;
+  const bool comes = x_m < world.belt.pick_x_min_m - kComing_s * world.belt.speed_m_s;
+  return comes ? task::Chance::kNotYet : task::Chance::kNow;
+}
+
+bool Cell::stands_over(const world::Place& place) {
+  const AxisVector& position = arm.state().position;
+  if (position.size() == 0) return true;  // nobody knows where it stands
+  const Vector3 off = (model.world_from_tip(position).translation() - place.center_m).cwiseAbs();
+  return off.x() < 0.5 * place.size_m.x() + kAround_m && off.y() < 0.5 * place.size_m.y() + kAround_m;
+}
+
+bool Cell::stands_in(std::string_view zone) {
+  return std::ranges::any_of(world.places,
+                             [&](const world::Place& place) { return place.resource == zone && stands_over(place); });
+}
+
+bool Cell::stands_in_zone() {
+  return std::ranges::any_of(world.places,
+                             [&](const world::Place& place) { return !place.resource.empty() && stands_over(place); });
+}
+
+bool Cell::lets_pass() {
+  const AxisVector& position = arm.state().position;
+  if (position.size() != model.axes()) return false;
+  const double load_m = held ? held->load.size_m.z() : 0;
+  std::vector<model::PlacedCapsule> capsules;
+  model.place_capsules(position, capsules);
+  return std::ranges::all_of(capsules, [&](const model::PlacedCapsule& capsule) {
+    const double near_y =
+        std::min(std::abs(capsule.from.y() - world.belt.y_center_m), std::abs(capsule.to.y() - world.belt.y_center_m));
+    const double low_z = std::min(capsule.from.z(), capsule.to.z()) - capsule.radius_m - load_m;
+    return near_y > 0.5 * world.belt.width_m + capsule.radius_m + load_m || low_z > world.belt.surface_z_m + kTallest_m;
+  });
 }
 
 AxisLimits Cell::limits_planned() const {

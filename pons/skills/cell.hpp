@@ -2,6 +2,7 @@
 // a bridge, one thread.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -126,6 +127,20 @@ class Cell {
   // while it moves or where it is clear.
   void keep_clear(Time now);
 
+  // Whether the arm could set out now to take that object off the belt. Of what nobody sees nothing is known: it could.
+  [[nodiscard]] task::Chance chance(std::string_view code) const;
+  // Whether it stands where another arm may come once nobody holds the resource of that zone any more; any such zone.
+  [[nodiscard]] bool stands_in(std::string_view zone);
+  [[nodiscard]] bool stands_in_zone();
+  // Whether another arm stands in that zone, whoever holds it.
+  [[nodiscard]] bool taken(std::string_view zone) {
+    return std::ranges::any_of(others_, [&](Cell* other) { return other->stands_in(zone); });
+  }
+  // Another arm of the same belt, which must outlive the last look at a zone.
+  void beside(Cell& other) { others_.push_back(&other); }
+  // Whether what rides along the belt passes below the arm and what it holds, where it stands.
+  [[nodiscard]] bool lets_pass();
+
   // With the cups empty: out of the cameras' view, downstream. False: no way there now.
   bool step_aside(Time now);
 
@@ -148,6 +163,9 @@ class Cell {
 
   static constexpr Duration kBeltHeldFor = std::chrono::milliseconds(50);
 
+  [[nodiscard]] bool stands_over(const world::Place& place);
+
+  std::vector<Cell*> others_;
   std::optional<Time> belt_held_;
   std::optional<double> view_end_m_;  // on the belt; none: no camera watches it
   Time now_, seen_, looked_at_;

@@ -242,7 +242,7 @@ task::SkillType follow_policy(Cell& cell, const std::vector<std::string>& polici
                        {"first_latency_s", number(0, 9)}}},
                      {"required", {"policy", "seconds"}},
                      {"additionalProperties", false}},
-          .resources = {"arm"},
+          .resources = {cell.world.arm},
           .timeout = kLongestStream + 2 * kSilence,
           .attempts = 1,
           .safe_points = {"anywhere on the path"},

@@ -123,7 +123,7 @@ task::SkillType move_to(Cell& cell) {
                      {"properties", {{"place", {{"enum", places}}}, {"path", {{"enum", {kJoints, kLine}}}}}},
                      {"required", {"place"}},
                      {"additionalProperties", false}},
-          .resources = {"arm"},
+          .resources = {cell.world.arm},
           .timeout = std::chrono::seconds(15),
           .attempts = 2,
           .outputs = {"way_s"},

@@ -149,6 +149,8 @@ class Pick final : public ArmSkill {
       return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
     }
     if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
+      // Another arm may take it.
+      if (!cell_.world.next_arm.empty()) return {Status::kFailed, "rode past the pick zone of " + cell_.world.arm, {}};
       return {Status::kException, "rode past the pick zone", {}};
     }
     if (must_look_again(*object, now)) {
@@ -474,18 +476,21 @@ class Pick final : public ArmSkill {
 }  // namespace
 
 task::SkillType pick(Cell& cell) {
-  return {.name = "pick",
-          .summary = "Take one parcel off the moving belt by its label and weigh it",
-          .schema = {{"type", "object"},
-                     {"properties", {{"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
-                     {"required", {"object"}},
-                     {"additionalProperties", false}},
-          .resources = {"arm"},
-          .timeout = std::chrono::seconds(20),
-          .attempts = 4,
-          .outputs = {"mass_kg", "sealed"},
-          .safe_points = {"before the last of the way down", "with the parcel weighed, which its task keeps"},
-          .start = [&cell](const task::Json& arguments, Time now) {
+  return {
+      .name = "pick",
+      .summary = "Take one parcel off the moving belt by its label and weigh it",
+      .schema = {{"type", "object"},
+                 {"properties", {{"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
+                 {"required", {"object"}},
+                 {"additionalProperties", false}},
+      .resources = {cell.world.arm},
+      .timeout = std::chrono::seconds(20),
+      .attempts = 4,
+      .outputs = {"mass_kg", "sealed"},
+      .safe_points = {"before the last of the way down", "with the parcel weighed, which its task keeps"},
+      .chance = [&cell](const task::Json& arguments) { return cell.chance(arguments.at("object").get<std::string>()); },
+      .start =
+          [&cell](const task::Json& arguments, Time now) {
             return conduct(cell, std::make_unique<Pick>(cell, arguments.at("object").get<std::string>(), now));
           }};
 }

@@ -11,6 +11,7 @@
 #include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
+#include "pons/task/json_value.hpp"
 #include "pons/world/mouth.hpp"
 
 namespace pons::skills {
@@ -318,6 +319,16 @@ class Place final : public ArmSkill {
   bool cancelled_ = false;
 };
 
+// Beside the arm: what the place has, or any place may have that the arguments may come to name.
+std::vector<std::string> held_for(const Cell& cell, const task::Json& arguments) {
+  const std::string name = task::text_of(arguments, "place");
+  std::vector<std::string> held;
+  for (const world::Place& place : cell.world.places) {
+    if (!place.resource.empty() && (name.empty() || place.name == name)) held.push_back(place.resource);
+  }
+  return held;
+}
+
 }  // namespace
 
 task::SkillType place(Cell& cell) {
@@ -329,7 +340,7 @@ task::SkillType place(Cell& cell) {
                        {"object", {{"type", "string"}, {"minLength", 1}, {"maxLength", 64}}}}},
                      {"required", {"place"}},
                      {"additionalProperties", false}},
-          .resources = {"arm"},
+          .resources = {cell.world.arm},
           .timeout = std::chrono::seconds(15),
           .attempts = 3,
           .safe_points =
@@ -341,6 +352,13 @@ task::SkillType place(Cell& cell) {
             if (moment != task::Moment::kAdmission || !arguments.contains("object")) return {};
             return passes(cell.find(arguments.at("object").get<std::string>()), cell.world.place(place));
           },
+          .holds = [&cell](const task::Json& arguments) { return held_for(cell, arguments); },
+          .chance =
+              [&cell](const task::Json& arguments) {
+                const std::vector<std::string> held = held_for(cell, arguments);
+                const bool free = std::ranges::none_of(held, [&](const std::string& zone) { return cell.taken(zone); });
+                return free ? task::Chance::kNow : task::Chance::kNotYet;
+              },
           .start =
               [&cell](const task::Json& arguments, Time now) {
                 return conduct(cell, std::make_unique<Place>(cell, arguments.at("place").get<std::string>(),

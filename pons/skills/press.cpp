@@ -219,7 +219,7 @@ task::SkillType press(Cell& cell) {
                        {"seconds", {{"type", "number"}, {"minimum", 0.1}, {"maximum", 10}}}}},
                      {"required", {"place", "force_n", "seconds"}},
                      {"additionalProperties", false}},
-          .resources = {"arm"},
+          .resources = {cell.world.arm},
           .timeout = std::chrono::seconds(30),
           .attempts = 2,
           .outputs = {"least_n", "most_n"},

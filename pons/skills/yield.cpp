@@ -138,7 +138,7 @@ task::SkillType yield(Cell& cell) {
                        {"stiffness_n_m", {{"type", "number"}, {"minimum", kSoftest_n_m}, {"maximum", kStiffest_n_m}}}}},
                      {"required", {"seconds"}},
                      {"additionalProperties", false}},
-          .resources = {"arm"},
+          .resources = {cell.world.arm},
           .timeout = std::chrono::seconds(70),
           .attempts = 2,
           .outputs = {"most_m", "moved_m"},

@@ -83,6 +83,9 @@ enum class Moment : std::uint8_t {
   kStart,
 };
 
+// Whether a robot could take up now what a use of a skill is about: on a belt things pass by one robot after the other.
+enum class Chance : std::uint8_t { kNotYet, kNow, kGone };
+
 struct SkillType {
   std::string name;                       // "pick"
   std::string summary;                    // one line for `pons skills`
@@ -95,6 +98,10 @@ struct SkillType {
   // Whether the robot can do it, as far as that is known: reach, what stands in the way, drives. None: it can. Error:
   // why not. Quick: it is asked within a tick of the bridge.
   std::function<Expected<void>(const Json& arguments, Moment moment)> feasible = {};
+  // What a use with these arguments holds beside `resources`. Null: whatever one may. None: nothing.
+  std::function<std::vector<std::string>(const Json& arguments)> holds = {};
+  // Asked where several robots have the skill, each tick while a task waits for one of them. None: any time.
+  std::function<Chance(const Json& arguments)> chance = {};
   std::function<std::unique_ptr<Skill>(const Json& arguments, Time now)> start;
 };
 

@@ -98,8 +98,8 @@ Expected<Manifest> draw_manifest(const World& world, std::int64_t count, std::ui
                 fmt::format("ask for 1 to {}", kMaxParcels));
   }
   std::vector<std::string> chutes;
-  for (const Place& place : world.places) {
-    if (place.kind == PlaceKind::kChute) chutes.push_back(place.name);
+  for (const std::string& name : world.place_names()) {
+    if (world.place(name)->kind == PlaceKind::kChute) chutes.push_back(name);
   }
   if (chutes.empty()) return fail("the world has no chute", world.name, "add a place of kind chute");
   const Random stream = Random(seed).fork(kStream);

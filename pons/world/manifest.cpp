@@ -84,10 +84,8 @@ Expected<std::string> read_destination(const Row& row, const World& world) {
   const std::string& name = row.text(kDestination);
   const Place* place = world.place(name);
   if (place != nullptr && place->kind == PlaceKind::kChute) return name;
-  std::vector<std::string_view> chutes;
-  for (const Place& candidate : world.places) {
-    if (candidate.kind == PlaceKind::kChute) chutes.push_back(candidate.name);
-  }
+  std::vector<std::string> chutes = world.place_names();
+  std::erase_if(chutes, [&](const std::string& known) { return world.place(known)->kind != PlaceKind::kChute; });
   return row.refuse(kDestination, fmt::format("there is no chute '{}' in {}", printable(name), world.name),
                     fmt::format("choose from {}", fmt::join(chutes, ", ")));
 }

@@ -132,15 +132,18 @@ Pose read_pose(const YamlValue& value) {
   return pose;
 }
 
-Robot read_robot(const YamlValue& value, const std::filesystem::path& folder) {
-  const YamlMap map(
-      value, {"name", "urdf", "flange_link", "world_from_base", "home", "limits", "payload_kg", "tool", "capsules"},
-      {"rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s", "wrist_sensor"});
+Robot read_robot(const YamlValue& value, const std::filesystem::path& folder, Arms arms) {
+  const YamlMap map(value, {"name", "urdf", "flange_link", "home", "limits", "payload_kg", "tool", "capsules"},
+                    {"world_from_base", "rotor_inertia_kg_m2", "watchdog_s", "drive_delay_s", "wrist_sensor"});
+  if (map.has("world_from_base") != (arms == Arms::kOne)) {
+    value.refuse(arms == Arms::kOne ? "key 'world_from_base' is missing" : "has a world_from_base, and so has each arm",
+                 arms == Arms::kOne ? "say where the robot's base stands" : "leave it to them");
+  }
   Robot robot;
   robot.name = map["name"].name();
   robot.urdf = map["urdf"].existing_file(folder);
   robot.flange_link = map["flange_link"].text();
-  robot.world_from_base = read_pose(map["world_from_base"]);
+  if (arms == Arms::kOne) robot.world_from_base = read_pose(map["world_from_base"]);
   robot.limits = read_limits(map["limits"]);
   const auto count = static_cast<std::size_t>(robot.limits.position_min.size());
   robot.home = map["home"].axes(count, -kTurns, kTurns);

@@ -1,6 +1,7 @@
 // The parts of world.yaml that have a file of their own. Loading only: they throw LoadError.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -11,7 +12,19 @@
 
 namespace pons::world {
 
-[[nodiscard]] Robot read_robot(const YamlValue& value, const std::filesystem::path& folder);
+enum class Arms : std::uint8_t { kOne, kSeveral };
+
+// Of several arms without where it stands, which each says for itself.
+[[nodiscard]] Robot read_robot(const YamlValue& value, const std::filesystem::path& folder, Arms arms);
+
+// Mouths must not overlap; their resources must be among those of the world.
+[[nodiscard]] std::vector<Place> read_places(const YamlValue& value, const std::vector<Resource>& resources);
+// One exception chute, one tray, and somewhere to bring parcels to.
+void check_destinations(const YamlValue& value, const std::vector<Place>& places);
+// From `pick_x_min_m` and `pick_x_max_m`, on the belt.
+void read_pick_zone(const YamlMap& map, Belt& belt);
+// The stations of the arms, of a world of which all else is there; its places and its pick zone become those of all.
+void read_arms(const YamlValue& value, World& world);
 
 [[nodiscard]] Review read_review(const YamlValue& value);
 

@@ -28,11 +28,11 @@ constexpr double kSlowest = 0.05;      // share of the speed limits: slower, not
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
-Belt read_belt(const YamlValue& value) {
+Belt read_belt(const YamlValue& value, Arms arms) {
   const YamlMap map(value,
                     {"x_start_m", "x_end_m", "y_center_m", "width_m", "surface_z_m", "speed_m_s", "speed_variation",
-                     "speed_period_s", "pick_x_min_m", "pick_x_max_m"},
-                    {"ramp_m_s2"});
+                     "speed_period_s"},
+                    {"pick_x_min_m", "pick_x_max_m", "ramp_m_s2"});
   Belt belt;
   belt.x_start_m = map["x_start_m"].number(-kReach, kReach);
   belt.x_end_m = map["x_end_m"].number(-kReach, kReach);
@@ -44,61 +44,15 @@ Belt read_belt(const YamlValue& value) {
   belt.speed_variation = map["speed_variation"].number(0, 0.9);
   belt.speed_period_s = map["speed_period_s"].positive(kMaxSeconds);
   if (map.has("ramp_m_s2")) belt.ramp_m_s2 = map["ramp_m_s2"].positive(kMaxBeltRamp);
-  belt.pick_x_min_m = map["pick_x_min_m"].number(belt.x_start_m, belt.x_end_m);
-  belt.pick_x_max_m = map["pick_x_max_m"].number(belt.x_start_m, belt.x_end_m);
-  if (belt.pick_x_max_m <= belt.pick_x_min_m) {
-    map["pick_x_max_m"].refuse("is not above pick_x_min_m", "the pick zone runs along +x");
+  if (arms == Arms::kOne) {
+    for (const char* key : {"pick_x_min_m", "pick_x_max_m"}) {
+      if (!map.has(key)) map.value().refuse(fmt::format("key '{}' is missing", key), "the arm takes hold between them");
+    }
+    read_pick_zone(map, belt);
+  } else if (map.has("pick_x_min_m") || map.has("pick_x_max_m")) {
+    map.value().refuse("has a pick zone, and so has each of the arms", "leave it to them");
   }
   return belt;
-}
-
-constexpr std::array kPlaceKinds{PlaceKind::kChute, PlaceKind::kException, PlaceKind::kTray, PlaceKind::kRegion,
-                                 PlaceKind::kObstacle};
-
-PlaceKind read_place_kind(const YamlValue& value) {
-  const std::string word = value.text();
-  for (const PlaceKind kind : kPlaceKinds) {
-    if (word == name(kind)) return kind;
-  }
-  value.refuse(fmt::format("'{}' is no kind of place", printable(word)),
-               "write chute, exception, tray, region or obstacle");
-}
-
-bool mouths_overlap(const Place& a, const Place& b) {
-  const Vector3 apart = (a.center_m - b.center_m).cwiseAbs();
-  const Vector3 reach = (a.size_m + b.size_m) / 2;
-  return apart.x() < reach.x() && apart.y() < reach.y();
-}
-
-std::vector<Place> read_places(const YamlValue& value) {
-  std::vector<Place> places;
-  std::set<std::string> taken{"belt", "home"};  // each means something already
-  for (const YamlValue& entry : value.list(1, kMaxPlaces)) {
-    const YamlMap map(entry, {"name", "kind", "center", "size"});
-    Place place;
-    place.name = new_name(map["name"], taken);
-    place.kind = read_place_kind(map["kind"]);
-    place.center_m = map["center"].vector(kReach);
-    place.size_m = map["size"].vector(kReach);
-    if (place.size_m.minCoeff() <= 0) map["size"].refuse("is not above 0 everywhere", "write three lengths");
-    const bool mouth = place.kind == PlaceKind::kChute || place.kind == PlaceKind::kException;
-    for (const Place& other : places) {
-      const bool other_mouth = other.kind == PlaceKind::kChute || other.kind == PlaceKind::kException;
-      if (mouth && other_mouth && mouths_overlap(place, other)) {
-        map["center"].refuse(fmt::format("the mouth overlaps that of '{}'", other.name), "move one of them");
-      }
-    }
-    places.push_back(std::move(place));
-  }
-  const auto count = [&](PlaceKind kind) { return std::ranges::count(places, kind, &Place::kind); };
-  if (count(PlaceKind::kChute) == 0) value.refuse("there is no chute", "add a place of kind chute");
-  if (count(PlaceKind::kException) != 1) {
-    value.refuse(fmt::format("there are {} exception chutes", count(PlaceKind::kException)), "write exactly one");
-  }
-  if (count(PlaceKind::kTray) != 1) {
-    value.refuse(fmt::format("there are {} trays", count(PlaceKind::kTray)), "write exactly one");
-  }
-  return places;
 }
 
 CameraSpec read_camera(const YamlMap& map, const std::vector<Place>& places, const Belt& belt) {
@@ -279,7 +233,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.folder = folder;
   const YamlValue file = read_yaml(folder / "world.yaml");
   if (has_key(file, "base")) {
-    for (const char* of_a_cell : {"belt", "arrivals", "rules", "cameras", "places", "zones"}) {
+    for (const char* of_a_cell : {"belt", "arrivals", "rules", "cameras", "places", "zones", "arms"}) {
       if (has_key(file, of_a_cell))
         file.refuse(fmt::format("has both 'base' and '{}'", of_a_cell), "a world has a base, or a cell with an arm");
     }
@@ -287,15 +241,18 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   }
   const YamlMap map(
       file, {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "review", "zones"});
+      {"schedule", "review", "zones", "arms"});
   read_common(map, world);
-  world.robot = read_robot(map["robot"], folder);
-  world.belt = read_belt(map["belt"]);
-  world.places = read_places(map["places"]);
+  const Arms arms = map.has("arms") ? Arms::kSeveral : Arms::kOne;
+  world.robot = read_robot(map["robot"], folder, arms);
+  world.belt = read_belt(map["belt"], arms);
+  world.places = read_places(map["places"], world.resources);
+  if (arms == Arms::kOne) check_destinations(map["places"], world.places);
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   if (map.has("zones")) world.zones = read_zones(map["zones"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
+  if (arms == Arms::kSeveral) read_arms(map["arms"], world);
   return world;
 }
 
@@ -328,10 +285,13 @@ const Place* World::place(std::string_view place_name) const {
   return found == places.end() ? nullptr : &*found;
 }
 
+std::span<const World> World::arms() const { return stations.empty() ? std::span(this, 1) : std::span(stations); }
+
 std::vector<std::string> World::place_names() const {
   std::vector<std::string> names;
   for (const Place& known : places) {
-    if (known.kind != PlaceKind::kObstacle) names.push_back(known.name);
+    const bool named = std::ranges::find(names, known.name) != names.end();
+    if (known.kind != PlaceKind::kObstacle && !named) names.push_back(known.name);
   }
   return names;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,6 +74,7 @@ struct Place {
   PlaceKind kind = PlaceKind::kRegion;
   Vector3 center_m = Vector3::Zero();  // world frame
   Vector3 size_m = Vector3::Zero();    // along the world axes
+  std::string resource = {};           // what who brings something there holds beside the arm; empty: nothing
 };
 
 // Runs along +x of the world.
@@ -188,13 +190,20 @@ struct Base {
 
 // A world has a cell's robot (arm and tool, belt, arrivals, rules) or a base with its map. What belongs to the other
 // kind is empty.
+//
+// Several arms stand along one belt, each by a station of its own: where it hangs, what it takes hold of and where, its
+// mouths, its cameras. What one of them has of the world is a world again, with that arm alone: whoever works for one
+// arm needs no other, and what works in a world with one arm works there.
 struct World {
   std::string name;
   std::filesystem::path folder;
   std::filesystem::path scene_mjcf;
   double physics_step_s = 0;
-  Robot robot;
-  Belt belt;
+  Robot robot;              // of several arms what they have in common: their make
+  std::string arm = "arm";  // the resource that whoever moves the robot holds; of several arms each has its own
+  std::string next_arm;     // that may take what this one lets ride by; empty: none
+  Belt belt;                // picked from where any arm does
+  // Of several arms each has a mouth for the same destinations; of one name they are one destination.
   std::vector<Place> places;
   std::vector<CameraSpec> cameras;
   std::vector<Resource> resources;
@@ -206,10 +215,13 @@ struct World {
   std::optional<Base> base;
   std::optional<Grid> map;                   // of a world with a base, always
   std::vector<std::filesystem::path> tasks;  // likewise: what is asked of it when nobody asks for anything else
+  std::vector<World> stations;               // of several arms, in the order in which the belt passes them
 
-  // nullptr when there is none of that name.
+  // What each arm has of it, in that order. Of a world with one, that is the world itself.
+  [[nodiscard]] std::span<const World> arms() const;
+  // The first of that name; nullptr when there is none.
   [[nodiscard]] const Place* place(std::string_view place_name) const;
-  // Where something may be brought: all but obstacles.
+  // Where something may be brought: all but obstacles, each name once.
   [[nodiscard]] std::vector<std::string> place_names() const;
 };
 

@@ -52,7 +52,7 @@ class BrokenWorld : public ::testing::Test {
 
 TEST(Worlds, AllThatAreCommittedLoad) {
   const std::vector<std::string> names = list("worlds");
-  EXPECT_THAT(names, ElementsAre("parcel_cell", "rounds", "small_cell"));
+  EXPECT_THAT(names, ElementsAre("parcel_cell", "parcel_cell_two_arms", "rounds", "small_cell"));
   for (const std::string& name : names) {
     const auto world = load("worlds", name);
     ASSERT_TRUE(world) << world.error().line();

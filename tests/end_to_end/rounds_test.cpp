@@ -72,10 +72,10 @@ class RoundsTest : public ::testing::Test {
   void step() {
     now_ += runner::kControlPeriod;
     parts_.body.plant.advance(now_);
-    parts_.body.plant.body->read(sensors_);
-    parts_.body.photographer->open_shutters(now_, sensors_);
-    rounds_->cerebellum->step(now_, sensors_, *parts_.body.link, set_points_);
-    parts_.body.plant.body->write(set_points_);
+    parts_.body.robots.front().body->read(sensors_);
+    parts_.body.photographer->open_shutters(now_, {&sensors_, 1});
+    rounds_->cerebellum->step(now_, sensors_, *parts_.body.robots.front().link, set_points_);
+    parts_.body.robots.front().body->write(set_points_);
     if (now_.ns() % runner::kBridgePeriod.count() != 0) return;
     const auto ticked = parts_.bridge_side->tick(now_, *parts_.observer);
     ASSERT_TRUE(ticked) << ticked.error().line();
@@ -325,9 +325,9 @@ TEST_F(RoundsTest, TheLinkGoingSilentStopsIt) {
   while (now_ < end) {  // the bridge's side is not ticked any more
     now_ += runner::kControlPeriod;
     parts_.body.plant.advance(now_);
-    parts_.body.plant.body->read(sensors_);
-    rounds_->cerebellum->step(now_, sensors_, *parts_.body.link, set_points_);
-    parts_.body.plant.body->write(set_points_);
+    parts_.body.robots.front().body->read(sensors_);
+    rounds_->cerebellum->step(now_, sensors_, *parts_.body.robots.front().link, set_points_);
+    parts_.body.robots.front().body->write(set_points_);
   }
   EXPECT_LT(speed_m_s(), 0.005);
   EXPECT_EQ(rounds_->cerebellum->state().cause, link::StopCause::kHeartbeatLost);

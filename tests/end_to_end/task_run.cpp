@@ -45,15 +45,20 @@ TaskRun::TaskRun(world::World world, std::int64_t parcels, std::uint64_t seed)
       cell_(apps::Assembly::build(world_, world::draw_manifest(world_, parcels, seed).value(),
                                   {.journal = ":memory:", .body = {.seed = seed}})
                 .value()),
-      parts_(cell_->parts()) {}
+      parts_(cell_->parts()),
+      sensors_(parts_.body.robots.size()),
+      set_points_(parts_.body.robots.size()) {}
 
 void TaskRun::step() {
   now_ += runner::kControlPeriod;
   parts_.body.plant.advance(now_);
-  parts_.body.plant.body->read(sensors_);
+  std::vector<runner::RobotParts>& robots = parts_.body.robots;
+  for (std::size_t i = 0; i < robots.size(); ++i) robots[i].body->read(sensors_[i]);
   parts_.body.photographer->open_shutters(now_, sensors_);
-  cell_->body->cerebellum->step(now_, sensors_, *parts_.body.link, set_points_);
-  parts_.body.plant.body->write(set_points_);
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    robots[i].cerebellum->step(now_, sensors_[i], *robots[i].link, set_points_[i]);
+    robots[i].body->write(set_points_[i]);
+  }
   if (now_.ns() % runner::kBridgePeriod.count() != 0) return;
   const auto ticked = parts_.bridge_side->tick(now_, *parts_.observer);
   ASSERT_TRUE(ticked) << ticked.error().line();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/assembly.hpp"
 
@@ -30,11 +31,12 @@ class TaskRun {
 
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] sim::Simulation& simulation() { return *cell_->body->simulation; }
-  [[nodiscard]] const cerebellum::Cerebellum& cerebellum() const { return *cell_->body->cerebellum; }
+  [[nodiscard]] const cerebellum::Cerebellum& cerebellum() const { return cell_->body->arms.front()->cerebellum; }
   [[nodiscard]] const world::World& world() const { return world_; }
   [[nodiscard]] bridge::Bridge& bridge() { return *cell_->above->bridge; }
   [[nodiscard]] const bridge::Journal& journal() const { return *cell_->above->journal; }
   [[nodiscard]] apps::BodyHalf& body() { return *cell_->body; }
+  [[nodiscard]] apps::BridgeHalf& above() { return *cell_->above; }
 
   // Of the task that was awaited.
   task::Outcome outcome = task::Outcome::kCancelled;
@@ -45,8 +47,8 @@ class TaskRun {
   const world::World world_;
   const std::unique_ptr<apps::Assembly> cell_;
   runner::Parts parts_;
-  body::Sensors sensors_;
-  body::SetPoints set_points_;
+  std::vector<body::Sensors> sensors_;  // of each robot
+  std::vector<body::SetPoints> set_points_;
   Time now_;
 };
 

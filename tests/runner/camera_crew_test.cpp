@@ -71,7 +71,7 @@ struct Scene {
       simulation->advance_to(now);
       simulation->body().read(sensors);
       travel_m[now] = sensors.belt_travel_m;
-      photographer->open_shutters(now, sensors);
+      photographer->open_shutters(now, {&sensors, 1});
     }
     EXPECT_TRUE(photographer->health());
     return observer->collect(now, forgotten);
@@ -193,8 +193,9 @@ TEST(CameraCrew, InRealTimeABusyCameraSkipsAFrameAndAFailedOneEndsTheRun) {
   Photographer photographer(world, {&camera}, room.frames, room.pages, room.memory(), Pace::kRealTime);
   Observer observer(world, perception, room.frames, room.pages, room.memory(), Pace::kRealTime);
   const Time first(from_s(world.cameras[0].phase_s)), second = first + from_s(world.cameras[0].period_s);
-  photographer.open_shutters(first, {});
-  photographer.open_shutters(second, {});
+  const body::Sensors sensors;
+  photographer.open_shutters(first, {&sensors, 1});
+  photographer.open_shutters(second, {&sensors, 1});
   EXPECT_EQ(camera.begun, 1) << "the second frame was skipped, and nobody waited";
   EXPECT_FALSE(observer.collect(second, {}));
 

@@ -75,7 +75,7 @@ class RealTimeLoop : public testing::Test {
 
 // An emergency stop must not wait for the next tick: the word that is raised is the one on which the loop sleeps.
 TEST_F(RealTimeLoop, SleepsOnTheEmergencyWord) {
-  const auto word = reinterpret_cast<std::uintptr_t>(&parts_.body.link->emergency_word());
+  const auto word = reinterpret_cast<std::uintptr_t>(&parts_.body.robots.front().link->emergency_word());
   std::atomic<std::uintptr_t> slept_on{0};
   parts_.body.plant.advance = [&](Time now) {
     if (const int thread = loop_thread(); slept_on != word && thread != 0) slept_on = sleeps_on(thread);

@@ -137,9 +137,10 @@ std::vector<UseOf> Review::uses(const task::Task& task, const tree::Program* pro
   return uses;
 }
 
-Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, task::Moment moment) const {
+Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, task::Moment moment,
+                              const task::SkillRegistry& skills) const {
   auto asked = rules_.check(task, use, moment);
-  const task::SkillType* const type = skills_.find(use.skill);
+  const task::SkillType* const type = skills.find(use.skill);
   if (!asked || type == nullptr || !type->feasible) return asked;
   if (auto good = type->feasible(use.arguments, moment); !good) {
     good.error().what = fmt::format("the robot cannot do that: {}", good.error().what);
@@ -151,7 +152,7 @@ Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, tas
 Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& uses) const {
   Asked all;
   for (const UseOf& use : uses) {
-    auto asked = judge(task, use.use, task::Moment::kAdmission);
+    auto asked = judge(task, use.use, task::Moment::kAdmission, skills_);
     if (!asked && task.tree) continue;
     if (!asked) {
       asked.error().where = use.where;
@@ -162,8 +163,8 @@ Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& 
   return all;
 }
 
-Expected<Asked> Review::judge_start(const task::Task& task, const task::Step& use) {
-  auto asked = judge(task, use, task::Moment::kStart);
+Expected<Asked> Review::judge_start(const task::Task& task, const task::Step& use, const task::SkillRegistry& skills) {
+  auto asked = judge(task, use, task::Moment::kStart, skills);
   if (!asked || !task.tree) return asked;  // steps were claimed when the task was taken
   const UseOf started{use, {}};
   if (auto claimed = contradictions_.claim(task, {&started, 1}); !claimed) return std::unexpected(claimed.error());

@@ -46,8 +46,9 @@ class Review {
   // Whether it may be done, and by the robot. Not all leaves of a tree come to pass: what of them may not be done is
   // found out when it starts. Error: the first step that may not be.
   [[nodiscard]] Expected<Asked> judge(const task::Task& task, const std::vector<UseOf>& uses) const;
-  // Likewise of a use that starts now, and whether it contradicts another task.
-  [[nodiscard]] Expected<Asked> judge_start(const task::Task& task, const task::Step& use);
+  // Likewise of a use that starts now, of a robot with those skills, and whether it contradicts another task.
+  [[nodiscard]] Expected<Asked> judge_start(const task::Task& task, const task::Step& use,
+                                            const task::SkillRegistry& skills);
 
   [[nodiscard]] Rules& rules() { return rules_; }
   [[nodiscard]] Contradictions& contradictions() { return contradictions_; }
@@ -55,7 +56,8 @@ class Review {
  private:
   [[nodiscard]] Expected<void> check_resources(const task::SkillType& type, const std::string& where) const;
   [[nodiscard]] Expected<void> check_step(const task::Step& step, const std::string& where) const;
-  [[nodiscard]] Expected<Asked> judge(const task::Task& task, const task::Step& use, task::Moment moment) const;
+  [[nodiscard]] Expected<Asked> judge(const task::Task& task, const task::Step& use, task::Moment moment,
+                                      const task::SkillRegistry& skills) const;
 
   const task::SkillRegistry& skills_;
   std::vector<std::string> resources_;

@@ -79,7 +79,7 @@ TEST_F(ReviewTest, AsksWhetherTheRobotCanDoIt) {
   EXPECT_EQ(refused.error().line(), "/steps/1: the robot cannot do that: out of reach; ask for something nearer");
   EXPECT_TRUE(judge(R"([{"skill":"pick","arguments":{"object":"b"}}])"));
   EXPECT_EQ(asked, std::vector(3, task::Moment::kAdmission));
-  EXPECT_FALSE(review.judge_start({}, {"pick", Json::object()}));
+  EXPECT_FALSE(review.judge_start({}, {"pick", Json::object()}, skills));
   EXPECT_EQ(asked.back(), task::Moment::kStart);
 }
 

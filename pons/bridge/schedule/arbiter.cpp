@@ -28,12 +28,19 @@ void Arbiter::add(const Claim& claim) {
   entry.claim = claim;
   entry.number = added_++;
   entry.since = entry.ages_from = claim.accepted;
-  for (const std::string& name : claim.resources) {
+  entry.ways = {mask_of(claim.resources)};
+  for (const auto& resources : claim.instead) entry.ways.push_back(mask_of(resources));
+  wait(entry);
+}
+
+Arbiter::Mask Arbiter::mask_of(const std::vector<std::string>& resources) const {
+  Mask mask = 0;
+  for (const std::string& name : resources) {
     const auto bit = bits_.find(name);
     assert(bit != bits_.end());
-    entry.needs |= Mask{1} << bit->second;
+    mask |= Mask{1} << bit->second;
   }
-  wait(entry);
+  return mask;
 }
 
 bool Arbiter::remove(std::string_view id) {
@@ -54,14 +61,14 @@ void Arbiter::take_rank(Entry& entry) const {
   entry.counts_more.reset();
   if (gained < missing) entry.counts_more = entry.ages_from + (gained + 1) * schedule_.ageing;
   // Who stood up comes after all who count as much: a seat that it gave to one of them must not be its own again.
-  const bool again = entry.needs == 0 && entry.started;
+  const bool again = entry.needs() == 0 && entry.started;
   const Time deadline = counts == kAged || again ? kNever : claim.deadline.value_or(kNever);
   entry.rank = {-counts, deadline, again ? entry.since : claim.accepted, entry.number};
 }
 
 void Arbiter::wait(Entry& entry) {
   take_rank(entry);
-  lanes_[entry.needs].emplace(entry.rank, &entry);
+  lanes_[entry.ways].emplace(entry.rank, &entry);
   if (entry.counts_more) ageing_.emplace(std::pair(*entry.counts_more, entry.number), &entry);
   if (entry.claim.deadline && !entry.started)
     deadlines_.emplace(std::pair(*entry.claim.deadline, entry.number), &entry);
@@ -69,7 +76,7 @@ void Arbiter::wait(Entry& entry) {
 }
 
 void Arbiter::wait_no_more(Entry& entry) {
-  const auto lane = lanes_.find(entry.needs);
+  const auto lane = lanes_.find(entry.ways);
   lane->second.erase(entry.rank);
   if (lane->second.empty()) lanes_.erase(lane);
   if (entry.counts_more) ageing_.erase({*entry.counts_more, entry.number});
@@ -110,41 +117,64 @@ std::vector<std::string> Arbiter::queue() const {
 
 // ---- resources ----
 
-const Arbiter::Lanes::value_type* Arbiter::first_lane(const std::set<Mask>& passed) const {
-  const Lanes::value_type* first = nullptr;
-  for (const Lanes::value_type& lane : lanes_) {
-    if (passed.contains(lane.first)) continue;
-    if (first == nullptr || lane.second.begin()->first < first->second.begin()->first) first = &lane;
+const Arbiter::Entry* Arbiter::next(const std::set<Ways>& passed, const std::map<Ways, Rank>& looked) const {
+  const Lane::value_type* first = nullptr;
+  for (const auto& [ways, lane] : lanes_) {
+    if (passed.contains(ways)) continue;
+    const auto last = looked.find(ways);
+    const auto head = last == looked.end() ? lane.begin() : lane.upper_bound(last->second);
+    if (head != lane.end() && (first == nullptr || head->first < first->first)) first = &*head;
   }
-  return first;
+  return first == nullptr ? nullptr : first->second;
 }
 
-std::vector<std::string> Arbiter::grant(Time now) {
+std::vector<std::size_t> Arbiter::fitting(const Entry& entry, const Fits& fits) const {
+  std::vector<std::size_t> ways;
+  for (std::size_t way = 0; way < entry.ways.size(); ++way) {
+    if (!fits || fits(entry.claim.id, entry.way + way)) ways.push_back(way);
+  }
+  return ways;
+}
+
+std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
   now_ = now;
   age();
   std::vector<std::string> granted;
-  if (!changed_) return granted;
+  if (!changed_ && !fits) return granted;
   Mask taken = held_;
-  std::set<Mask> passed;
-  while (const Lanes::value_type* const lane = first_lane(passed)) {
-    const Mask needs = lane->first;
-    if (is_free(needs, taken)) {
-      Entry& entry = waiting_.find(lane->second.begin()->second->claim.id)->second;
-      wait_no_more(entry);  // and the lane may be no more
-      entry.started = true;
-      entry.since = now_;
-      held_ |= needs;
-      seated_ += needs == 0 ? 1 : 0;
-      granted.push_back(entry.claim.id);
-      running_.insert(waiting_.extract(entry.claim.id));
+  std::set<Ways> passed;
+  std::map<Ways, Rank> looked;
+  for (int looks = 0; looks < kLooks || !fits; ++looks) {
+    const Entry* const entry = next(passed, looked);
+    if (entry == nullptr) break;
+    const Ways ways = entry->ways;  // the entry may be elsewhere soon
+    looked.insert_or_assign(ways, entry->rank);
+    const std::vector<std::size_t> fit = fitting(*entry, fits);
+    const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free(ways[way], taken); });
+    if (free != fit.end()) {
+      taken |= ways[*free];
+      give(*entry, *free, granted);
     } else {
-      passed.insert(needs);
+      // It has to wait: nobody behind it may take what it waits for.
+      for (const std::size_t way : fit) taken |= ways[way];
     }
-    // Also where it has to wait: nobody behind it may take what it waits for.
-    taken |= needs;
+    if (std::ranges::none_of(ways, [&](Mask needs) { return is_free(needs, taken); })) passed.insert(ways);
   }
   changed_ = false;
   return granted;
+}
+
+void Arbiter::give(const Entry& waits, std::size_t way, std::vector<std::string>& granted) {
+  Entry& entry = waiting_.find(waits.claim.id)->second;
+  wait_no_more(entry);  // and the lane may be no more
+  entry.started = true;
+  entry.since = now_;
+  entry.way += way;
+  entry.ways = {entry.ways[way]};
+  held_ |= entry.needs();
+  seated_ += entry.needs() == 0 ? 1 : 0;
+  granted.push_back(entry.claim.id);
+  running_.insert(waiting_.extract(entry.claim.id));
 }
 
 bool Arbiter::is_free(Mask needs, Mask taken) const {
@@ -152,8 +182,8 @@ bool Arbiter::is_free(Mask needs, Mask taken) const {
 }
 
 void Arbiter::give_back(const Entry& entry) {
-  held_ &= ~entry.needs;
-  seated_ -= entry.needs == 0 ? 1 : 0;
+  held_ &= ~entry.needs();
+  seated_ -= entry.needs() == 0 ? 1 : 0;
 }
 
 void Arbiter::release(std::string_view id) {
@@ -185,7 +215,7 @@ bool Arbiter::gives_seat(const Entry& sits, const Entry& waits) const {
 void Arbiter::free_seats(const Lane& lane, const Stays& stays, std::map<std::string, std::string>& by) const {
   std::vector<const Entry*> sitting;
   for (const auto& [id, entry] : running_) {
-    if (entry.needs == 0 && !(stays && stays(id))) sitting.push_back(&entry);
+    if (entry.needs() == 0 && !(stays && stays(id))) sitting.push_back(&entry);
   }
   std::ranges::sort(sitting, [](const Entry* a, const Entry* b) {
     return std::tuple(-std::get<int>(a->rank), a->since, a->number) <
@@ -199,29 +229,36 @@ void Arbiter::free_seats(const Lane& lane, const Stays& stays, std::map<std::str
   }
 }
 
-std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays) const {
+// Whether all who hold any of it count less.
+bool Arbiter::gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const {
+  holders.clear();
+  for (const auto& [id, entry] : running_) {
+    if ((entry.needs() & needs) == 0) continue;
+    holders.push_back(id);
+    if (std::get<int>(entry.rank) <= std::get<int>(urgent.rank)) return false;
+  }
+  return true;
+}
+
+std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays, const Fits& fits) const {
   std::map<std::string, std::string> by;
   Mask claimed = 0;  // by those before: who comes after them gains nothing by a preemption
-  std::set<Mask> passed;
-  while (const Lanes::value_type* const lane = first_lane(passed)) {
-    passed.insert(lane->first);
-    if (lane->first == 0) {
-      free_seats(lane->second, stays, by);
+  std::set<Ways> passed;
+  while (const Entry* const first = next(passed, {})) {
+    passed.insert(first->ways);
+    if (first->ways == Ways{0}) {
+      free_seats(lanes_.find(first->ways)->second, stays, by);
       continue;
     }
-    const Entry& urgent = *lane->second.begin()->second;
-    const bool alone = (claimed & urgent.needs) == 0;
-    claimed |= urgent.needs;
-    if (!alone || urgent.claim.priority < schedule_.urgent_priority) continue;
-    std::vector<std::string> holders;
-    bool gives_way = true;
-    for (const auto& [id, entry] : running_) {
-      if ((entry.needs & urgent.needs) == 0) continue;
-      holders.push_back(id);
-      gives_way = gives_way && std::get<int>(entry.rank) > std::get<int>(urgent.rank);
+    for (const std::size_t way : fitting(*first, fits)) {
+      const Mask needs = first->ways[way];
+      const bool alone = (claimed & needs) == 0;
+      claimed |= needs;
+      std::vector<std::string> holders;
+      if (!alone || first->claim.priority < schedule_.urgent_priority || !gives_way(*first, needs, holders)) continue;
+      for (std::string& id : holders) by.emplace(std::move(id), first->claim.id);
+      break;
     }
-    if (!gives_way) continue;
-    for (std::string& id : holders) by.emplace(std::move(id), urgent.claim.id);
   }
   std::vector<Preemption> preemptions;
   for (auto& [running, urgent] : by) preemptions.push_back({running, urgent});

@@ -19,10 +19,11 @@ namespace pons::bridge {
 // What a task asks the arbiter for.
 struct Claim {
   std::string id;
-  int priority = 50;                   // 0 … 100, or kFirst
-  std::optional<Time> deadline;        // to start by
-  Time accepted;                       // it waits since then
-  std::vector<std::string> resources;  // twice named is once
+  int priority = 50;                                   // 0 … 100, or kFirst
+  std::optional<Time> deadline;                        // to start by
+  Time accepted;                                       // it waits since then
+  std::vector<std::string> resources;                  // twice named is once
+  std::vector<std::vector<std::string>> instead = {};  // other ways to do it, of which any one will do
 };
 
 // A task takes all its resources at once or waits; it never asks for more while it holds some, so that no circle of
@@ -31,16 +32,23 @@ struct Claim {
 // starved by tasks that need less. And with every `ageing` that it has waited it counts one priority more, at last more
 // than any brain may ask for, where acceptance alone decides: nor can it be starved by a stream of more important ones.
 //
+// Where a task can be done in several ways, as by either of two robots, it is granted the first that is free. Whoever
+// grants may say of each way whether it fits now; a way that does not keeps nobody waiting.
+//
 // Tasks that need no resource need a seat; there are `running` of them, all alike. Who needs resources needs no seat.
 // Seats are given in the same order. Trees may go round for ever, so seats are also shared by turns: who has waited for
 // one for `ageing` may have that of one that counts no more, and has had it for as long.
 //
 // add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
-// different sets of resources that are waited for.
+// different sets of resources that are waited for. Of those that may be done in several ways, or are asked whether they
+// fit, at most kLooks are looked at in one grant().
 class Arbiter {
  public:
   static constexpr std::size_t kMaxResources = 64;
   static constexpr int kFirst = 102;  // the priority of a task that goes before all others
+  static constexpr int kLooks = 256;
+  // Whether a queued task could be done in that way (0: Claim::resources, then Claim::instead) now.
+  using Fits = std::function<bool(std::string_view id, std::size_t way)>;
 
   // At most kMaxResources names, each once.
   Arbiter(const std::vector<std::string>& resources, const world::Schedule& schedule);
@@ -48,11 +56,13 @@ class Arbiter {
   // Queues a task whose resources are all known and whose id is neither queued nor running (asserted).
   void add(const Claim& claim);
   // The tasks that may start now, in order; they hold their resources from here on. `now` must not run back.
-  [[nodiscard]] std::vector<std::string> grant(Time now);
+  [[nodiscard]] std::vector<std::string> grant(Time now, const Fits& fits = {});
+  // In which way a task that runs was granted.
+  [[nodiscard]] std::size_t way(std::string_view id) const { return running_.find(id)->second.way; }
   // A task that was granted has ended.
   void release(std::string_view id);
-  // A task that was granted waits again, at the place in the queue that the age gives it with which it was granted; its
-  // deadline was met.
+  // A task that was granted waits again, for the same way, at the place in the queue that the age gives it with which
+  // it was granted; its deadline was met.
   void hand_over(std::string_view id);
   // Takes a task out of the queue; false when it is not in it.
   bool remove(std::string_view id);
@@ -66,7 +76,7 @@ class Arbiter {
     std::string running, by;
   };
   using Stays = std::function<bool(std::string_view id)>;
-  [[nodiscard]] std::vector<Preemption> preemptions(const Stays& stays = {}) const;
+  [[nodiscard]] std::vector<Preemption> preemptions(const Stays& stays = {}, const Fits& fits = {}) const;
 
   [[nodiscard]] std::vector<std::string> queue() const;  // in order
   [[nodiscard]] std::size_t queue_length() const { return waiting_.size(); }
@@ -75,9 +85,12 @@ class Arbiter {
   using Mask = std::uint64_t;
   // Priority negated, aged; deadline, or the end of time; acceptance, or since when for a seat again; what came first.
   using Rank = std::tuple<int, Time, Time, std::uint64_t>;
+  using Ways = std::vector<Mask>;
   struct Entry {
     Claim claim;
-    Mask needs = 0;
+    Ways ways;            // those it may take
+    std::size_t way = 0;  // of the claim's, the first that it may take, or the one granted
+    [[nodiscard]] Mask needs() const { return ways.front(); }  // of a running one: what it holds
     std::uint64_t number = 0;
     Rank rank;                        // by which it waits, or was granted
     std::optional<Time> counts_more;  // while it waits: from when on
@@ -88,16 +101,20 @@ class Arbiter {
   using Entries = std::map<std::string, Entry, std::less<>>;
   // Those that wait for the same resources, of which only the first can be next; with none, for a seat.
   using Lane = std::map<Rank, const Entry*>;
-  using Lanes = std::map<Mask, Lane>;
+  using Lanes = std::map<Ways, Lane>;
   // Of waiting entries, by a time of theirs.
   using Agenda = std::map<std::pair<Time, std::uint64_t>, Entry*>;
 
+  [[nodiscard]] Mask mask_of(const std::vector<std::string>& resources) const;
   void wait(Entry& entry);
   void wait_no_more(Entry& entry);
   void age();
   void take_rank(Entry& entry) const;
-  // The lane whose head comes first, of those that are none of `passed`; null when there is none.
-  [[nodiscard]] const Lanes::value_type* first_lane(const std::set<Mask>& passed) const;
+  // The first entry of all lanes that are none of `passed`, and in each behind the one looked at last; null: none.
+  [[nodiscard]] const Entry* next(const std::set<Ways>& passed, const std::map<Ways, Rank>& looked) const;
+  [[nodiscard]] std::vector<std::size_t> fitting(const Entry& entry, const Fits& fits) const;
+  void give(const Entry& entry, std::size_t way, std::vector<std::string>& granted);
+  [[nodiscard]] bool gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const;
   [[nodiscard]] bool is_free(Mask needs, Mask taken) const;
   void give_back(const Entry& entry);
   [[nodiscard]] bool gives_seat(const Entry& sits, const Entry& waits) const;

@@ -401,5 +401,79 @@ TEST(Arbiter, NeverGivesAResourceTwiceAndForgetsNobody) {
   EXPECT_GT(ended, 4'000u);
 }
 
+// ---- several ways to do it ----
+
+Claim either(std::string id, int priority, Ids one, Ids other) {
+  Claim claim{std::move(id), priority, {}, {}, std::move(one)};
+  claim.instead.push_back(std::move(other));
+  return claim;
+}
+
+TEST(Arbiter, WhatCanBeDoneInTwoWaysTakesTheFirstThatIsFree) {
+  Arbiter arbiter({"left", "right", "zone"}, {});
+  arbiter.add(claim("holder", 50, {"left"}));
+  arbiter.add(either("a", 50, {"left"}, {"right", "zone"}));
+  arbiter.add(either("b", 50, {"left"}, {"right", "zone"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"holder", "a"}));
+  EXPECT_EQ(arbiter.way("a"), 1U);
+  arbiter.add(claim("zone", 50, {"zone"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{}) << "it holds all that its way needs";
+  arbiter.release("holder");
+  EXPECT_EQ(arbiter.grant({}), (Ids{"b"}));
+  EXPECT_EQ(arbiter.way("b"), 0U);
+}
+
+TEST(Arbiter, AWayThatDoesNotFitKeepsNobodyWaiting) {
+  Arbiter arbiter({"left", "right"}, {});
+  bool fits_right = false;
+  const Arbiter::Fits fits = [&](std::string_view id, std::size_t way) {
+    return id != "rides" || (way == 1 && fits_right);
+  };
+  arbiter.add(either("rides", 90, {"left"}, {"right"}));
+  arbiter.add(either("comes", 50, {"left"}, {"right"}));
+  EXPECT_EQ(arbiter.grant({}, fits), (Ids{"comes"})) << "before one that counts more";
+  EXPECT_EQ(arbiter.grant({}, fits), Ids{});
+  fits_right = true;
+  EXPECT_EQ(arbiter.grant(at(1), fits), (Ids{"rides"})) << "though nothing was added or released";
+  EXPECT_EQ(arbiter.way("rides"), 1U);
+}
+
+TEST(Arbiter, AWayThatFitsAndIsTakenIsKeptForWhoWaitsForIt) {
+  Arbiter arbiter({"left", "right", "zone"}, {});
+  const Arbiter::Fits fits = [](std::string_view id, std::size_t way) { return id != "waits" || way == 1; };
+  arbiter.add(claim("holder", 50, {"zone"}));
+  EXPECT_EQ(arbiter.grant({}, fits), (Ids{"holder"}));
+  arbiter.add(either("waits", 60, {"left"}, {"right", "zone"}));
+  arbiter.add(claim("later", 50, {"right"}));
+  arbiter.add(claim("other", 50, {"left"}));
+  EXPECT_EQ(arbiter.grant({}, fits), (Ids{"other"})) << "what it waits for is not taken, what it cannot use is";
+}
+
+TEST(Arbiter, WhoHasBegunInOneWayGoesOnInIt) {
+  Arbiter arbiter({"left", "right"}, {.urgent_priority = 90});
+  arbiter.add(either("begun", 50, {"left"}, {"right"}));
+  arbiter.add(claim("beside", 50, {"right"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"begun", "beside"}));
+  arbiter.add(claim("urgent", 95, {"left"}));
+  ASSERT_EQ(arbiter.grant({}), Ids{});
+  ASSERT_EQ(arbiter.preemptions().size(), 1U);
+  EXPECT_EQ(arbiter.preemptions().front().running, "begun");
+  arbiter.hand_over("begun");
+  arbiter.release("beside");
+  EXPECT_EQ(arbiter.grant({}), (Ids{"urgent"})) << "the other way is free, and not taken";
+  arbiter.release("urgent");
+  EXPECT_EQ(arbiter.grant({}), (Ids{"begun"}));
+  EXPECT_EQ(arbiter.way("begun"), 0U);
+}
+
+// Of ways that do not fit so many are looked at in one grant.
+TEST(Arbiter, LooksAreBounded) {
+  Arbiter arbiter({"left", "right"}, {});
+  for (int i = 0; i < 5000; ++i) arbiter.add(either(fmt::format("t{:04}", i), 50, {"left"}, {"right"}));
+  int looks = 0;
+  EXPECT_EQ(arbiter.grant({}, [&](std::string_view, std::size_t) { return ++looks < 0; }), Ids{});
+  EXPECT_EQ(looks, 2 * Arbiter::kLooks);
+}
+
 }  // namespace
 }  // namespace pons::bridge

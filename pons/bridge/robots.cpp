@@ -1,0 +1,112 @@
+// Which robot a task runs on, and what becomes of tasks when one stops.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "pons/bridge/bridge.hpp"
+#include "pons/bridge/journal/story.hpp"
+#include "pons/bridge/open_task.hpp"
+
+namespace pons::bridge {
+namespace {
+
+void add(std::vector<std::string>& resources, const task::SkillType& type, const Json& arguments) {
+  resources.insert(resources.end(), type.resources.begin(), type.resources.end());
+  if (!type.holds) return;
+  std::ranges::move(type.holds(arguments), std::back_inserter(resources));
+}
+
+}  // namespace
+
+void Bridge::add_robot(const task::SkillRegistry& skills) {
+  robots_.push_back({world_.arms()[robots_.size()].arm, &skills});
+}
+
+bool Bridge::held() const {
+  return std::ranges::all_of(robots_, [](const Robot& robot) { return robot.hold != Hold::kOff; });
+}
+
+std::vector<std::string> Bridge::resources_for(const task::Task& task, const tree::Program* program,
+                                               std::size_t robot) const {
+  std::vector<std::string> resources;
+  if (program != nullptr) {
+    resources = program->resources;
+    for (const tree::SkillUse& use : program->uses)
+      add(resources, *use.type, use.bound.empty() ? use.arguments : Json());
+  }
+  for (const task::Step& step : task.steps) add(resources, *robots_[robot].skills->find(step.skill), step.arguments);
+  return resources;
+}
+
+// The first one's the review has seen to be there.
+std::vector<std::size_t> Bridge::robots_for(const task::Task& task, const tree::Program* program) const {
+  std::vector<std::size_t> robots{0};
+  if (task.tree || resources_for(task, program, 0).empty()) return robots;
+  for (std::size_t robot = 1; robot < robots_.size(); ++robot) {
+    const bool can = std::ranges::all_of(task.steps, [&](const task::Step& step) {
+      const task::SkillType* const type = robots_[robot].skills->find(step.skill);
+      return type != nullptr && (!type->feasible || type->feasible(step.arguments, task::Moment::kAdmission));
+    });
+    if (can) robots.push_back(robot);
+  }
+  return robots;
+}
+
+// Of all steps the worst: what has gone is gone, what cannot be taken yet is waited for.
+task::Chance Bridge::chance(const Open& open, std::size_t robot) const {
+  auto worst = task::Chance::kNow;
+  for (const task::Step& step : open.task.steps) {
+    const task::SkillType& type = *robots_[robot].skills->find(step.skill);
+    const task::Chance chance = type.chance ? type.chance(step.arguments) : task::Chance::kNow;
+    if (chance == task::Chance::kGone) return chance;
+    if (chance == task::Chance::kNotYet) worst = chance;
+  }
+  return worst;
+}
+
+// What no robot that works can take any more is given to any: its skill says what has become of it.
+Arbiter::Fits Bridge::fits() const {
+  if (robots_.size() == 1) return {};
+  return [this](std::string_view id, std::size_t way) {
+    const Open& open = *open_.find(id)->second;
+    const std::size_t robot = open.robots[way];
+    if (is_held(robot)) return false;
+    if (open.begun || open.robots.size() == 1) return true;
+    const task::Chance own = chance(open, robot);
+    if (own != task::Chance::kGone) return own == task::Chance::kNow;
+    return std::ranges::all_of(open.robots, [&](std::size_t other) {
+      return robots_[other].hold == Hold::kGone || chance(open, other) == task::Chance::kGone;
+    });
+  };
+}
+
+// ---- emergency stop ----
+
+void Bridge::emergency_stop(Time now, std::string_view cause, std::size_t robot) {
+  if (std::exchange(robots_[robot].emergency, true)) return;
+  const bool all = std::ranges::all_of(robots_, &Robot::emergency);
+  const auto concerned = [&](const Open& open) { return open.stage == Open::Stage::kRuns ? open.robot == robot : all; };
+  if (on_emergency_stop_ == world::OnEmergencyStop::kCancel) {
+    end_those(concerned, now, fmt::format("stopped: {}", cause));
+    return;
+  }
+  for (const auto& [id, open] : open_) {
+    if (!concerned(*open)) continue;
+    open->held = true;
+    unkept_ = true;
+    tell(*open, now, kHeldEvent, {{"cause", cause}});
+  }
+}
+
+void Bridge::released(Time now, std::size_t robot) {
+  if (!std::exchange(robots_[robot].emergency, false)) return;
+  for (const auto& [id, open] : open_) {
+    if (open->stage == Open::Stage::kRuns && open->robot != robot) continue;
+    if (!std::exchange(open->held, false)) continue;
+    unkept_ = true;
+    tell(*open, now, kReleasedEvent);
+  }
+}
+
+}  // namespace pons::bridge

@@ -1,0 +1,171 @@
+// Two robots behind one bridge: who gets which task, and what becomes of it when one stops.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <optional>
+
+#include "pons/bridge/journal/story.hpp"
+#include "pons/bridge/test_bridge.hpp"
+
+namespace pons::bridge {
+namespace {
+
+using task::Chance;
+
+class Robots : public testing::Test {
+ protected:
+  Robots() {
+    for (std::size_t robot = 0; robot < 2; ++robot) {
+      task::SkillType type = actors_[robot].type();
+      type.resources = {world_.stations[robot].arm};
+      type.holds = [this, robot](const Json& arguments) {
+        return arguments.value("object", "") == zoned_[robot] ? std::vector<std::string>{"between"}
+                                                              : std::vector<std::string>{};
+      };
+      type.chance = [this, robot](const Json&) { return chance_[robot]; };
+      skills_[robot].add(type);
+    }
+    bridge_.emplace(*journal_, skills_[0], world_);
+    bridge_->add_robot(skills_[1]);
+  }
+  void submit(const std::string& id, const std::string& rest = "") {
+    ASSERT_TRUE(bridge_->submit(
+        fmt::format(R"({{"id":"{}","steps":[{{"skill":"pick","arguments":{{"object":"{}"}}}}]{}}})", id, id, rest),
+        now_));
+  }
+  void tick(int times = 1) {
+    for (; times > 0; --times) bridge_->tick(now_ += from_s(0.01));
+  }
+  // The robot that began the task, by the journal; empty when none has.
+  std::string robot_of(const std::string& id) {
+    const auto events = journal_->task(id).value()->events;
+    for (const Event& event : events) {
+      if (event.kind == kStartedEvent) return event.detail.at("robot");
+    }
+    return {};
+  }
+  std::optional<OutcomeRecord> recorded(const std::string& id) {
+    return journal_->task(id).value().value().record.outcome;
+  }
+
+  TemporaryFolder folder_;
+  world::World world_ = [] {
+    world::World world;
+    world.resources = {{"arm_1"}, {"arm_2"}, {"between"}};
+    for (const char* name : {"arm_1", "arm_2"}) {
+      world::World station;
+      station.arm = name;
+      world.stations.push_back(std::move(station));
+    }
+    return world;
+  }();
+  std::array<Actor, 2> actors_{{{"pick", {{.ticks = 20}}}, {"pick", {{.ticks = 20}}}}};
+  std::array<task::SkillRegistry, 2> skills_;
+  std::array<Chance, 2> chance_{Chance::kNow, Chance::kNow};
+  std::array<std::string, 2> zoned_;  // what holds the zone, too
+  std::unique_ptr<Journal> journal_ = std::move(*Journal::open(folder_ / "day.db"));
+  std::optional<Bridge> bridge_;
+  Time now_;
+};
+
+TEST_F(Robots, EachTaskRunsOnOneThatIsFree) {
+  submit("a");
+  submit("b");
+  submit("c");
+  tick(2);
+  EXPECT_EQ(robot_of("a"), "arm_1");
+  EXPECT_EQ(robot_of("b"), "arm_2");
+  EXPECT_EQ(robot_of("c"), "");
+  EXPECT_TRUE(bridge_->uses_resources(0) && bridge_->uses_resources(1));
+  tick(60);
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_EQ(actors_[0].log.started.size() + actors_[1].log.started.size(), 3U);
+}
+
+TEST_F(Robots, WhatRidesByOneIsTheOthers) {
+  chance_ = {Chance::kGone, Chance::kNotYet};
+  submit("a");
+  tick(10);
+  EXPECT_EQ(robot_of("a"), "") << "the first has missed it, the second waits for it";
+  chance_[1] = Chance::kNow;
+  tick();
+  EXPECT_EQ(robot_of("a"), "arm_2");
+}
+
+TEST_F(Robots, WhatHasGonePastAllIsGivenToAnyAndItsSkillSaysSo) {
+  chance_ = {Chance::kGone, Chance::kGone};
+  submit("a");
+  tick(30);
+  EXPECT_TRUE(recorded("a"));
+}
+
+TEST_F(Robots, AHeldOneStartsNothingAndTheOtherGoesOn) {
+  bridge_->hold(Bridge::Hold::kOn, 0);
+  EXPECT_FALSE(bridge_->held());
+  submit("a");
+  submit("b");
+  tick(60);
+  EXPECT_EQ(robot_of("a"), "arm_2");
+  EXPECT_EQ(robot_of("b"), "arm_2");
+  EXPECT_TRUE(actors_[0].log.started.empty());
+  bridge_->hold(Bridge::Hold::kOn, 1);
+  EXPECT_TRUE(bridge_->held());
+}
+
+// One that will go on by itself is waited for; one that waits for a person is not.
+TEST_F(Robots, WhatOnlyAStoppedOneCouldTakeWaitsUnlessThatOneIsGone) {
+  chance_ = {Chance::kGone, Chance::kNow};
+  bridge_->hold(Bridge::Hold::kOn, 1);
+  submit("a");
+  tick(10);
+  EXPECT_EQ(robot_of("a"), "");
+  bridge_->hold(Bridge::Hold::kGone, 1);
+  tick();
+  EXPECT_EQ(robot_of("a"), "arm_1");
+}
+
+TEST_F(Robots, ABegunTaskStaysWhereItIsAndItsTimeStands) {
+  submit("a");
+  tick(5);
+  ASSERT_EQ(robot_of("a"), "arm_1");
+  bridge_->hold(Bridge::Hold::kGone, 0);
+  const int before = actors_[0].log.ticks;
+  tick(2000);  // its timeout is 10 s
+  EXPECT_GT(actors_[0].log.ticks, before);
+  EXPECT_TRUE(actors_[1].log.started.empty());
+  EXPECT_EQ(actors_[0].log.cancels, 0);
+}
+
+TEST_F(Robots, TakeTurnsInTheZoneBetweenThem) {
+  zoned_ = {"a", "b"};
+  chance_[0] = Chance::kNow;
+  submit("a");
+  submit("b");
+  submit("c");
+  tick(2);
+  EXPECT_EQ(robot_of("a"), "arm_1");
+  EXPECT_EQ(robot_of("b"), "") << "on the second it needs what the first one's task holds";
+  EXPECT_EQ(robot_of("c"), "") << "and nobody overtakes it";
+  tick(100);
+  EXPECT_TRUE(bridge_->idle());
+}
+
+TEST_F(Robots, AnEmergencyStopHoldsWhatItsRobotRuns) {
+  submit("a");
+  submit("b");
+  submit("c");
+  tick(2);
+  bridge_->emergency_stop(now_, "stop input", 0);
+  const auto has_held = [&](const std::string& id) {
+    const auto events = journal_->task(id).value()->events;
+    return std::ranges::any_of(events, [](const Event& event) { return event.kind == kHeldEvent; });
+  };
+  EXPECT_TRUE(has_held("a"));
+  EXPECT_FALSE(has_held("b"));
+  EXPECT_FALSE(has_held("c")) << "the other may run it";
+  bridge_->emergency_stop(now_, "stop input", 1);
+  EXPECT_TRUE(has_held("b") && has_held("c"));
+}
+
+}  // namespace
+}  // namespace pons::bridge
