@@ -286,14 +286,17 @@ bool Cell::stands_in_zone() {
 bool Cell::lets_pass() {
   const AxisVector& position = arm.state().position;
   if (position.size() != model.axes()) return false;
-  const double load_m = held ? held->load.size_m.z() : 0;
+  const double load_m = held ? held->load.size_m.norm() : 0;
+  const world::Belt& belt = world.belt;
   std::vector<model::PlacedCapsule> capsules;
   model.place_capsules(position, capsules);
   return std::ranges::all_of(capsules, [&](const model::PlacedCapsule& capsule) {
-    const double near_y =
-        std::min(std::abs(capsule.from.y() - world.belt.y_center_m), std::abs(capsule.to.y() - world.belt.y_center_m));
-    const double low_z = std::min(capsule.from.z(), capsule.to.z()) - capsule.radius_m - load_m;
-    return near_y > 0.5 * world.belt.width_m + capsule.radius_m + load_m || low_z > world.belt.surface_z_m + kTallest_m;
+    const double around_m = capsule.radius_m + load_m;
+    const double low_z = std::min(capsule.from.z(), capsule.to.z()) - around_m;
+    const double from_y = std::min(capsule.from.y(), capsule.to.y()) - around_m;
+    const double to_y = std::max(capsule.from.y(), capsule.to.y()) + around_m;
+    const bool over_belt = to_y > belt.y_center_m - 0.5 * belt.width_m && from_y < belt.y_center_m + 0.5 * belt.width_m;
+    return !over_belt || low_z > belt.surface_z_m + kTallest_m;
   });
 }
 
