@@ -139,6 +139,8 @@ class Bridge {
   [[nodiscard]] std::string_view state(std::string_view id) const;
   // Waiting ones that a person has paused, or is asked about.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
+  // Those, and the ones that a robot has begun which is gone: nobody need wait for what they are about.
+  [[nodiscard]] std::set<std::string> set_aside() const;
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
   [[nodiscard]] bool idle() const { return open_.empty(); }

@@ -27,6 +27,14 @@ bool Bridge::held() const {
   return std::ranges::all_of(robots_, [](const Robot& robot) { return robot.hold != Hold::kOff; });
 }
 
+std::set<std::string> Bridge::set_aside() const {
+  std::set<std::string> ids = parked_;
+  for (const auto& [id, open] : running_) {
+    if (robots_[open->robot].hold == Hold::kGone) ids.insert(id);
+  }
+  return ids;
+}
+
 std::vector<std::string> Bridge::resources_for(const task::Task& task, const tree::Program* program,
                                                std::size_t robot) const {
   std::vector<std::string> resources;

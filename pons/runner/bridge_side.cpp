@@ -162,7 +162,7 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       taken_until_m = std::max(taken_until_m.value_or(robot->skills.takes_until_m), robot->skills.takes_until_m);
   }
   if (taken_until_m) brain_.taken_until(*taken_until_m);
-  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
+  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.set_aside());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
