@@ -24,8 +24,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 struct ArmPositions {
   ArmPositions() = default;
   template <typename Positions>
-  ArmPositions(const Eigen::MatrixBase<Positions>& only)
-      : of{AxisVector(only)} {}         // NOLINT(google-explicit-constructor)
+  ArmPositions(const Eigen::MatrixBase<Positions>& only)  // NOLINT(google-explicit-constructor)
+      : of{AxisVector(only)} {}
   std::array<AxisVector, kMaxArms> of;  // rad
 };
 
