@@ -21,8 +21,8 @@ class Desk {
  public:
   // The stream of chunks that goes on, or null.
   using Stream = std::function<task::ChunkStream*()>;
-  // All but the visitors must outlive it. `arming` is that of each robot: a stop is for all of them, a reset and an arming
-  // for those that wait for a person.
+  // All but the visitors must outlive it. `arming` is that of each robot: a stop is for all of them, a reset and an
+  // arming for those that wait for a person.
   Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
        std::vector<runner::Arming*> arming, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
