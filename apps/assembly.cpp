@@ -44,13 +44,18 @@ Expected<std::string> body_in(const bridge::Journal& journal) {
 
 }  // namespace
 
-bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
+bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done) {
   using Fate = skills::TakeUp::Fate;
-  switch (fate) {
+  switch (take_up.fate(task, done)) {
     case Fate::kGoesOn:
       return {.done = done};
     case Fate::kDone:
       return {.done = done + 1};
+    case Fate::kAstray:
+      return {done,
+              task::Outcome::kException,
+              "fell into " + take_up.fell_into() + " while no bridge lived",
+              {{"fell_into", take_up.fell_into()}}};
     case Fate::kLost:
       return {done, task::Outcome::kFailed, "lost from the cups while no bridge lived"};
     case Fate::kBroken:
@@ -197,8 +202,7 @@ runner::SkillPort BridgeHalf::skill_port() {
           .release_emergency = [this] { end.clear_emergency_stop(); },
           .carries = [this] { return take_up->carries(); },
           .restore = [this](const task::Json& carried) { take_up->restore(carried); },
-          .resume = [this](const task::Task& task,
-                           std::size_t done) { return resumption(take_up->fate(task, done), done); },
+          .resume = [this](const task::Task& task, std::size_t done) { return resumption(*take_up, task, done); },
           .settle = [this](Time now) { return take_up->settle(now); }};
 }
 

@@ -140,6 +140,6 @@ class Assembly {
 };
 
 // What becomes of a task that a bridge which is no more had begun, of whose steps so many were done.
-[[nodiscard]] bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done);
+[[nodiscard]] bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done);
 
 }  // namespace pons::apps

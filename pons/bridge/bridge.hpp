@@ -55,6 +55,7 @@ struct Resumption {
   std::size_t done = 0;                  // so many of its first steps have succeeded, by the look of the world
   std::optional<task::Outcome> outcome;  // nothing: it goes on with the next step; when there is none, it SUCCEEDED
   std::string reason;                    // of the outcome
+  Json detail = Json::object();          // of the step that it comes from
 };
 // Looks at the world. `done`: of so many of its first steps the journal has it; an answer of fewer counts as that many.
 // Of a tree it is asked for each skill that nobody saw end, as for a task of that one step.
@@ -202,7 +203,8 @@ class Bridge {
   void end_running(Open& open, Ending ending, Time now, std::string_view reason);
   void end_waiting(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
-  void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now);
+  void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now,
+                       Json detail = Json::object());
   [[nodiscard]] Expected<void> journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
   void keep(const Expected<void>& written);
   void set_fault(Error error);

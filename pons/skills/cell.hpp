@@ -2,6 +2,7 @@
 // a bridge, one thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -86,6 +87,11 @@ class Cell {
   // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
   // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
+  // How often something fell into each of the world's places, as their light curtains count it; and the chute into
+  // which something has since, nullptr where none: what rides off the belt's end breaks no chute's.
+  using Falls = std::array<std::uint16_t, kMaxPlaces>;
+  [[nodiscard]] const Falls& falls() const { return arm.state().fallen_into; }
+  [[nodiscard]] const world::Place* fallen_since(const Falls& before) const;
   // For the journal, of whatever task runs.
   void note(std::string kind, task::Json detail) { notes_.push_back({std::move(kind), std::move(detail)}); }
   // Since the last call, the motions that were sent among them.

@@ -54,7 +54,7 @@ class Place final : public ArmSkill {
         object_(std::move(object)),
         started_(now),
         delay_(cell.arm),
-        fallen_into_(cell.arm.state().fallen_into) {}
+        falls_(cell.falls()) {}
 
   Progress tick(Time now) override {
     move_along(delay_.take());
@@ -246,14 +246,10 @@ class Place final : public ArmSkill {
   // is seen again.
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_}};
-    for (std::size_t i = 0; i < cell_.world.places.size(); ++i) {
-      const world::Place& place = cell_.world.places[i];
-      // What rides off the belt's end falls through the exception chute's.
-      if (place.kind != world::PlaceKind::kChute) continue;
-      if (cell_.arm.state().fallen_into[i] == fallen_into_[i]) continue;
-      if (place.name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
-      detail["fell_into"] = place.name;
-      return {Status::kException, "fell into " + place.name, std::move(detail)};
+    if (const world::Place* const chute = cell_.fallen_since(falls_)) {
+      if (chute->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
+      detail["fell_into"] = chute->name;
+      return {Status::kException, "fell into " + chute->name, std::move(detail)};
     }
     if (now < fell_at_ + kFallsWithin) return {};
     return {Status::kFailed, "dropped", std::move(detail)};
@@ -312,8 +308,8 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
-  std::array<std::uint16_t, kMaxPlaces> fallen_into_;  // before it was carried
-  std::string fallen_;                                 // what the cups lost on the way
+  Cell::Falls falls_;   // before it was carried
+  std::string fallen_;  // what the cups lost on the way
   Time fell_at_;
   bool cancelled_ = false;
 };

@@ -38,13 +38,15 @@ Json TakeUp::carries() const {
           {"mass_kg", held.mass_kg},
           {"size_m", of(held.load.size_m)},
           {"yaw_rad", held.load.yaw_in_tip_rad},
-          {"offset_m", of(held.load.offset_in_tip_m)}};
+          {"offset_m", of(held.load.offset_in_tip_m)},
+          {"falls", cell_.falls()}};
 }
 
 void TakeUp::restore(const Json& carried) {
   cell_.unseen_end(kTall_m);
   if (!carried.is_object()) return;
   carried_ = carried.value("code", std::string{});
+  if (carried.contains("falls")) falls_ = carried["falls"].get<Cell::Falls>();
   if (cell_.arm.cups().open) {
     cell_.holds_nothing();
     return;
@@ -64,7 +66,14 @@ TakeUp::Fate TakeUp::fate(const task::Task& task, std::size_t done) const {
   if (object.empty() || object != carried_) return Fate::kBroken;
   if (cell_.held) return Fate::kGoesOn;
   if (next.skill != "place") return Fate::kBroken;
-  return is_over(next.arguments.value("place", std::string{})) ? Fate::kDone : Fate::kLost;
+  const auto place = next.arguments.value("place", std::string{});
+  if (const std::string chute = fell_into(); !chute.empty()) return chute == place ? Fate::kDone : Fate::kAstray;
+  return is_over(place) ? Fate::kDone : Fate::kLost;  // let go of there, and still falling
+}
+
+std::string TakeUp::fell_into() const {
+  const world::Place* const chute = falls_ && !cell_.held ? cell_.fallen_since(*falls_) : nullptr;
+  return chute != nullptr ? chute->name : std::string();
 }
 
 bool TakeUp::is_over(const std::string& name) const {

@@ -157,7 +157,7 @@ runner::SkillPort Process::skill_port() {
 // A printer remembers what it has printed.
 Resumption Process::resume(const task::Task& task, std::size_t done) {
   const task::Step& next = task.steps[done];
-  if (next.skill != "print") return apps::resumption(take_up_.fate(task, done), done);
+  if (next.skill != "print") return apps::resumption(take_up_, task, done);
   const Json& arguments = next.arguments;
   const int printed =
       outside_.plant.printed(arguments.at("task").get<std::string>(), arguments.at("number").get<int>());
