@@ -32,7 +32,9 @@ constexpr double kSlowGripShare = 0.70;
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
 constexpr int kFineCorrections = 5;
-constexpr double kUnsure_kg = 0.1;  // the scale's
+constexpr double kUnsure_kg = 0.1;                 // the scale's
+constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
+constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
@@ -76,6 +78,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
+    lost = std::move(held);
     holds_nothing();
   }
   const double passed_s = to_s(now - now_);
@@ -99,6 +102,8 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
+  strays.look(objects_);
+  recognise_left();
   take_in_cut();
   add_unseen();
 }
@@ -154,14 +159,37 @@ std::vector<task::Note> Cell::take_notes() {
   return std::exchange(notes_, {});
 }
 
-void Cell::left_on_belt(const Load& load, const Vector3& position) {
-  ObjectBelief object;
-  object.stamp = now_;
-  object.world_from_top.translation() = position;
+void Cell::left_on_belt(const Pose& world_from_tip) {
+  ObjectBelief object = held_at(*held, world_from_tip);
+  object.world_from_top.translation().z() = world.belt.surface_z_m + object.size_m.z();
+  object.track = kFirstLeft + lefts_++;
+  object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
-  object.size_m = load.size_m;
   left_.push_back(object);
   objects_.push_back(object);
+}
+
+void Cell::lifted(const ObjectBelief& object) {
+  forgotten_.push_back(object.track);
+  std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
+}
+
+// Nothing else can have come to lie just there.
+void Cell::recognise_left() {
+  for (ObjectBelief& object : objects_) {
+    if (object.track == 0) continue;
+    std::erase_if(left_, [&](const ObjectBelief& left) {
+      const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
+      const bool lies_there = object.code.empty() && object.last_seen > left.last_seen && off.norm() < kSlides_m;
+      if (lies_there) labelled_[object.track] = left.code;
+      return lies_there || object.code == left.code;
+    });
+    const auto label = labelled_.find(object.track);
+    if (label != labelled_.end() && object.code.empty()) object.code = label->second;
+  }
+  std::erase_if(labelled_, [&](const auto& entry) {
+    return std::ranges::find(objects_, entry.first, &ObjectBelief::track) == objects_.end();
+  });
 }
 
 void Cell::hides(double reach_m, double height_m) {

@@ -185,6 +185,17 @@ Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation) {
   return load;
 }
 
+ObjectBelief held_at(const Held& held, const Pose& world_from_tip) {
+  ObjectBelief object;
+  object.size_m = held.load.size_m;
+  object.world_from_top = world_from_tip * Eigen::Translation3d(held.load.offset_in_tip_m);
+  const double yaw = yaw_of(world_from_tip.linear()) - held.load.yaw_in_tip_rad;
+  object.world_from_top.linear() = Eigen::AngleAxisd(yaw, Vector3::UnitZ()).toRotationMatrix();
+  object.confidence = 1;
+  object.code = held.code;
+  return object;
+}
+
 Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,
                     const Vector3& offset, double peak_m_s2) {
   // Seen from the belt, as it runs and changes speed now, the way is straight: what touches the load is neither pushed

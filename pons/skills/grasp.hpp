@@ -74,6 +74,9 @@ struct Lift {
 // its middle is high.
 [[nodiscard]] Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation);
 
+// What hangs on the cups, as if it were seen there.
+[[nodiscard]] ObjectBelief held_at(const Held& held, const Pose& world_from_tip);
+
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at,
                                                  const Eigen::Matrix3d& orientation, const Vector3& offset,

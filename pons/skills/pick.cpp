@@ -47,6 +47,8 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
+constexpr double kNearEnd_m = 0.25;    // of the pick zone: what is lifted there has to be put back soon
+constexpr double kHeard_s = 0.05;      // until a belt obeys
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
 constexpr double kWaitOver_m = 0.06;   // the others, which pass below
 constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
@@ -91,7 +93,7 @@ class Pick final : public ArmSkill {
     if (phase_ == Phase::kSetDown) {
       verdict_ = {Status::kFailed, "cancelled", {}};
     } else if (phase_ == Phase::kLift) {
-      begin_put_back(now, {Status::kFailed, "cancelled", {}});
+      begin_put_back(now, kPutAside, {Status::kFailed, "cancelled", {}});
       if (phase_ != Phase::kSetDown) begin_retreat(now, {Status::kFailed, "cancelled; still held", {}});
     } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
@@ -141,9 +143,10 @@ class Pick final : public ArmSkill {
     if (object == nullptr) {
       step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
-      return {Status::kFailed, "lost from sight", {}};
+      return absent();
     }
     seen_ = now;
+    keep_in_reach(*object, now);
     const world::Belt& belt = cell_.world.belt;
     if (cell_.world.rules.too_large(object->size_m)) {
       return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
@@ -185,6 +188,20 @@ class Pick final : public ArmSkill {
     return start(*grasp, *object, now);
   }
 
+  [[nodiscard]] Progress absent() const {
+    const std::string* const place = cell_.strays.place_of(code_);
+    if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
+    return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
+  }
+
+  // The brain has the belt wait for what it sees; what was put back, nobody may see.
+  void keep_in_reach(const ObjectBelief& object, Time now) {
+    const world::Belt& belt = cell_.world.belt;
+    const double speed_m_s = cell_.belt_speed_m_s();
+    const double stops_m = speed_m_s * (kHeard_s + speed_m_s / (2 * belt.ramp_m_s2));
+    if (object.world_from_top.translation().x() + stops_m > belt.waits_at_m()) cell_.hold_belt(now);
+  }
+
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
   [[nodiscard]] bool comes_too_late(double x_m) const {
     return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > kStands_m_s;
@@ -203,13 +220,13 @@ class Pick final : public ArmSkill {
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
 
-  // What cannot be sorted goes back beside its neighbours, to where it was lifted from, which has moved on with the
-  // belt, and rides on into the exception chute.
-  Progress begin_put_back(Time now, Progress verdict) {
+  // To where it was lifted from, which has moved on with the belt: what cannot be sorted so much farther from its
+  // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place.
+  Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     const AxisState state = cell_.arm.planned(from);
-    Vector3 to = kPutAside * lift_offset(cell_, target_) + lift_from_;
+    Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
     to.x() += belt_travel_m(from) - lift_travel_m_;
     to.z() = lift_from_.z() + kPutBack_m;
     const Vector3 offset = to - cell_.model.world_from_tip(state.position).translation();
@@ -230,9 +247,11 @@ class Pick final : public ArmSkill {
   }
 
   Progress set_down(Time now) {
+    if (verdict_.status == Status::kRetry) cell_.hold_belt(now);
     const auto laid = set_down_.tick(now);
     if (!laid) return {Status::kRetry, laid.error().line(), {}};
     if (!*laid) return {};
+    if (verdict_.status == Status::kRetry) cell_.missed = Miss{code_, now};
     if (verdict_.status == Status::kRunning) {
       phase_ = Phase::kFind;
       seen_ = now;
@@ -279,6 +298,7 @@ class Pick final : public ArmSkill {
 
   Progress approach(Time now) {
     if (const ObjectBelief* object = cell_.find(code_)) {
+      keep_in_reach(*object, now);
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
       const double moved_m = off.head<2>().norm();
       if (const auto other = tied_to(cell_, *object)) return give_up(now, *other);
@@ -322,6 +342,9 @@ class Pick final : public ArmSkill {
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
+      // It was not there, and no camera has seen it since another was taken from beside it.
+      if (cups.sealed_cups == 0 && cell_.strays.place_of(code_) != nullptr)
+        return begin_retreat(now, absent()), Progress{};
       return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};
@@ -363,11 +386,16 @@ class Pick final : public ArmSkill {
     }
     lift_end_ = up->top;
     rides_until_ = up->rides_until;
-    cell_.held = Held{.code = code_, .load = load_of(target_, grasp_.orientation)};
+    const ObjectBelief* const seen = cell_.find(code_);
+    cell_.held = Held{.code = code_,
+                      .load = load_of(target_, grasp_.orientation),
+                      .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
+                      .falls = cell_.falls()};
+    cell_.lost.reset();
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
     cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
-    cell_.forget(target_.track);
+    cell_.lifted(seen != nullptr ? *seen : target_);
     phase_ = Phase::kLift;
     return {};
   }
@@ -386,19 +414,27 @@ class Pick final : public ArmSkill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
-    const bool lopsided = weighed && hangs_beside(cell_.held->load, *weighed);
+    const Held& held = *cell_.held;
+    const Companion* const other = weighed ? felt_on(held.load, *weighed, held.company) : nullptr;
+    const bool lopsided =
+        weighed && (other != nullptr ||
+                    hangs_beside(held.load, *weighed, cell_.hooked == code_ ? Uneven::kDoubted : Uneven::kUsual));
+    // If it is put back, then within reach.
+    const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
+    if (lopsided || (near_end && !held.company.empty())) cell_.hold_belt(now);
     if ((!weighed || heavy || lopsided) && !at_rest) return {};
-    if (target_.crowded && now < lift_end_) return {};
+    if ((target_.crowded || !held.company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(0.0, mass));
     cell_.arm.expect_contact(0);
     if (mass > limit) {
-      return begin_put_back(now, overweight(mass));
+      return begin_put_back(now, kPutAside, overweight(mass));
     }
     if (lopsided) {
-      cell_.missed = Miss{code_, now};
-      return begin_put_back(now, {Status::kRetry, "another hangs on it: its weight is felt beside it", {}});
+      cell_.hooked = code_;
+      const std::string name = other != nullptr && !other->code.empty() ? other->code : "another";
+      return begin_put_back(now, 0, {Status::kRetry, name + " hangs on it: its weight is felt beside it", {}});
     }
     return success(now);
   }

@@ -16,7 +16,7 @@ class TakeUp {
   explicit TakeUp(Cell& cell) : cell_(cell) {}
 
   // What is on the cups, to be written down whenever it changes: {"code":…,"mass_kg":…,"size_m":[…],"yaw_rad":…,
-  // "offset_m":[…],"falls":[…]}, as in Held and Cell::falls; null when nothing is.
+  // "offset_m":[…],"falls":[…]}, as in Held; null when nothing is.
   [[nodiscard]] task::Json carries() const;
 
   // After refresh(): believes what was written last, as far as the cups still hold something. What only the bridge that
@@ -42,6 +42,7 @@ class TakeUp {
   [[nodiscard]] bool settle(Time now);
 
  private:
+  [[nodiscard]] Falls falls_from(const task::Json& carried) const;
   [[nodiscard]] bool is_over(const std::string& place) const;
   [[nodiscard]] bool is_over_belt() const;
   [[nodiscard]] double too_low_m() const;
@@ -50,8 +51,7 @@ class TakeUp {
   void hide_below();
 
   Cell& cell_;
-  std::string carried_;               // the code that was written down, whether still held or not
-  std::optional<Cell::Falls> falls_;  // likewise
+  std::string carried_;  // the code that was written down, whether still held or not
   std::optional<Time> called_;
   Time looks_until_;
   int rises_ = 0, steps_ = 0;
