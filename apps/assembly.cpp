@@ -8,6 +8,7 @@
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
 #include "pons/bridge/journal/place.hpp"
+#include "pons/rt/clock.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -136,6 +137,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     socket = std::move(*listening);
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
+  if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
@@ -153,11 +155,12 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     half->policies->attend(half->cell->stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
-                                                           world.zones, options.recovery, visitors);
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), world,
+                                                           options.recovery, visitors);
   if (socket) {
-    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
-                                        [half = self.get()] { return half->cell->stream; });
+    self->desk =
+        std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
+                               self->bridge_side->health(), [half = self.get()] { return half->cell->stream; });
   }
   return self;
 }

@@ -61,6 +61,10 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
             progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
           },
       .said = {},
+      .alerted =
+          [&](std::string_view alert) {
+            if (!options.quiet) progress.put(alert_line(alert));
+          },
       .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
       .limit = border.clock.now() + slowest(manifest.size())};
   const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);

@@ -20,6 +20,7 @@ struct RoundsOptions {
   std::filesystem::path report, log, picture, socket, speech;
   runner::Pace pace = runner::Pace::kLockstep;
   Explain explain = Explain::kNothing;
+  Alerts alerts = Alerts::kTold;
   std::string of_a_cell = {};  // an option was given that only a cell with an arm knows: its name
 };
 

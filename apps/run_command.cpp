@@ -69,6 +69,10 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 }
               },
           .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+          .alerted =
+              [&](std::string_view alert) {
+                if (!options.quiet) progress.put(alert_line(alert));
+              },
           .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
           .limit = Time(slowest(static_cast<std::size_t>(total)))};
 }
@@ -89,7 +93,8 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   const auto reckoning =
       reckon(cell.world, *cell.body, *cell.above->journal,
              {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(), cell.above->bridge->retries(),
-              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->arming().interventions()});
+              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->arming().interventions(),
+              &cell.above->bridge_side->health()});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
@@ -117,6 +122,7 @@ RoundsOptions rounds_options(const RunOptions& options) {
                        .socket = options.socket,
                        .speech = options.speech};
   rounds.pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
+  rounds.alerts = options.quiet ? Alerts::kUntold : Alerts::kTold;
   rounds.explain = options.explain ? Explain::kFindings : Explain::kNothing;
   if (options.parcels.parcels_given) rounds.of_a_cell = "--parcels";
   if (!options.parcels.manifest.empty()) rounds.of_a_cell = "--manifest";

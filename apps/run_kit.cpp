@@ -189,6 +189,15 @@ void LoopLog::say(Time at, std::string_view text) {
 
 std::string degraded_line(std::string_view refused) { return fmt::format("pons: degraded: {}\n", refused); }
 
+std::string alert_line(std::string_view alert) { return fmt::format("pons: {}\n", alert); }
+
+record::Report::Health health_of(const runner::Health& health) {
+  record::Report::Health parts;
+  for (const auto& [part, fares] : health.parts())
+    parts[part] = {std::string(runner::name(fares.condition)), fares.why, fares.alerts};
+  return parts;
+}
+
 bool Reckoning::good() const {
   return verdict.lost == 0 && verdict.missorted == 0 && verdict.duplicated == 0 && report.limits.violations == 0;
 }
@@ -229,6 +238,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   for (const auto& [reason, counts] : verdict->reasons)
     report.parcels.exceptions.reasons[reason] = {counts.deserved, counts.undeserved};
   report.interventions = figures.interventions;
+  if (figures.health != nullptr) report.health = health_of(*figures.health);
   report.findings = verdict->findings;
   Time first = result.end;
   for (const sim::ParcelTruth& parcel : truth.parcels()) {

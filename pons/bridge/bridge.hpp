@@ -136,6 +136,7 @@ class Bridge {
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources() const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
+  [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
   [[nodiscard]] std::int64_t refused() const { return refused_; }  // submissions

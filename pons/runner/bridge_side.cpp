@@ -14,18 +14,19 @@ using bridge::Json;
 
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
-constexpr Duration kBrainSilent = std::chrono::milliseconds(300);
-// Frames come four times a second and later by what it takes to see what they show.
-constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
-BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills,
-                       const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
+BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const world::World& world,
+                       Recovery recovery, std::function<void(Time)> visitors)
     : bridge_(bridge),
       brain_(brain),
       skills_(std::move(skills)),
-      arming_(bridge, skills_, zones, recovery),
+      arming_(bridge, skills_, world.zones, recovery),
+      health_([this](std::string_view part, const PartHealth& health, Time now) {
+        bridge_.note("health", {{"part", part}, {"condition", name(health.condition)}, {"why", health.why}}, now);
+      }),
+      vitals_(world, health_),
       visitors_(std::move(visitors)) {}
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
@@ -59,6 +60,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
   skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
   if (auto good = arming_.tick(now); !good) return good;
+  look_after_parts(now);
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What nobody sees must not ride by unread, nor into the arm.
   const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
@@ -90,7 +92,18 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
     }
   }
   seen_ = snapshot;
+  seen_behind_ = now - snapshot.due;
   if (snapshot.base && skills_.locate) skills_.locate(*snapshot.base);
+}
+
+void BridgeSide::look_after_parts(Time now) {
+  const link::State& state = skills_.state();
+  vitals_.eyes(seen_, seen_behind_, now);
+  vitals_.arm(state, arming_.needs_person() ? Vitals::Resumes::kByPerson : Vitals::Resumes::kByItself, now);
+  vitals_.belt(state, now);
+  vitals_.loop(state, now);
+  vitals_.bridge(bridge_.open_count(), now);
+  vitals_.journal(bridge_.journal(), now);
 }
 
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -107,9 +120,11 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
+  const bool silent = stalls_ && stalls_->on(now);
+  if (!silent) brain_heard_ = now;
+  vitals_.brain(brain_heard_, now);
   // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
-  if (stalls_ && stalls_->on(now)) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
-  brain_heard_ = now;
+  if (silent) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
   const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);

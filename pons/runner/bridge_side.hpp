@@ -13,8 +13,10 @@
 #include "pons/brain/brain.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/health.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/runner/skill_port.hpp"
+#include "pons/runner/vitals.hpp"
 #include "pons/world/faults.hpp"
 #include "pons/world/world.hpp"
 
@@ -24,9 +26,8 @@ inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
 
 class BridgeSide {
  public:
-  // All must outlive it. `zones` are the world's. `visitors` is called once a period, before the bridge's tick:
-  // requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const std::vector<world::Zone>& zones,
+  // All must outlive it. `visitors` is called once a period, before the bridge's tick: requests from outside.
+  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const world::World& world,
              Recovery recovery, std::function<void(Time)> visitors);
 
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
@@ -48,9 +49,11 @@ class BridgeSide {
   [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const { return arming_.stops(); }
   [[nodiscard]] Arming& arming() { return arming_; }  // for a person's words
+  [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:
   void take_in(const Snapshot& snapshot, Time now);
+  void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
@@ -62,8 +65,11 @@ class BridgeSide {
   brain::Brain& brain_;
   SkillPort skills_;
   Arming arming_;
+  Health health_;
+  Vitals vitals_;
   std::function<void(Time)> visitors_;
   Snapshot seen_;
+  Duration seen_behind_{0};               // of when it was due
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   bridge::Json carried_;                  // as last noted
