@@ -157,6 +157,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), world,
                                                            options.recovery, visitors);
+  self->bridge_side->keep_free(options.keep_free);
   if (socket) {
     self->desk =
         std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
@@ -193,6 +194,7 @@ runner::SkillPort BridgeHalf::skill_port() {
           .outside_rad = [this] { return cell->arm.outside_rad(); },
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
+          .park = [this](Time now) { rest->park(now); },
           .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
           .holds_belt = [this](Time now) { return cell->holds_belt(now); },
           .halt = [this] { cell->arm.halt(); },
@@ -214,8 +216,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above = BridgeHalf::build(self->world, manifest,
-                                 {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
+  auto above =
+      BridgeHalf::build(self->world, manifest,
+                        {options.journal, options.socket, std::nullopt, options.recovery, options.keep_free}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
   const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];

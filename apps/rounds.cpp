@@ -83,6 +83,7 @@ Expected<void> Rounds::build_bridge(const RoundsSetup& setup) {
                                                      [this](Time now) {
                                                        if (desk) desk->attend(now);
                                                      });
+  bridge_side->keep_free(setup.keep_free);
   if (socket) {
     desk = std::make_unique<Desk>(std::move(socket), *bridge, *journal, bridge_side->arming(), bridge_side->health(),
                                   []() -> task::ChunkStream* { return nullptr; });

@@ -185,7 +185,12 @@ int run_rounds(const RoundsOptions& options, world::World world) {
   fs::create_directories(*speech, error);
   if (error) return bad_input({error.message(), *speech, "name a folder that can be written for --speech"});
 
-  RoundsSetup setup{.seed = options.seed, .journal = *journal, .socket = {}, .speech = *speech, .pace = options.pace};
+  RoundsSetup setup{.seed = options.seed,
+                    .journal = *journal,
+                    .socket = {},
+                    .speech = *speech,
+                    .pace = options.pace,
+                    .keep_free = options.keep_free};
   if (!options.socket.empty()) {
     setup.socket = options.socket;
   } else if (options.pace == runner::Pace::kRealTime) {

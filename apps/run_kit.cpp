@@ -129,6 +129,13 @@ Expected<world::World> cell_named(const std::string& name, const std::string& co
 
 Duration slowest(std::size_t parcels) { return from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(parcels)); }
 
+void add_keep_free(CLI::App& command, std::uint64_t& mib) {
+  command
+      .add_option("--keep-free", mib,
+                  "Take no new tasks with fewer MiB than that left for the journal on its disk; 0 to 1000000 (64)")
+      ->check(whole_number & CLI::Range(0.0, 1e6));
+}
+
 void refuse_empty(CLI::App& command) {
   for (CLI::Option* option : command.get_options()) {
     if (option->get_items_expected_max() > 0) option->check(not_empty);

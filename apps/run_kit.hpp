@@ -54,6 +54,10 @@ void add_parcel_options(CLI::App& command, ParcelOptions& options);
 // The longest that a run of so many parcels takes (run time): one that takes longer hangs.
 [[nodiscard]] Duration slowest(std::size_t parcels);
 
+// --keep-free, in MiB.
+void add_keep_free(CLI::App& command, std::uint64_t& mib);
+[[nodiscard]] inline std::uint64_t bytes_of(std::uint64_t mib) { return mib << 20; }
+
 // Refuses an option that was given an empty text, most often a variable of a script that was never set.
 void refuse_empty(CLI::App& command);
 

@@ -19,7 +19,8 @@ constexpr std::size_t kGoneRemembered = 64;
 
 BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const world::World& world,
                        Recovery recovery, std::function<void(Time)> visitors)
-    : bridge_(bridge),
+    : world_(world),
+      bridge_(bridge),
       brain_(brain),
       skills_(std::move(skills)),
       arming_(bridge, skills_, world.zones, recovery),
@@ -34,6 +35,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
+    if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
     if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
   const auto events = journal.notes();
@@ -71,9 +73,13 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
-  if (!bridge_.uses_resources() && !arming_.settles()) skills_.rest(now);
+  if (!bridge_.uses_resources() && !arming_.settles()) {
+    const bool parks = (vitals_.belt_unseen() || falls_back_) && skills_.park;
+    parks ? skills_.park(now) : skills_.rest(now);
+  }
   if (auto noted = note_carried(now); !noted) return noted;
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
+    asked_.erase(report.id);
     if (brain_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
   for (const std::uint32_t track : skills_.take_forgotten()) {
@@ -104,6 +110,12 @@ void BridgeSide::look_after_parts(Time now) {
   vitals_.loop(state, now);
   vitals_.bridge(bridge_.open_count(), now);
   vitals_.journal(bridge_.journal(), now);
+  // What is begun goes on. A new task would be one more that a camera has to show the way to.
+  bridge_.withhold(vitals_.belt_unseen() ? bridge::Arbiter::Withheld::kResources : bridge::Arbiter::Withheld::kNothing);
+  bridge_.refuse_new(vitals_.lacks_room().empty()
+                         ? std::nullopt
+                         : std::optional(Error{"no room for new tasks: " + vitals_.lacks_room(), "journal",
+                                               "free some space; tasks are taken again by themselves"}));
 }
 
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -123,9 +135,14 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   const bool silent = stalls_ && stalls_->on(now);
   if (!silent) brain_heard_ = now;
   vitals_.brain(brain_heard_, now);
-  // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
-  if (silent) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
-  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
+  // A brain that says nothing asks for nothing, nor is it asked for what there is no room for.
+  if (silent || !vitals_.lacks_room().empty()) return fall_back(objects, now);
+  decided_ = now;
+  if (std::exchange(falls_back_, false)) bridge_.note("fallback", {{"decides", "brain"}}, now);
+  tell_brain_what_rode();
+  std::vector<ObjectBelief> undecided = objects;
+  std::erase_if(undecided, [&](const ObjectBelief& object) { return rode(object); });
+  const brain::Decisions decisions = brain_.observe(undecided, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
@@ -133,6 +150,8 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       const std::string code = task.value("order", id);
       bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
       brain_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
+    } else {
+      asked_.emplace(task.at("id").get<std::string>(), task.value("order", std::string{}));
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
@@ -141,6 +160,36 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   }
   brain_holds_belt_ = decisions.belt_waits;
   return decisions.belt_waits;
+}
+
+// What is not decided on must not ride by meanwhile; or, by the world's rules, it does, and only what was asked for
+// before gets its turn.
+bool BridgeSide::fall_back(const std::vector<ObjectBelief>& objects, Time now) {
+  const Duration undecided = now - decided_;
+  const world::Fallback& fallback = world_.fallback;
+  if (fallback.undecided == world::Fallback::Undecided::kHold || undecided <= from_s(fallback.after_s))
+    return brain_holds_belt_ || undecided > kBrainSilent;
+  if (!std::exchange(falls_back_, true)) bridge_.note("fallback", {{"decides", "rules"}}, now);
+  bool waits = false;
+  for (const ObjectBelief& object : objects) {
+    const bool asked = std::ranges::any_of(asked_, [&](const auto& task) { return task.second == object.code; });
+    const double x_m = object.world_from_top.translation().x();
+    if (asked) {
+      waits = waits || world_.belt.must_wait_for(x_m, std::max(object.velocity_m_s.x(), 0.0));
+    } else if (x_m > world_.belt.pick_x_max_m) {
+      let_ride(object, now);
+    }
+  }
+  return waits;
+}
+
+void BridgeSide::let_ride(const ObjectBelief& object, Time now) {
+  if (rode(object)) return;
+  rode_tracks_.push_back(object.track);
+  if (rode_tracks_.size() > kGoneRemembered) rode_tracks_.erase(rode_tracks_.begin());
+  rode_.push_back(object.code);
+  const char* const reason = vitals_.lacks_room().empty() ? "the brain was silent" : "no room for tasks";
+  bridge_.note("ride", {{"track", object.track}, {"code", object.code}, {"reason", reason}}, now, object.code);
 }
 
 // What the brain decided on.
@@ -178,7 +227,16 @@ void BridgeSide::stop(Time now, const std::string& reason) {
 
 bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }
 
+bool BridgeSide::rode(const ObjectBelief& object) const {
+  return std::ranges::find(rode_tracks_, object.track) != rode_tracks_.end();
+}
+
+void BridgeSide::tell_brain_what_rode() {
+  for (const std::string& code : std::exchange(rode_, {})) brain_.recall_ride(code);
+}
+
 void BridgeSide::close(Time now) {
+  tell_brain_what_rode();
   const std::vector<std::string> unseen = brain_.unseen();
   for (const std::string& code : unseen) {
     bridge_.note("ride",

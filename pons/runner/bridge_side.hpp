@@ -43,6 +43,8 @@ class BridgeSide {
 
   // From now on the brain is silent in these spells.
   void stall_brain(const world::Spells& stalls) { stalls_ = stalls; }
+  // See Vitals.
+  void keep_free(std::uint64_t bytes) { vitals_.keep_free(bytes); }
   [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
@@ -58,9 +60,15 @@ class BridgeSide {
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  // Likewise, while nothing is decided.
+  bool fall_back(const std::vector<ObjectBelief>& objects, Time now);
+  void let_ride(const ObjectBelief& object, Time now);
+  [[nodiscard]] bool rode(const ObjectBelief& object) const;
+  void tell_brain_what_rode();
   void note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now);
   [[nodiscard]] Expected<void> note_carried(Time now);
 
+  const world::World& world_;
   bridge::Bridge& bridge_;
   brain::Brain& brain_;
   SkillPort skills_;
@@ -74,7 +82,12 @@ class BridgeSide {
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   bridge::Json carried_;                  // as last noted
   Time last_outcome_, brain_heard_;
-  bool brain_holds_belt_ = false;  // as it last said
+  Time decided_;                                           // when the brain was last asked
+  bool falls_back_ = false;                                // to the world's rules
+  std::map<std::string, std::string, std::less<>> asked_;  // code by task: what the brain asked for and has no outcome
+  std::vector<std::string> rode_;                          // codes, by those rules: to tell the brain
+  std::vector<std::uint32_t> rode_tracks_;                 // likewise; nothing is left for it to decide
+  bool brain_holds_belt_ = false;                          // as it last said
   std::optional<world::Spells> stalls_;
   std::int64_t unlabelled_ = 0;
   bool stopping_ = false;

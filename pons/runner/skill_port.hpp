@@ -23,7 +23,8 @@ struct SkillPort {
   std::function<void(Time)> arm;                               // one step out of a stop, towards operational
   std::function<double()> outside_rad;                         // how far the arm stands outside its position limits
   std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
-  std::function<void(Time)> rest;                              // once a period while no skill runs
+  std::function<void(Time)> rest;                              // once a period while no skill runs,
+  std::function<void(Time)> park;                              // or this, out of the cameras' view; may be empty
   std::function<void(link::Belt)> belt;                        // once a period
   std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
   std::function<void()> halt;                                         // a protective stop

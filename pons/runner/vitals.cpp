@@ -165,13 +165,21 @@ void Vitals::journal(const bridge::Journal& journal, Time now) {
   const auto tell = [&](Condition condition, const std::string& why) { health_.tell("journal", condition, why, now); };
   const Duration waited = journal.take_longest_commit();
   const std::optional<std::uint64_t> room = journal.room();
-  if (room && *room < keep_free_)
-    return tell(Condition::kBad, fmt::format("{:.0f} MiB left on its disk", static_cast<double>(*room) / kMiB));
-  if (waited > kStuckDisk) return tell(Condition::kBad, fmt::format("a commit took {:.1f} s", to_s(waited)));
-  if (room && *room / kPlenty < keep_free_)
-    return tell(Condition::kPoor, fmt::format("{:.0f} MiB left on its disk", static_cast<double>(*room) / kMiB));
-  if (waited > kSlowDisk) return tell(Condition::kPoor, fmt::format("a commit took {:.0f} ms", 1e3 * to_s(waited)));
-  tell(Condition::kGood, "");
+  const std::string left = fmt::format("{:.0f} MiB left on its disk", static_cast<double>(room.value_or(0)) / kMiB);
+  if (room && *room < keep_free_) {
+    lacks_room_ = left;
+    return tell(Condition::kBad, left);
+  }
+  if (waited > kStuckDisk) {
+    tell(Condition::kBad, fmt::format("a commit took {:.1f} s", to_s(waited)));
+  } else if (room && *room / kPlenty < keep_free_) {
+    tell(Condition::kPoor, left);
+  } else if (waited > kSlowDisk) {
+    tell(Condition::kPoor, fmt::format("a commit took {:.0f} ms", 1e3 * to_s(waited)));
+  } else {
+    tell(Condition::kGood, "");
+  }
+  if (!health_.is_bad("journal")) lacks_room_.clear();
 }
 
 }  // namespace pons::runner

@@ -49,6 +49,8 @@ class Vitals {
   // room always.
   void keep_free(std::uint64_t bytes) { keep_free_ = bytes; }
 
+  // Why no new task is to be taken; empty: there is room for them.
+  [[nodiscard]] const std::string& lacks_room() const { return lacks_room_; }
   // Whether a camera that watches the belt is lost: nobody knows what lies there.
   [[nodiscard]] bool belt_unseen() const { return belt_unseen_; }
 
@@ -62,6 +64,7 @@ class Vitals {
   std::vector<Time> awaited_since_;  // a camera that was not asked for pictures before
   bool belt_unseen_ = false;
   std::uint64_t keep_free_ = kKeptFree;
+  std::string lacks_room_;
   std::optional<Time> belt_slow_since_;
   struct Ticks {
     Time at;

@@ -4,10 +4,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "apps/assembly.hpp"
 #include "pons/bridge/journal/journal.hpp"
+#include "pons/runner/lockstep.hpp"
 #include "tests/end_to_end/outcomes.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -79,6 +89,153 @@ TEST_F(Degradation, ASilentBrainIsToldToEverybody) {
   const auto told = conditions("brain");
   ASSERT_GE(told.size(), 3U);
   EXPECT_THAT(std::vector<std::string>(told.begin(), told.begin() + 3), ::testing::ElementsAre("poor", "bad", "good"));
+}
+
+// So many of each reason were let ride or ended as exceptions that they did not deserve.
+int undeserved(const json& report, const std::string& reason) {
+  return report["parcels"]["exceptions"]["reasons"].value(reason, json::object()).value("undeserved", 0);
+}
+
+// Until the brain speaks again; nothing is lost sight of, and what it had asked for gets its turn.
+TEST_F(Degradation, WithoutABrainParcelsRideByTheRulesOfAWorldThatSaysSo) {
+  const auto worlds = folder_ / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  const auto world = worlds / "parcel_cell" / "world.yaml";
+  write_text(world, read_text(world) + "\nfallback: {undecided: rules, after_s: 3}\n");
+  run_with("brain_stall: {an_hour: 300, lasts_s: [16, 20]}\n", 14, {}, {"PONS_WORLDS=" + worlds.string()});
+  ASSERT_GE(report_["faults"]["brain_stall"], 1);
+  EXPECT_GE(undeserved(report_, "the brain was silent"), 2) << run_.out;
+  const int others =
+      report_["parcels"]["exceptions"]["undeserved"].get<int>() - undeserved(report_, "the brain was silent");
+  EXPECT_LE(others, 1) << "what it had asked for got its turn\n" << run_.out;
+  EXPECT_GE(report_["parcels"]["sorted"], 5) << run_.out;
+  std::vector<std::string> decides;
+  std::optional<Time> silent;
+  for (const bridge::Event& event : notes()) {
+    if (event.kind == "health" && event.detail.at("part") == "brain" && event.detail.at("condition") == "poor")
+      silent = event.stamp;
+    if (event.kind != "fallback") continue;
+    decides.push_back(event.detail.at("decides"));
+    if (decides.size() > 1) continue;
+    ASSERT_TRUE(silent);
+    EXPECT_NEAR(to_s(event.stamp - *silent), 3 - 0.3, 0.02);
+  }
+  ASSERT_GE(decides.size(), 2U);
+  EXPECT_EQ(decides[0], "rules");
+  EXPECT_EQ(decides[1], "brain");
+}
+
+// Each task's start, and when a camera was bad.
+TEST_F(Degradation, WithoutACameraNoPickBegins) {
+  run_with("blackout: {an_hour: 300, lasts_s: [6, 8]}\n", 12);
+  ASSERT_GE(report_["faults"]["blackout"], 2);
+  EXPECT_GE(part("camera overhead")["alerts"], 2);
+  EXPECT_EQ(part("camera overhead")["condition"], "good");
+  EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "tasks wait rather than fail\n" << run_.out;
+  EXPECT_THAT(run_.err, HasSubstr("pons: camera overhead is bad at "));
+  std::vector<std::pair<Time, Time>> lost;
+  for (const bridge::Event& event : notes()) {
+    if (event.kind != "health" || event.detail.at("part") != "camera overhead") continue;
+    const bool bad = event.detail.at("condition") == "bad";
+    if (bad) lost.emplace_back(event.stamp, Time(Duration::max()));
+    if (!bad && !lost.empty()) lost.back().second = std::min(lost.back().second, event.stamp);
+  }
+  ASSERT_FALSE(lost.empty());
+  const auto journal = bridge::Journal::open_to_read(folder_ / "j.db").value();
+  int waited = 0;
+  const auto tasks = journal->tasks().value();
+  for (const bridge::TaskRecord& task : tasks) {
+    const auto events = journal->history(task.task.id).value();
+    for (const bridge::Event& event : events) {
+      if (event.kind != bridge::kStartedEvent) continue;
+      for (const auto& [from, to] : lost) {
+        EXPECT_FALSE(event.stamp >= from && event.stamp < to) << task.task.id << " at " << event.stamp.s();
+        waited += task.accepted < to && event.stamp >= to ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(waited, 1) << "one at least had to wait";
+}
+
+// By where the arm really is.
+TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
+  write_text(folder_ / "plan.yaml", "blackout: {an_hour: 300, lasts_s: [6, 8]}\n");
+  auto world = world::load("worlds", "parcel_cell");
+  ASSERT_TRUE(world) << world.error().line();
+  apps::AssemblyOptions options{.journal = ":memory:", .socket = {}, .body = {}};
+  options.body.faults = world::load_faults(*world, folder_ / "plan.yaml").value();
+  const world::Manifest manifest = world::draw_manifest(*world, 8, 1).value();
+  auto cell = apps::Assembly::build(*std::move(world), manifest, options);
+  ASSERT_TRUE(cell) << cell.error().line();
+  apps::BridgeHalf& above = *(*cell)->above;
+  int parked = 0, elsewhere = 0;
+  const runner::Watch watch{.progress = [&](Time now) {
+    const auto& parts = above.bridge_side->health().parts();
+    const auto camera = parts.find("camera overhead");
+    if (camera == parts.end() || camera->second.condition != runner::Condition::kBad) return;
+    if (now - camera->second.since < std::chrono::seconds(3) || above.bridge->uses_resources()) return;
+    const Vector3 tip = above.cell->model.world_from_tip(above.cell->arm.state().position).translation();
+    const bool aside = std::abs(tip.x() - (*cell)->world.belt.pick_x_max_m) < 0.02;
+    ++(aside ? parked : elsewhere);
+  }};
+  runner::Parts parts = (*cell)->parts();
+  const auto result = runner::run_lockstep(parts, watch);
+  ASSERT_TRUE(result) << result.error().line();
+  EXPECT_GE(parked, 100);
+  EXPECT_EQ(elsewhere, 0);
+}
+
+// A file that may grow no more is a disk that is full, to who writes it.
+TEST_F(Degradation, WithoutRoomNoTaskIsTakenAndThoseThatAreGoOn) {
+  const auto submit = [&](const std::string& id) {
+    write_text(folder_ / "task.json",
+               R"({"id":")" + id + R"(","steps":[{"skill":"detect","arguments":{"object":"x","within_s":2}}]})");
+    return run_pons({"task", "submit", folder_ / "task.json", "--socket", folder_ / "s"});
+  };
+  const auto show = [&](const std::string& id) {
+    return run_pons({"task", "show", id, "--journal", folder_ / "j.db"}).out;
+  };
+  const auto health = [&] { return run_pons({"health", "--socket", folder_ / "s"}); };
+  const auto until = [&](int code, const char* row) {
+    Finished seen = health();
+    for (int i = 0; i < 500 && (seen.code != code || seen.out.find(row) == std::string::npos); ++i) seen = health();
+    EXPECT_THAT(seen.out, HasSubstr(row));
+  };
+  const Finished run = run_pons_and(
+      {"run", "small_cell", "--parcels", "8", "--seed", "3", "--socket", folder_ / "s", "--journal", folder_ / "j.db",
+       "--report", folder_ / "r.json", "--keep-free", "16"},
+      1, [&](pid_t run_id) {
+        until(0, "good  journal");
+        EXPECT_EQ(submit("before").code, 0);
+        const rlimit little{std::filesystem::file_size(folder_ / "j.db-wal") + (9U << 20), RLIM_INFINITY};
+        ASSERT_EQ(::prlimit(run_id, RLIMIT_FSIZE, &little, nullptr), 0);
+        until(1, "bad   journal");
+        const Finished refused = submit("meanwhile");
+        EXPECT_EQ(refused.code, 2);
+        EXPECT_THAT(refused.err, AllOf(HasSubstr("no room for new tasks: "), HasSubstr(" MiB left on its disk; ")));
+        EXPECT_EQ(submit("before").out, "before: already accepted\n") << "it is in the journal";
+        const rlimit enough{RLIM_INFINITY, RLIM_INFINITY};
+        ASSERT_EQ(::prlimit(run_id, RLIMIT_FSIZE, &enough, nullptr), 0);
+        until(0, "good  journal");
+        EXPECT_EQ(submit("afterwards").code, 0);
+      });
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  EXPECT_THAT(run.err, HasSubstr("pons: journal is bad at "));
+  report_ = read_json(folder_ / "r.json");
+  EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "nothing rode by meanwhile\n" << report_.dump(2);
+  EXPECT_GE(report_["parcels"]["sorted"], 7);
+  EXPECT_THAT(show("before"), HasSubstr("FAILED")) << "x was never there";
+  EXPECT_THAT(show("afterwards"), HasSubstr("FAILED"));
+  EXPECT_EQ(run_pons({"task", "show", "meanwhile", "--journal", folder_ / "j.db"}).code, 2);
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
+}
+
+TEST_F(Degradation, WhatIsKeptFreeIsANumberOfMebibytes) {
+  for (const char* const wrong : {"-1", "x", "1000001"}) {
+    const Finished run = run_pons({"run", "small_cell", "--parcels", "1", "--keep-free", wrong});
+    EXPECT_EQ(run.code, 2) << wrong;
+    EXPECT_THAT(run.err, HasSubstr("--keep-free")) << wrong;
+  }
 }
 
 TEST_F(Degradation, WhereNothingFailsNobodyHearsOfIt) {
