@@ -195,6 +195,7 @@ runner::SkillPort BridgeHalf::skill_port() {
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
           .park = [this](Time now) { rest->park(now); },
+          .grip = [this](const runner::Grip& grip) { cell->grip_share = grip.share, cell->lifts = grip.lifts; },
           .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
           .holds_belt = [this](Time now) { return cell->holds_belt(now); },
           .halt = [this] { cell->arm.halt(); },

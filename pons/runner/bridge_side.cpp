@@ -107,6 +107,7 @@ void BridgeSide::look_after_parts(Time now) {
   vitals_.eyes(seen_, seen_behind_, now);
   vitals_.arm(state, arming_.needs_person() ? Vitals::Resumes::kByPerson : Vitals::Resumes::kByItself, now);
   vitals_.belt(state, now);
+  if (skills_.grip) skills_.grip(vitals_.vacuum(state, now));
   vitals_.loop(state, now);
   vitals_.bridge(bridge_.open_count(), now);
   vitals_.journal(bridge_.journal(), now);

@@ -13,6 +13,12 @@
 
 namespace pons::runner {
 
+// How well the cups hold now, by their vacuum.
+struct Grip {
+  double share = 1;   // of their full force, once sealed; above 0
+  bool lifts = true;  // false: they do not seal well enough to lift anything
+};
+
 struct SkillPort {
   // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
   // the belt was taken that they come from.
@@ -25,6 +31,7 @@ struct SkillPort {
   std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
   std::function<void(Time)> rest;                              // once a period while no skill runs,
   std::function<void(Time)> park;                              // or this, out of the cameras' view; may be empty
+  std::function<void(const Grip&)> grip;                       // once a period; may be empty
   std::function<void(link::Belt)> belt;                        // once a period
   std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
   std::function<void()> halt;                                         // a protective stop

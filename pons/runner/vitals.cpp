@@ -19,6 +19,13 @@ constexpr Duration kBehind = std::chrono::milliseconds(500);
 constexpr int kPicturesMissed = 3, kPicturesLost = 6;  // in a row
 // Half and more of what stops the arm (cerebellum's limit is 0.05 rad).
 constexpr double kFollowing_rad = 0.03;
+constexpr Duration kEvacuated = std::chrono::milliseconds(100);  // after it has sealed a cup has all its vacuum
+constexpr double kFullShare = 0.85;                              // of the best: seals differ by so much
+constexpr double kLeastShare = 0.1;                              // what sealed holds something
+constexpr double kDrawsShare = 0.45;   // of what counts as sealed: a cup that lies on something draws more
+constexpr double kNothingShare = 0.1;  // likewise: a pump that runs draws more, whatever the cups touch
+constexpr int kTooWeak = 4;            // attempts: single ones leak
+constexpr Duration kTriedAgainAfter = std::chrono::seconds(10);
 constexpr Duration kBeltSlowFor = std::chrono::seconds(1);
 constexpr double kStands_m_s = 0.002, kSlowShare = 0.5;  // of the slowest that it runs nominally
 constexpr Duration kCountedOver = std::chrono::seconds(1);
@@ -110,6 +117,46 @@ void Vitals::arm(const link::State& state, Resumes resumes, Time now) {
   if (off_rad > kFollowing_rad)
     return tell(Condition::kPoor, fmt::format("{:.3f} rad from where it was told to be", off_rad));
   tell(Condition::kGood, "");
+}
+
+void Vitals::measure_attempt(const link::State& state, Time now) {
+  const double kpa = *std::ranges::max_element(state.cup_vacuum_kpa);
+  if (!attempt_) attempt_ = Attempt{.began = now};
+  attempt_->most_kpa = std::max(attempt_->most_kpa, kpa);
+  if (state.vacuum.phase != link::VacuumPhase::kSealed) {
+    attempt_->sealed_since.reset();
+    return;
+  }
+  if (!attempt_->sealed_since) attempt_->sealed_since = now;
+  attempt_->sealed = true;
+  too_weak_ = 0;
+  if (now - *attempt_->sealed_since < kEvacuated) return;
+  best_kpa_ = std::max(best_kpa_, kpa);
+  grip_share_ = kpa >= kFullShare * best_kpa_ ? 1 : std::max(kpa / best_kpa_, kLeastShare);
+}
+
+Grip Vitals::vacuum(const link::State& state, Time now) {
+  if (state.vacuum_on != 0) {
+    measure_attempt(state, now);
+  } else if (attempt_) {
+    // Cups that touch nothing draw a little, and tell nothing of the pump.
+    const double of_sealed = attempt_->most_kpa / world_.robot.tool.sealed_kpa;
+    const bool weak = !attempt_->sealed && now - attempt_->began > kEvacuated &&
+                      (of_sealed > kDrawsShare || of_sealed < kNothingShare);
+    too_weak_ += weak ? 1 : 0;
+    if (weak) too_weak_at_ = now;
+    attempt_.reset();
+  }
+  if (too_weak_ >= kTooWeak && now - too_weak_at_ < kTriedAgainAfter) {
+    health_.tell("vacuum", Condition::kBad, fmt::format("too weak to seal, {} times in a row", too_weak_), now);
+  } else if (too_weak_ >= kTooWeak) {
+    health_.tell("vacuum", Condition::kPoor, "it is tried again", now);
+  } else if (grip_share_ < 1) {
+    health_.tell("vacuum", Condition::kPoor, fmt::format("{:.0f} % of the best so far", 100 * grip_share_), now);
+  } else {
+    health_.tell("vacuum", Condition::kGood, "", now);
+  }
+  return {.share = grip_share_, .lifts = !health_.is_bad("vacuum")};
 }
 
 void Vitals::belt(const link::State& state, Time now) {

@@ -14,6 +14,7 @@
 #include "pons/link/message.hpp"
 #include "pons/runner/health.hpp"
 #include "pons/runner/observer.hpp"
+#include "pons/runner/skill_port.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::runner {
@@ -38,6 +39,8 @@ class Vitals {
   // `needs_person`: it is in a stop that only a person ends.
   enum class Resumes : std::uint8_t { kByItself, kByPerson };
   void arm(const link::State& state, Resumes resumes, Time now);
+  // By the best cup's vacuum while something is sealed, held against the best of the run so far; how well they hold.
+  [[nodiscard]] Grip vacuum(const link::State& state, Time now);
   void belt(const link::State& state, Time now);
   void loop(const link::State& state, Time now);
   // How many tasks have no outcome yet; a period that comes late is measured here, too.
@@ -65,6 +68,19 @@ class Vitals {
   bool belt_unseen_ = false;
   std::uint64_t keep_free_ = kKeptFree;
   std::string lacks_room_;
+  // From switching the cups on to switching them off.
+  struct Attempt {
+    Time began;
+    std::optional<Time> sealed_since;
+    double most_kpa = 0;
+    bool sealed = false;
+  };
+  void measure_attempt(const link::State& state, Time now);
+  std::optional<Attempt> attempt_;
+  double best_kpa_ = 0;  // that a seal has reached in this run
+  double grip_share_ = 1;
+  int too_weak_ = 0;  // attempts in a row
+  Time too_weak_at_;
   std::optional<Time> belt_slow_since_;
   struct Ticks {
     Time at;

@@ -136,6 +136,9 @@ class Cell {
   Reach reach;
   std::optional<Held> held;
   std::optional<Miss> missed;
+  double grip_share =
+      1;              // of its force that a sealed cup holds now, by its vacuum; carries are as soft as that asks for
+  bool lifts = true;  // false: the vacuum is too weak to seal; nothing is picked
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does
   std::uint64_t streams = 0;            // there were so far
 

@@ -238,11 +238,32 @@ TEST_F(Degradation, WhatIsKeptFreeIsANumberOfMebibytes) {
   }
 }
 
+// Seven tenths of the vacuum still seal.
+TEST_F(Degradation, WithLessVacuumParcelsAreCarriedAllTheSame) {
+  run_with("vacuum_weak: {an_hour: 300, lasts_s: [12, 16], share: 0.7}\n", 16);
+  ASSERT_GE(report_["faults"]["vacuum_weak"], 1);
+  EXPECT_GE(part("vacuum")["alerts"], 1);
+  EXPECT_THAT(conditions("vacuum"), AllOf(Contains("poor"), Contains("good"), Not(Contains("bad"))));
+  EXPECT_THAT(run_.err, HasSubstr(" % of the best so far"));
+  EXPECT_LE(report_["parcels"]["exceptions"]["undeserved"], 1) << run_.out;
+  EXPECT_EQ(report_["parcels"]["damaged"], 0) << run_.out;
+}
+
+// Four tenths do not: what cannot be lifted rides on, and a try now and then finds out when it can again.
+TEST_F(Degradation, WithoutVacuumParcelsRideAndTheReasonIsSaid) {
+  run_with("vacuum_weak: {an_hour: 300, lasts_s: [20, 24], share: 0.4}\n", 14);
+  ASSERT_GE(report_["faults"]["vacuum_weak"], 1);
+  EXPECT_THAT(conditions("vacuum"), AllOf(Contains("bad"), Contains("good")));
+  EXPECT_GE(undeserved(report_, "the vacuum is too weak"), 4) << run_.out;
+  EXPECT_GE(report_["parcels"]["sorted"], 3) << run_.out;
+  EXPECT_THAT(run_.err, HasSubstr("pons: vacuum is bad at "));
+}
+
 TEST_F(Degradation, WhereNothingFailsNobodyHearsOfIt) {
   run_with("brain_stall: {an_hour: 0, lasts_s: [1, 1]}\n", 3);
   EXPECT_EQ(report_["health"]["alerts"], 0) << report_["health"].dump(2);
   for (const char* const name : {"arm", "belt", "brain", "bridge", "camera overhead", "camera label", "camera tray",
-                                 "journal", "loop", "perception"})
+                                 "journal", "loop", "perception", "vacuum"})
     EXPECT_EQ(part(name)["condition"], "good") << name;
   EXPECT_THAT(run_.err, Not(HasSubstr("pons: ")));
   EXPECT_THAT(run_.out, Not(HasSubstr("alerts")));
