@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -56,6 +57,18 @@ class Degradation : public testing::Test {
     expect_accounted_for(report_);
     EXPECT_EQ(report_["parcels"]["offered"], parcels) << run_.out;
     EXPECT_EQ(report_["parcels"]["missorted"], 0) << run_.out;
+  }
+  // Likewise in this process, where a test can look at it.
+  [[nodiscard]] std::unique_ptr<apps::Assembly> built(const std::string& plan, int parcels) const {
+    write_text(folder_ / "plan.yaml", plan);
+    auto world = world::load("worlds", "parcel_cell");
+    EXPECT_TRUE(world) << world.error().line();
+    apps::AssemblyOptions options{.journal = ":memory:", .socket = {}, .body = {}};
+    options.body.faults = world::load_faults(*world, folder_ / "plan.yaml").value();
+    const world::Manifest manifest = world::draw_manifest(*world, parcels, 1).value();
+    auto cell = apps::Assembly::build(*std::move(world), manifest, options);
+    EXPECT_TRUE(cell) << cell.error().line();
+    return cell ? std::move(*cell) : nullptr;
   }
   [[nodiscard]] json part(const std::string& name) const { return report_["health"]["parts"][name]; }
 
@@ -114,6 +127,9 @@ TEST_F(Degradation, WithoutABrainParcelsRideByTheRulesOfAWorldThatSaysSo) {
   for (const bridge::Event& event : notes()) {
     if (event.kind == "health" && event.detail.at("part") == "brain" && event.detail.at("condition") == "poor")
       silent = event.stamp;
+    if (event.kind == "closed") {
+      EXPECT_EQ(event.detail.at("never_identified"), 0) << "the brain has heard of each that rode by";
+    }
     if (event.kind != "fallback") continue;
     decides.push_back(event.detail.at("decides"));
     if (decides.size() > 1) continue;
@@ -159,15 +175,9 @@ TEST_F(Degradation, WithoutACameraNoPickBegins) {
 
 // By where the arm really is.
 TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
-  write_text(folder_ / "plan.yaml", "blackout: {an_hour: 300, lasts_s: [6, 8]}\n");
-  auto world = world::load("worlds", "parcel_cell");
-  ASSERT_TRUE(world) << world.error().line();
-  apps::AssemblyOptions options{.journal = ":memory:", .socket = {}, .body = {}};
-  options.body.faults = world::load_faults(*world, folder_ / "plan.yaml").value();
-  const world::Manifest manifest = world::draw_manifest(*world, 8, 1).value();
-  auto cell = apps::Assembly::build(*std::move(world), manifest, options);
-  ASSERT_TRUE(cell) << cell.error().line();
-  apps::BridgeHalf& above = *(*cell)->above;
+  const auto cell = built("blackout: {an_hour: 300, lasts_s: [6, 8]}\n", 8);
+  ASSERT_TRUE(cell);
+  apps::BridgeHalf& above = *cell->above;
   int parked = 0, elsewhere = 0;
   const runner::Watch watch{.progress = [&](Time now) {
     const auto& parts = above.bridge_side->health().parts();
@@ -175,10 +185,10 @@ TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
     if (camera == parts.end() || camera->second.condition != runner::Condition::kBad) return;
     if (now - camera->second.since < std::chrono::seconds(3) || above.bridge->uses_resources()) return;
     const Vector3 tip = above.cell->model.world_from_tip(above.cell->arm.state().position).translation();
-    const bool aside = std::abs(tip.x() - (*cell)->world.belt.pick_x_max_m) < 0.02;
+    const bool aside = std::abs(tip.x() - cell->world.belt.pick_x_max_m) < 0.02;
     ++(aside ? parked : elsewhere);
   }};
-  runner::Parts parts = (*cell)->parts();
+  runner::Parts parts = cell->parts();
   const auto result = runner::run_lockstep(parts, watch);
   ASSERT_TRUE(result) << result.error().line();
   EXPECT_GE(parked, 100);
@@ -247,6 +257,17 @@ TEST_F(Degradation, WithLessVacuumParcelsAreCarriedAllTheSame) {
   EXPECT_THAT(run_.err, HasSubstr(" % of the best so far"));
   EXPECT_LE(report_["parcels"]["exceptions"]["undeserved"], 1) << run_.out;
   EXPECT_EQ(report_["parcels"]["damaged"], 0) << run_.out;
+}
+
+TEST_F(Degradation, WithLessVacuumTheArmKnowsWhatTheCupsHold) {
+  const auto cell = built("vacuum_weak: {an_hour: 300, lasts_s: [12, 16], share: 0.7}\n", 16);
+  ASSERT_TRUE(cell);
+  double least = 1;
+  const runner::Watch watch{.progress = [&](Time) { least = std::min(least, cell->above->cell->grip_share); }};
+  runner::Parts parts = cell->parts();
+  const auto result = runner::run_lockstep(parts, watch);
+  ASSERT_TRUE(result) << result.error().line();
+  EXPECT_NEAR(least, 0.7, 0.03);
 }
 
 // Four tenths do not: what cannot be lifted rides on, and a try now and then finds out when it can again.
