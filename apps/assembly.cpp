@@ -8,6 +8,7 @@
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
 #include "pons/bridge/journal/place.hpp"
+#include "pons/rt/clock.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -141,6 +142,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     socket = std::move(*listening);
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
+  if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, self->registry, world);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
@@ -158,11 +160,13 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     half->policies->attend(half->cell->stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(),
-                                                           world.zones, options.recovery, visitors);
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_port(), world,
+                                                           options.recovery, visitors);
+  self->bridge_side->keep_free(options.keep_free);
   if (socket) {
-    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
-                                        [half = self.get()] { return half->cell->stream; });
+    self->desk =
+        std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->arming(),
+                               self->bridge_side->health(), [half = self.get()] { return half->cell->stream; });
   }
   return self;
 }
@@ -195,6 +199,8 @@ runner::SkillPort BridgeHalf::skill_port() {
           .outside_rad = [this] { return cell->arm.outside_rad(); },
           .recover = [this](Time now) { return cell->arm.recover(now); },
           .rest = [this](Time now) { rest->tick(now); },
+          .park = [this](Time now) { rest->park(now); },
+          .grip = [this](const runner::Grip& grip) { cell->grip_share = grip.share, cell->lifts = grip.lifts; },
           .belt = [this](link::Belt wanted) { cell->arm.belt(wanted); },
           .holds_belt = [this](Time now) { return cell->holds_belt(now); },
           .halt = [this] { cell->arm.halt(); },
@@ -215,8 +221,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above = BridgeHalf::build(self->world, manifest,
-                                 {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
+  auto above =
+      BridgeHalf::build(self->world, manifest,
+                        {options.journal, options.socket, std::nullopt, options.recovery, options.keep_free}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
   const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];

@@ -80,6 +80,7 @@ struct BridgeOptions {
   // holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
   runner::Recovery recovery = runner::Recovery::kRefused;
+  std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
 };
 
 class BridgeHalf {
@@ -118,6 +119,7 @@ struct AssemblyOptions {
   BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;
   runner::Recovery recovery = runner::Recovery::kRefused;
+  std::uint64_t keep_free = runner::kKeptFree;
 };
 
 // Both halves in this process.

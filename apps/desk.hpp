@@ -13,6 +13,7 @@
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/health.hpp"
 #include "pons/task/policy.hpp"
 
 namespace pons::apps {
@@ -23,7 +24,7 @@ class Desk {
   using Stream = std::function<task::ChunkStream*()>;
   // All but the visitors must outlive it.
   Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
-       runner::Arming& arming, Stream stream);
+       runner::Arming& arming, const runner::Health& health, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
@@ -48,6 +49,7 @@ class Desk {
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
   runner::Arming& arming_;
+  const runner::Health& health_;
   Stream stream_;
   struct Watcher {
     gate::Request request;

@@ -112,6 +112,14 @@ class Bridge {
   enum class Hold : std::uint8_t { kOff, kOn };
   void hold(Hold hold) { hold_ = hold; }
 
+  // What keeps new tasks from being taken, as their senders are told, and orders from being claimed; nothing: they are.
+  // Those that are open go on.
+  void refuse_new(std::optional<Error> why) { closed_ = std::move(why); }
+
+  // Withheld, no task is given a resource, and none makes way for another: who needs some waits, and its time passes.
+  // Those that have them go on, and so do those that need none.
+  void withhold(Arbiter::Withheld what) { arbiter_.withhold(what); }
+
   // A journal entry of no task; `order` is what it belongs to, if anything.
   void note(std::string_view kind, const Json& detail, Time now, std::string_view order = {});
   // Makes all that happened so far durable. Error: the journal cannot be written, which is then fault(), too.
@@ -137,6 +145,7 @@ class Bridge {
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources() const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
+  [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] bool held() const { return hold_ == Hold::kOn; }
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
   [[nodiscard]] std::int64_t refused() const { return refused_; }  // submissions
@@ -220,7 +229,7 @@ class Bridge {
   std::set<std::string> parked_;
   std::set<std::string> asking_;                 // a person
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
-  std::optional<Error> fault_;
+  std::optional<Error> fault_, closed_;
   std::size_t shared_work_ = 0;  // of this tick, by those that need no resource
   std::string next_;             // of those, who has the first turn in the next tick; empty: all have had theirs
   Time last_commit_, last_tick_, look_at_;  // the last: into the order book again

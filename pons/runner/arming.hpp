@@ -46,6 +46,8 @@ class Arming {
 
   // The arm is still being brought out of where a bridge that is no more has left it; nothing else may move it.
   [[nodiscard]] bool settles() const { return took_over_; }
+  // It is stopped, and only a person ends that.
+  [[nodiscard]] bool needs_person() const { return needs_person_; }
   [[nodiscard]] std::int64_t stops() const { return stops_; }
   // Times the arm came to need a person: by a cause that only one may reset, or by one's own word.
   [[nodiscard]] std::int64_t interventions() const { return interventions_; }

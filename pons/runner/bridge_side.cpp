@@ -14,18 +14,20 @@ using bridge::Json;
 
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
-constexpr Duration kBrainSilent = std::chrono::milliseconds(300);
-// Frames come four times a second and later by what it takes to see what they show.
-constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
-BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills,
-                       const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
-    : bridge_(bridge),
+BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const world::World& world,
+                       Recovery recovery, std::function<void(Time)> visitors)
+    : world_(world),
+      bridge_(bridge),
       brain_(brain),
       skills_(std::move(skills)),
-      arming_(bridge, skills_, zones, recovery),
+      arming_(bridge, skills_, world.zones, recovery),
+      health_([this](std::string_view part, const PartHealth& health, Time now) {
+        bridge_.note("health", {{"part", part}, {"condition", name(health.condition)}, {"why", health.why}}, now);
+      }),
+      vitals_(world, health_),
       visitors_(std::move(visitors)) {}
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
@@ -33,6 +35,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
+    if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
     if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
   const auto events = journal.notes();
@@ -59,6 +62,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
   skills_.refresh(now, std::move(obstacles), seen_.belt_seen);
   if (auto good = arming_.tick(now); !good) return good;
+  look_after_parts(now);
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What nobody sees must not ride by unread, nor into the arm.
   const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
@@ -69,9 +73,13 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
 
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
-  if (!bridge_.uses_resources() && !arming_.settles()) skills_.rest(now);
+  if (!bridge_.uses_resources() && !arming_.settles()) {
+    const bool parks = (vitals_.belt_unseen() || falls_back_) && skills_.park;
+    parks ? skills_.park(now) : skills_.rest(now);
+  }
   if (auto noted = note_carried(now); !noted) return noted;
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
+    asked_.erase(report.id);
     if (brain_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
   for (const std::uint32_t track : skills_.take_forgotten()) {
@@ -90,7 +98,25 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
     }
   }
   seen_ = snapshot;
+  seen_behind_ = now - snapshot.due;
   if (snapshot.base && skills_.locate) skills_.locate(*snapshot.base);
+}
+
+void BridgeSide::look_after_parts(Time now) {
+  const link::State& state = skills_.state();
+  vitals_.eyes(seen_, seen_behind_, now);
+  vitals_.arm(state, arming_.needs_person() ? Vitals::Resumes::kByPerson : Vitals::Resumes::kByItself, now);
+  vitals_.belt(state, now);
+  if (skills_.grip) skills_.grip(vitals_.vacuum(state, now));
+  vitals_.loop(state, now);
+  vitals_.bridge(bridge_.open_count(), now);
+  vitals_.journal(bridge_.journal(), now);
+  // What is begun goes on. A new task would be one more that a camera has to show the way to.
+  bridge_.withhold(vitals_.belt_unseen() ? bridge::Arbiter::Withheld::kResources : bridge::Arbiter::Withheld::kNothing);
+  bridge_.refuse_new(vitals_.lacks_room().empty()
+                         ? std::nullopt
+                         : std::optional(Error{"no room for new tasks: " + vitals_.lacks_room(), "journal",
+                                               "free some space; tasks are taken again by themselves"}));
 }
 
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -107,10 +133,17 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
-  // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
-  if (stalls_ && stalls_->on(now)) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
-  brain_heard_ = now;
-  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.parked());
+  const bool silent = stalls_ && stalls_->on(now);
+  if (!silent) brain_heard_ = now;
+  vitals_.brain(brain_heard_, now);
+  // A brain that says nothing asks for nothing, nor is it asked for what there is no room for.
+  if (silent || !vitals_.lacks_room().empty()) return fall_back(objects, now);
+  decided_ = now;
+  if (std::exchange(falls_back_, false)) bridge_.note("fallback", {{"decides", "brain"}}, now);
+  tell_brain_what_rode();
+  std::vector<ObjectBelief> undecided = objects;
+  std::erase_if(undecided, [&](const ObjectBelief& object) { return rode(object); });
+  const brain::Decisions decisions = brain_.observe(undecided, now, bridge_.parked());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
@@ -118,6 +151,8 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       const std::string code = task.value("order", id);
       bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
       brain_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
+    } else {
+      asked_.emplace(task.at("id").get<std::string>(), task.value("order", std::string{}));
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
@@ -126,6 +161,36 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   }
   brain_holds_belt_ = decisions.belt_waits;
   return decisions.belt_waits;
+}
+
+// What is not decided on must not ride by meanwhile; or, by the world's rules, it does, and only what was asked for
+// before gets its turn.
+bool BridgeSide::fall_back(const std::vector<ObjectBelief>& objects, Time now) {
+  const Duration undecided = now - decided_;
+  const world::Fallback& fallback = world_.fallback;
+  if (fallback.undecided == world::Fallback::Undecided::kHold || undecided <= from_s(fallback.after_s))
+    return brain_holds_belt_ || undecided > kBrainSilent;
+  if (!std::exchange(falls_back_, true)) bridge_.note("fallback", {{"decides", "rules"}}, now);
+  bool waits = false;
+  for (const ObjectBelief& object : objects) {
+    const bool asked = std::ranges::any_of(asked_, [&](const auto& task) { return task.second == object.code; });
+    const double x_m = object.world_from_top.translation().x();
+    if (asked) {
+      waits = waits || world_.belt.must_wait_for(x_m, std::max(object.velocity_m_s.x(), 0.0));
+    } else if (x_m > world_.belt.pick_x_max_m) {
+      let_ride(object, now);
+    }
+  }
+  return waits;
+}
+
+void BridgeSide::let_ride(const ObjectBelief& object, Time now) {
+  if (rode(object)) return;
+  rode_tracks_.push_back(object.track);
+  if (rode_tracks_.size() > kGoneRemembered) rode_tracks_.erase(rode_tracks_.begin());
+  rode_.push_back(object.code);
+  const char* const reason = vitals_.lacks_room().empty() ? "the brain was silent" : "no room for tasks";
+  bridge_.note("ride", {{"track", object.track}, {"code", object.code}, {"reason", reason}}, now, object.code);
 }
 
 // What the brain decided on.
@@ -163,7 +228,16 @@ void BridgeSide::stop(Time now, const std::string& reason) {
 
 bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }
 
+bool BridgeSide::rode(const ObjectBelief& object) const {
+  return std::ranges::find(rode_tracks_, object.track) != rode_tracks_.end();
+}
+
+void BridgeSide::tell_brain_what_rode() {
+  for (const std::string& code : std::exchange(rode_, {})) brain_.recall_ride(code);
+}
+
 void BridgeSide::close(Time now) {
+  tell_brain_what_rode();
   const std::vector<std::string> unseen = brain_.unseen();
   for (const std::string& code : unseen) {
     bridge_.note("ride",

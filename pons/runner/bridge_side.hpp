@@ -13,8 +13,10 @@
 #include "pons/brain/brain.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/health.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/runner/skill_port.hpp"
+#include "pons/runner/vitals.hpp"
 #include "pons/world/faults.hpp"
 #include "pons/world/world.hpp"
 
@@ -24,9 +26,8 @@ inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
 
 class BridgeSide {
  public:
-  // All must outlive it. `zones` are the world's. `visitors` is called once a period, before the bridge's tick:
-  // requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const std::vector<world::Zone>& zones,
+  // All must outlive it. `visitors` is called once a period, before the bridge's tick: requests from outside.
+  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, SkillPort skills, const world::World& world,
              Recovery recovery, std::function<void(Time)> visitors);
 
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
@@ -42,33 +43,51 @@ class BridgeSide {
 
   // From now on the brain is silent in these spells.
   void stall_brain(const world::Spells& stalls) { stalls_ = stalls; }
+  // See Vitals.
+  void keep_free(std::uint64_t bytes) { vitals_.keep_free(bytes); }
   [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
   [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const { return arming_.stops(); }
   [[nodiscard]] Arming& arming() { return arming_; }  // for a person's words
+  [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:
   void take_in(const Snapshot& snapshot, Time now);
+  void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  // Likewise, while nothing is decided.
+  bool fall_back(const std::vector<ObjectBelief>& objects, Time now);
+  void let_ride(const ObjectBelief& object, Time now);
+  [[nodiscard]] bool rode(const ObjectBelief& object) const;
+  void tell_brain_what_rode();
   void note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now);
   [[nodiscard]] Expected<void> note_carried(Time now);
 
+  const world::World& world_;
   bridge::Bridge& bridge_;
   brain::Brain& brain_;
   SkillPort skills_;
   Arming arming_;
+  Health health_;
+  Vitals vitals_;
   std::function<void(Time)> visitors_;
   Snapshot seen_;
+  Duration seen_behind_{0};               // of when it was due
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   bridge::Json carried_;                  // as last noted
   Time last_outcome_, brain_heard_;
-  bool brain_holds_belt_ = false;  // as it last said
+  Time decided_;                                           // when the brain was last asked
+  bool falls_back_ = false;                                // to the world's rules
+  std::map<std::string, std::string, std::less<>> asked_;  // code by task: what the brain asked for and has no outcome
+  std::vector<std::string> rode_;                          // codes, by those rules: to tell the brain
+  std::vector<std::uint32_t> rode_tracks_;                 // likewise; nothing is left for it to decide
+  bool brain_holds_belt_ = false;                          // as it last said
   std::optional<world::Spells> stalls_;
   std::int64_t unlabelled_ = 0;
   bool stopping_ = false;

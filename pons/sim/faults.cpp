@@ -37,7 +37,8 @@ Faults::Faults(const world::FaultPlan& plan, std::uint64_t seed)
       jams_(spells(plan, seed, Fault::kBeltJam)),
       occlusions_(spells(plan, seed, Fault::kOcclusion)),
       blackouts_(spells(plan, seed, Fault::kBlackout)),
-      shifts_(spells(plan, seed, Fault::kShiftedView)) {}
+      shifts_(spells(plan, seed, Fault::kShiftedView)),
+      weak_(spells(plan, seed, Fault::kVacuumWeak)) {}
 
 bool Faults::draws(Fault fault) {
   const double share = plan_[fault].often;
@@ -74,7 +75,14 @@ void Faults::begin_attempt() {
 Suction Faults::suction(std::uint32_t vacuum_on, const Gripper& gripper, const Ledger& ledger, Time now) {
   if (vacuum_on_ == 0 && vacuum_on != 0) begin_attempt();
   vacuum_on_ = vacuum_on;
-  if (vacuum_on == 0) return {};
+  const bool weak = weak_.on(now);
+  Suction suction = vacuum_on == 0 ? Suction{} : attempted(gripper, ledger, now);
+  if (weak) suction.pump = plan_[Fault::kVacuumWeak].share;
+  return suction;
+}
+
+// By what was drawn for this attempt.
+Suction Faults::attempted(const Gripper& gripper, const Ledger& ledger, Time now) {
   const int slot = gripper.touched();
   if (attempt_.misses) {
     if (slot >= 0 && !std::exchange(attempt_.missed, true)) ++counts_[Fault::kMissedGrasp];
@@ -164,6 +172,7 @@ world::FaultCounts Faults::counts() const {
   counts[Fault::kOcclusion] = occlusions_.begun();
   counts[Fault::kBlackout] = blackouts_.begun();
   counts[Fault::kShiftedView] = shifts_.begun();
+  counts[Fault::kVacuumWeak] = weak_.begun();
   return counts;
 }
 

@@ -56,6 +56,7 @@ class Faults {
     bool missed = false, leaked = false, dropped = false;  // has come to pass
     std::optional<Time> lifted;
   };
+  [[nodiscard]] Suction attempted(const Gripper& gripper, const Ledger& ledger, Time now);
   [[nodiscard]] bool draws(world::Fault fault);
   void begin_attempt();
   [[nodiscard]] int neighbour(const Composed& cell, mjData* data, int slot, const Ledger& ledger) const;
@@ -63,7 +64,7 @@ class Faults {
   world::FaultPlan plan_;
   std::uint64_t seed_;
   std::array<Random, world::kFaults> streams_;
-  world::Spells jams_, occlusions_, blackouts_, shifts_;
+  world::Spells jams_, occlusions_, blackouts_, shifts_, weak_;
   world::FaultCounts counts_;
   std::uint32_t vacuum_on_ = 0;
   Attempt attempt_;

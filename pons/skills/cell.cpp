@@ -327,11 +327,11 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     const double mass_kg = held->mass_kg + kUnsure_kg;
     const double cups = grip_use(model, world.robot.tool, held->load, mass_kg, *way);
     const double motors = torque_use(model, world.robot, held->load, mass_kg, *way);
-    const double use = std::max(cups / kGripShare, motors / kTorqueShare);
+    const double use = std::max(cups / (kGripShare * grip_share), motors / kTorqueShare);
     if (use <= 1) return way;
     if (search.share <= kSlowestShare) {
-      if (search.must || (cups <= kSlowGripShare && motors <= 1)) return way;
-      return too_heavy(held->mass_kg, cups, motors);
+      if (search.must || (cups <= kSlowGripShare * grip_share && motors <= 1)) return way;
+      return too_heavy(held->mass_kg, cups / grip_share, motors);
     }
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;
     search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, timid));
@@ -347,7 +347,7 @@ Expected<void> Cell::stop(Time now) {
     if (!way) break;
     const double mass_kg = held->mass_kg + kUnsure_kg;
     softest = std::move(*way);
-    if (grip_use(model, world.robot.tool, held->load, mass_kg, *softest) <= kGripShare) break;
+    if (grip_use(model, world.robot.tool, held->load, mass_kg, *softest) <= kGripShare * grip_share) break;
   }
   return softest ? arm.stream(*softest) : arm.stop(now);
 }

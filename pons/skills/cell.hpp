@@ -150,6 +150,8 @@ class Cell {
   std::optional<std::string> hooked;  // the last code on which another was found to hang
   std::optional<Held> lost;           // from the cups in the last stop in which anything was
   Strays strays;
+  double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
+  bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does
   std::uint64_t streams = 0;            // there were so far
 

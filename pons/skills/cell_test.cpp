@@ -184,6 +184,15 @@ TEST_F(CarryTest, WhatIsHeavyAndTallGoesSlowerThanWhatIsLightAndFlat) {
   }
 }
 
+TEST_F(CarryTest, WhatTheCupsHoldWithLessVacuumGoesSlower) {
+  const Vector3 size_m{0.2, 0.2, 0.3};
+  const double base_s = duration_s(carry(size_m, 2));
+  cell_.grip_share = 0.5;
+  const motion::Trajectory slow = carry(size_m, 2);
+  EXPECT_LE(use(slow), 0.5 * kReserve);
+  EXPECT_GT(duration_s(slow), 1.1 * base_s);
+}
+
 TEST_F(CarryTest, AsHighOrAsHeavyAloneAlreadySlowsItDown) {
   const double base_s = duration_s(carry({0.2, 0.2, 0.05}, 1.5));
   EXPECT_GT(duration_s(carry({0.2, 0.2, 0.3}, 1.5)), 1.05 * base_s);

@@ -139,6 +139,7 @@ class Pick final : public ArmSkill {
       const Progress begun = begin_set_down(now, wanted ? overweight(mass) : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
+    if (!cell_.lifts) return {Status::kException, "the vacuum is too weak", {}};
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
       step_aside(now);

@@ -96,7 +96,7 @@ TEST(Faults, AStormOfOneSeedIsOneResult) {
   const json one = storm("one.json"), two = storm("two.json");
   EXPECT_EQ(one["state_hash"], two["state_hash"]);
   EXPECT_EQ(one["faults"], two["faults"]);
-  EXPECT_EQ(one["faults"].size(), 10U);
+  EXPECT_EQ(one["faults"].size(), 10U) << "all but a weak pump";
 }
 
 TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {

@@ -102,11 +102,11 @@ Expected<std::unique_ptr<Process>> Process::start(const Outside& outside) {
     half->desk_->attend(now);
     half->outside_.steps.doing(Doing::kTicking);
   };
-  self->side_ = std::make_unique<runner::BridgeSide>(*self->bridge_, *self->brain_, self->skill_port(),
-                                                     outside.world.zones, runner::Recovery::kAllowed, visitors);
+  self->side_ = std::make_unique<runner::BridgeSide>(*self->bridge_, *self->brain_, self->skill_port(), outside.world,
+                                                     runner::Recovery::kAllowed, visitors);
   self->desk_ = std::make_unique<apps::Desk>(std::make_unique<Counter>(outside.network, steps, outside.now),
                                              *self->bridge_, *self->journal_, self->side_->arming(),
-                                             [half = self.get()] { return half->cell_.stream; });
+                                             self->side_->health(), [half = self.get()] { return half->cell_.stream; });
   steps.doing(Doing::kTakingOver);
   auto taken = self->side_->take_over(*self->journal_, outside.now);
   if (!taken) return std::unexpected(taken.error());

@@ -124,7 +124,7 @@ std::vector<std::string> Arbiter::grant(Time now) {
   age();
   std::vector<std::string> granted;
   if (!changed_) return granted;
-  Mask taken = held_;
+  Mask taken = held_ | withheld_;
   std::set<Mask> passed;
   while (const Lanes::value_type* const lane = first_lane(passed)) {
     const Mask needs = lane->first;
@@ -149,6 +149,12 @@ std::vector<std::string> Arbiter::grant(Time now) {
 
 bool Arbiter::is_free(Mask needs, Mask taken) const {
   return needs != 0 ? (needs & taken) == 0 : seated_ < schedule_.running;
+}
+
+void Arbiter::withhold(Withheld what) {
+  const Mask withheld = what == Withheld::kResources ? ~Mask{0} : 0;
+  changed_ = changed_ || withheld != withheld_;
+  withheld_ = withheld;
 }
 
 void Arbiter::give_back(const Entry& entry) {
@@ -209,6 +215,7 @@ std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays) const 
       free_seats(lane->second, stays, by);
       continue;
     }
+    if ((lane->first & withheld_) != 0) continue;
     const Entry& urgent = *lane->second.begin()->second;
     const bool alone = (claimed & urgent.needs) == 0;
     claimed |= urgent.needs;
