@@ -20,9 +20,7 @@ using task::Status;
 constexpr Duration kVacuumLead = std::chrono::milliseconds(40);   // before the contact
 constexpr Duration kSealWithin = std::chrono::milliseconds(330);  // after it, while riding along
 constexpr Duration kPressAfter = std::chrono::milliseconds(90);   // the contact, when too few cups have sealed
-constexpr double kPressFurther_m = 0.003;
 constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
-constexpr double kPressTakes_s = 0.08;
 constexpr int kPresses = 2;
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
@@ -48,10 +46,7 @@ constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a li
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
 constexpr double kNearEnd_m = 0.25;    // of the pick zone: what is lifted there has to be put back soon
-constexpr double kHeard_s = 0.05;      // until a belt obeys
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
-constexpr double kWaitOver_m = 0.06;   // the others, which pass below
-constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
 
 class Pick final : public ArmSkill {
  public:
@@ -171,7 +166,9 @@ class Pick final : public ArmSkill {
     if (comes_too_late(met_x)) return {};
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
-    if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
+    if (soonest && quarters_ != 0)
+      turned = Eigen::AngleAxisd(quarters_ * std::numbers::pi / 2, object->world_from_top.linear().col(2)) *
+               soonest->orientation;
     auto grasp = plan_grasp(cell_, state, from, *object, turned, search_);
     if (!grasp) {
       if (cell_.router.spent()) {
@@ -197,10 +194,8 @@ class Pick final : public ArmSkill {
 
   // The brain has the belt wait for what it sees; what was put back, nobody may see.
   void keep_in_reach(const ObjectBelief& object, Time now) {
-    const world::Belt& belt = cell_.world.belt;
-    const double speed_m_s = cell_.belt_speed_m_s();
-    const double stops_m = speed_m_s * (kHeard_s + speed_m_s / (2 * belt.ramp_m_s2));
-    if (object.world_from_top.translation().x() + stops_m > belt.waits_at_m()) cell_.hold_belt(now);
+    const double x_m = object.world_from_top.translation().x();
+    if (cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
   }
 
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
@@ -265,18 +260,7 @@ class Pick final : public ArmSkill {
   // The parcel is still too far upstream: hang over the place where it will come within reach.
   Progress wait_for(const ObjectBelief& object, const Grasp& grasp, Time now) {
     if (waiting_) return {};
-    const Time from = cell_.arm.splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    Vector3 point = grasp.contact_point;
-    point.x() = cell_.world.belt.pick_x_min_m + 0.02;
-    point.z() = object.world_from_top.translation().z() + kWait_m;
-    for (const ObjectBelief& other : cell_.objects()) {
-      point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
-    }
-    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of(grasp.orientation)), state.position);
-    if (!q) return {};
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                                        cell_.limits_empty());
+    const auto way = way_to_wait(cell_, object, grasp, now);
     if (way && cell_.arm.stream(*way)) waiting_ = true;
     return {};
   }
@@ -325,9 +309,11 @@ class Pick final : public ArmSkill {
     if (moved_m <= kMoved_m && cell_.router.clear(grasp_.trajectory, now, grasp_.hover, nullptr, cell_.objects()))
       return;
     const Time from = cell_.arm.splice_time(now);
-    const double turn = yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
+    // A belief's yaw is known up to half a turn.
+    const double turn = std::remainder(yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear()),
+                                       std::numbers::pi);
     const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
-                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation, search_);
+                                   Eigen::AngleAxisd(turn, Vector3::UnitZ()) * grasp_.orientation, search_);
     planned_ = now;
     if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
   }
@@ -362,16 +348,9 @@ class Pick final : public ArmSkill {
   bool press_further(Time now) {
     if (weigh_now(cell_) < -kPressedHard_kg) return false;
     const Time from = cell_.arm.splice_time(now);
-    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.orientation,
-                      kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt, cell_.limits_empty());
-    if (!down) return false;
-    const Time end = down->back().end();
-    const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.orientation, 0.4);
-    if (!along) return false;
-    down->insert(down->end(), along->begin(), along->end());
-    if (!cell_.arm.stream(*down)) return false;
-    grasp_.contact = end;
+    const auto down = press_down(cell_, cell_.arm.planned(from), from, grasp_.orientation);
+    if (!down || !cell_.arm.stream(down->trajectory)) return false;
+    grasp_.contact = down->pressed;
     ++presses_;
     return true;
   }
@@ -474,19 +453,10 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
-    return {Status::kSucceeded,
-            {},
-            {{"mass_kg", cell_.held->mass_kg},
-             {"sealed", cell_.arm.cups().sealed_cups},
-             {"seconds", to_s(now - started_)}}};
+    task::Json detail{{"mass_kg", cell_.held->mass_kg}};
+    detail.update({{"sealed", cell_.arm.cups().sealed_cups}, {"seconds", to_s(now - started_)}});
+    return {Status::kSucceeded, {}, std::move(detail)};
   }
-
-  static Eigen::Matrix3d quarter_turns(const ObjectBelief& object, int count) {
-    const Vector3 up = object.world_from_top.linear().col(2);
-    return Eigen::AngleAxisd(count * std::numbers::pi / 2, up).toRotationMatrix();
-  }
-  // A belief's yaw is known up to half a turn.
-  static double wrapped(double angle) { return std::remainder(angle, M_PI); }
 
   Cell& cell_;
   std::string code_;

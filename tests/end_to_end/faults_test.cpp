@@ -53,6 +53,13 @@ TEST(Faults, WhatFallsOnTheWayIsAccountedFor) {
       << run.said;
 }
 
+// Felt at the wrist, both are put back where they lay and taken one by one; what was not felt is named where it fell.
+TEST(Faults, WhatHangsOnAnotherIsPutBackOrNamed) {
+  const Faulty run = run_with("double_pick: {a_pick: 0.1}\n", 40, 6);
+  EXPECT_GE(run.injected("double_pick"), 3);
+  EXPECT_LE(run.report["parcels"]["exceptions"].value("undeserved", 99), 2) << run.said;
+}
+
 TEST(Faults, ABeltThatJamsCostsTimeOnly) {
   const Faulty run = run_with("belt_jam: {an_hour: 300, lasts_s: [2, 6]}\n", 20, 1);
   EXPECT_GE(run.injected("belt_jam"), 1);
