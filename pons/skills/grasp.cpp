@@ -204,7 +204,7 @@ Expected<motion::Trajectory> way_to_wait(Cell& cell, const ObjectBelief& object,
                            cell.limits_empty());
 }
 
-Expected<Press> press_down(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation) {
+Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation) {
   const Vector3 belt{cell.belt_speed_m_s(), 0, 0};
   auto down = nudge(cell, start, at, orientation, kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt,
                     cell.limits_empty());
@@ -213,7 +213,7 @@ Expected<Press> press_down(Cell& cell, const AxisState& start, Time at, const Ei
   const auto along = ride(cell, motion::sample(*down, end, cell.model.axes()), end, orientation, kPressRides_s);
   if (!along) return std::unexpected(along.error());
   down->insert(down->end(), along->begin(), along->end());
-  return Press{*std::move(down), end};
+  return PressedDown{*std::move(down), end};
 }
 
 ObjectBelief held_at(const Held& held, const Pose& world_from_tip) {

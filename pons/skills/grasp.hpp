@@ -81,12 +81,12 @@ struct Lift {
 
 // The cups a little further down onto what they touch, riding along with the belt from `pressed` on. Error: out of
 // reach.
-struct Press {
+struct PressedDown {
   motion::Trajectory trajectory;
   Time pressed;
 };
-[[nodiscard]] Expected<Press> press_down(Cell& cell, const AxisState& start, Time at,
-                                         const Eigen::Matrix3d& orientation);
+[[nodiscard]] Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at,
+                                               const Eigen::Matrix3d& orientation);
 
 // What hangs on the cups, as if it were seen there.
 [[nodiscard]] ObjectBelief held_at(const Held& held, const Pose& world_from_tip);

@@ -109,6 +109,7 @@ TEST_F(TakeUpTest, TheLightCurtainsSayWhereItFell) {
   fallen_into_ = {"chute_2"};
   cups(kSealed_kpa, 15, over("chute_3"));
   cell_.held = held_;
+  cell_.held->falls = cell_.falls();
   const task::Json written = take_up_.carries();
   cell_.held.reset();
   cups(0, 0, world_.robot.home);
