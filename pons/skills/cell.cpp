@@ -180,9 +180,10 @@ void Cell::recognise_left() {
     if (object.track == 0) continue;
     std::erase_if(left_, [&](const ObjectBelief& left) {
       const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
-      const bool lies_there = object.code.empty() && object.last_seen > left.last_seen && off.norm() < kSlides_m;
+      const bool lies_there =
+          object.code.empty() && !left.code.empty() && object.last_seen > left.last_seen && off.norm() < kSlides_m;
       if (lies_there) labelled_[object.track] = left.code;
-      return lies_there || object.code == left.code;
+      return lies_there || (object.code == left.code && !left.code.empty());
     });
     const auto label = labelled_.find(object.track);
     if (label != labelled_.end() && object.code.empty()) object.code = label->second;

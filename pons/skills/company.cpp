@@ -1,5 +1,7 @@
 #include "pons/skills/company.hpp"
 
+#include <utility>
+
 namespace pons::skills {
 namespace {
 
@@ -30,6 +32,11 @@ void Strays::look(const std::vector<ObjectBelief>& objects) {
     const auto found = gone_.find(object.code);
     if (found != gone_.end() && object.last_seen > found->second.since) gone_.erase(found);
   }
+}
+
+bool Strays::missed_twice(const std::string& code) {
+  const auto found = gone_.find(code);
+  return found != gone_.end() && std::exchange(found->second.missed, true);
 }
 
 const std::string* Strays::place_of(const std::string& code) const {

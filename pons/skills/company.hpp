@@ -31,11 +31,14 @@ class Strays {
   void look(const std::vector<ObjectBelief>& objects);
   // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
   [[nodiscard]] const std::string* place_of(const std::string& code) const;
+  // The cups met nothing where it should lie. True once they have before, with no camera's having seen it meanwhile.
+  [[nodiscard]] bool missed_twice(const std::string& code);
 
  private:
   struct Gone {
     std::string place;
     Time since;
+    bool missed = false;
   };
   std::map<std::string, Gone> gone_;  // by code
 };

@@ -70,6 +70,9 @@ TEST(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
   ASSERT_NE(strays.place_of("B"), nullptr) << "seen last before it was lifted";
   EXPECT_EQ(*strays.place_of("B"), "chute_1");
   EXPECT_EQ(strays.place_of("C"), nullptr) << "it has stayed";
+  EXPECT_FALSE(strays.missed_twice("B")) << "a grasp may fail";
+  EXPECT_TRUE(strays.missed_twice("B"));
+  EXPECT_FALSE(strays.missed_twice("C") || strays.missed_twice("C"));
   EXPECT_EQ(strays.place_of("D"), nullptr);
   EXPECT_EQ(strays.place_of(""), nullptr);
 }
