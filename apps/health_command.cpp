@@ -28,7 +28,9 @@ void show(const Json& health, double time_s) {
     std::string text;
     if (!why.empty()) text = fmt::format("for {:.1f} s: {}", time_s - part.value("since_s", 0.0), why);
     if (alerts > 0) text += fmt::format("{}{} alert{}", text.empty() ? "" : "; ", alerts, alerts == 1 ? "" : "s");
-    fmt::print("{:<5} {:<18}{}\n", task::text_of(part, "condition"), task::text_of(part, "part"), text);
+    const std::string name = task::text_of(part, "part");
+    fmt::print("{:<5} {}\n", task::text_of(part, "condition"),
+               text.empty() ? name : fmt::format("{:<18}{}", name, text));
   }
 }
 
