@@ -8,6 +8,7 @@
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
 #include "pons/bridge/journal/place.hpp"
+#include "pons/rt/clock.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -44,13 +45,18 @@ Expected<std::string> body_in(const bridge::Journal& journal) {
 
 }  // namespace
 
-bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done) {
+bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done) {
   using Fate = skills::TakeUp::Fate;
-  switch (fate) {
+  switch (take_up.fate(task, done)) {
     case Fate::kGoesOn:
       return {.done = done};
     case Fate::kDone:
       return {.done = done + 1};
+    case Fate::kAstray:
+      return {done,
+              task::Outcome::kException,
+              "fell into " + take_up.fell_into() + " while no bridge lived",
+              {{"fell_into", take_up.fell_into()}}};
     case Fate::kLost:
       return {done, task::Outcome::kFailed, "lost from the cups while no bridge lived"};
     case Fate::kBroken:
@@ -133,6 +139,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     socket = std::move(*listening);
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
+  if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, registry, world);
   for (std::size_t i = 1; i < self->arms.size(); ++i) self->bridge->add_robot(self->arms[i]->registry);
   self->bridge->use_trees(std::move(trees));
@@ -152,11 +159,13 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     half->policies->attend(half->cell().stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_ports(),
-                                                           world.zones, options.recovery, visitors);
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_ports(), world,
+                                                           options.recovery, visitors);
+  self->bridge_side->keep_free(options.keep_free);
   if (socket) {
-    self->desk = std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->armings(),
-                                        [half = self.get()] { return half->cell().stream; });
+    self->desk =
+        std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->armings(),
+                               self->bridge_side->health(), [half = self.get()] { return half->cell().stream; });
   }
   return self;
 }
@@ -214,28 +223,30 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
   std::vector<runner::SkillPort> ports;
   for (std::size_t robot = 0; robot < arms.size(); ++robot) {
     auto& [end, cell, rest, take_up, registry] = *arms[robot];
-    ports.push_back({.name = cell.world.arm,
-                     .robot = robot,
-                     .refresh = [&cell](Time now, std::vector<ObjectBelief> objects,
-                                        Time seen) { cell.refresh(now, std::move(objects), seen); },
-                     .state = [&cell]() -> const link::State& { return cell.arm.state(); },
-                     .take_forgotten = [&cell] { return cell.take_forgotten(); },
-                     .arm = [&cell](Time now) { cell.arm.arm(now); },
-                     .outside_rad = [&cell] { return cell.arm.outside_rad(); },
-                     .recover = [&cell](Time now) { return cell.arm.recover(now); },
-                     .rest = [&rest](Time now) { rest.tick(now); },
-                     .belt = [&cell](link::Belt wanted) { cell.arm.belt(wanted); },
-                     .holds_belt = [&cell](Time now) { return cell.holds_belt(now); },
-                     .halt = [&cell] { cell.arm.halt(); },
-                     .raise_emergency = [&end] { end.raise_emergency_stop(); },
-                     .release_emergency = [&end] { end.clear_emergency_stop(); },
-                     .carries = [&take_up] { return take_up.carries(); },
-                     .takes_until_m = cell.world.belt.pick_x_max_m,
-                     .lets_pass = [&cell] { return cell.lets_pass(); },
-                     .restore = [&take_up](const task::Json& carried) { take_up.restore(carried); },
-                     .resume = [&take_up](const task::Task& task,
-                                          std::size_t done) { return resumption(take_up.fate(task, done), done); },
-                     .settle = [&take_up](Time now) { return take_up.settle(now); }});
+    ports.push_back(
+        {.name = cell.world.arm,
+         .robot = robot,
+         .refresh = [&cell](Time now, std::vector<ObjectBelief> objects,
+                            Time seen) { cell.refresh(now, std::move(objects), seen); },
+         .state = [&cell]() -> const link::State& { return cell.arm.state(); },
+         .take_forgotten = [&cell] { return cell.take_forgotten(); },
+         .arm = [&cell](Time now) { cell.arm.arm(now); },
+         .outside_rad = [&cell] { return cell.arm.outside_rad(); },
+         .recover = [&cell](Time now) { return cell.arm.recover(now); },
+         .rest = [&rest](Time now) { rest.tick(now); },
+         .park = [&rest](Time now) { rest.park(now); },
+         .grip = [&cell](const runner::Grip& grip) { cell.grip_share = grip.share, cell.lifts = grip.lifts; },
+         .belt = [&cell](link::Belt wanted) { cell.arm.belt(wanted); },
+         .holds_belt = [&cell](Time now) { return cell.holds_belt(now); },
+         .halt = [&cell] { cell.arm.halt(); },
+         .raise_emergency = [&end] { end.raise_emergency_stop(); },
+         .release_emergency = [&end] { end.clear_emergency_stop(); },
+         .carries = [&take_up] { return take_up.carries(); },
+         .takes_until_m = cell.world.belt.pick_x_max_m,
+         .lets_pass = [&cell] { return cell.lets_pass(); },
+         .restore = [&take_up](const task::Json& carried) { take_up.restore(carried); },
+         .resume = [&take_up](const task::Task& task, std::size_t done) { return resumption(take_up, task, done); },
+         .settle = [&take_up](Time now) { return take_up.settle(now); }});
   }
   return ports;
 }
@@ -253,8 +264,9 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above = BridgeHalf::build(self->world, manifest,
-                                 {options.journal, options.socket, std::nullopt, options.recovery}, meeting);
+  auto above =
+      BridgeHalf::build(self->world, manifest,
+                        {options.journal, options.socket, std::nullopt, options.recovery, options.keep_free}, meeting);
   if (!above) return std::unexpected(above.error());
   self->above = std::move(*above);
   const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];

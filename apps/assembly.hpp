@@ -85,6 +85,7 @@ struct BridgeOptions {
   // holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
   runner::Recovery recovery = runner::Recovery::kRefused;
+  std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
 };
 
 class BridgeHalf {
@@ -134,6 +135,7 @@ struct AssemblyOptions {
   BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;
   runner::Recovery recovery = runner::Recovery::kRefused;
+  std::uint64_t keep_free = runner::kKeptFree;
 };
 
 // Both halves in this process.
@@ -156,6 +158,6 @@ class Assembly {
 };
 
 // What becomes of a task that a bridge which is no more had begun, of whose steps so many were done.
-[[nodiscard]] bridge::Resumption resumption(skills::TakeUp::Fate fate, std::size_t done);
+[[nodiscard]] bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done);
 
 }  // namespace pons::apps

@@ -25,6 +25,7 @@ struct BridgeCommandOptions {
   ParcelOptions parcels;
   std::string journal;
   fs::path socket;
+  std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
   double wait_s = 10;
   bool quiet = false, recover = false;
 };
@@ -38,9 +39,9 @@ int failed(const Error& error) {
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
                const MeetingPlace& place) {
   link::Border& border = place.border();
-  const BridgeOptions half_options{options.journal, options.socket.empty() ? default_socket() : options.socket,
-                                   border.body,
-                                   options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
+  const BridgeOptions half_options{
+      options.journal, options.socket.empty() ? default_socket() : options.socket, border.body,
+      options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused, bytes_of(options.keep_free_mib)};
   auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
   if (!half) return bad_input(half.error());
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
@@ -61,6 +62,10 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
             progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
           },
       .said = {},
+      .alerted =
+          [&](std::string_view alert) {
+            if (!options.quiet) progress.put(alert_line(alert));
+          },
       .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
       .limit = border.clock.now() + slowest(manifest.size())};
   const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);
@@ -133,6 +138,7 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
   command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
       ->check(CLI::Range(0.0, 86400.0));
+  add_keep_free(*command, options->keep_free_mib);
   command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--quiet", options->quiet, "No progress");
   refuse_empty(*command);

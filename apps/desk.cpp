@@ -43,11 +43,12 @@ const Error kNoStream{"no stream goes on", "chunk_stream",
 }  // namespace
 
 Desk::Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
-           std::vector<runner::Arming*> arming, Stream stream)
+           std::vector<runner::Arming*> arming, const runner::Health& health, Stream stream)
     : visitors_(std::move(visitors)),
       bridge_(bridge),
       journal_(journal),
       arming_(std::move(arming)),
+      health_(health),
       stream_(std::move(stream)) {}
 
 Json Desk::observe(Time now) const {
@@ -138,6 +139,8 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
       return observe(now);
     case gate::Operation::kChunk:
       return take(asked, now);
+    case gate::Operation::kHealth:
+      return {{"ok", true}, {"time_s", now.s()}, {"health", health_.describe()}};
     case gate::Operation::kRobot:
     case gate::Operation::kStop:
     case gate::Operation::kEmergencyStop:

@@ -13,6 +13,7 @@
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/health.hpp"
 #include "pons/task/policy.hpp"
 
 namespace pons::apps {
@@ -24,7 +25,7 @@ class Desk {
   // All but the visitors must outlive it. `arming` is that of each robot: a stop is for all of them, a reset and an
   // arming for those that wait for a person.
   Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
-       std::vector<runner::Arming*> arming, Stream stream);
+       std::vector<runner::Arming*> arming, const runner::Health& health, Stream stream);
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
@@ -50,6 +51,7 @@ class Desk {
   bridge::Bridge& bridge_;
   const bridge::Journal& journal_;
   std::vector<runner::Arming*> arming_;
+  const runner::Health& health_;
   Stream stream_;
   struct Watcher {
     gate::Request request;

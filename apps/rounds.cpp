@@ -7,6 +7,7 @@
 #include "pons/bridge/review/review.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/model/robot_model.hpp"
+#include "pons/rt/clock.hpp"
 
 namespace pons::apps {
 namespace {
@@ -72,17 +73,19 @@ Expected<void> Rounds::build_bridge(const RoundsSetup& setup) {
     return fail("holds an earlier run", bridge::shown(setup.journal),
                 "name another file for --journal, or move this one away");
   journal = std::move(*opened);
+  if (realtime) journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   bridge = std::make_unique<bridge::Bridge>(*journal, registry, world);
   bridge->use_trees(std::move(trees));
   bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   observer = std::make_unique<runner::Observer>(world, localiser, darkroom.frames, darkroom.pages, darkroom.memory(),
                                                 setup.pace);
-  bridge_side = std::make_unique<runner::BridgeSide>(*bridge, errands, skill_ports(), world.zones,
-                                                     runner::Recovery::kRefused, [this](Time now) {
+  bridge_side = std::make_unique<runner::BridgeSide>(*bridge, errands, skill_ports(), world, runner::Recovery::kRefused,
+                                                     [this](Time now) {
                                                        if (desk) desk->attend(now);
                                                      });
+  bridge_side->keep_free(setup.keep_free);
   if (socket) {
-    desk = std::make_unique<Desk>(std::move(socket), *bridge, *journal, bridge_side->armings(),
+    desk = std::make_unique<Desk>(std::move(socket), *bridge, *journal, bridge_side->armings(), bridge_side->health(),
                                   []() -> task::ChunkStream* { return nullptr; });
   }
   return {};

@@ -31,6 +31,7 @@ struct RoundsSetup {
   std::optional<std::filesystem::path> socket;  // where visitors may ask
   std::filesystem::path speech;                 // folder for what is said
   runner::Pace pace = runner::Pace::kLockstep;
+  std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
 };
 
 // Members stand in the order in which they need each other.

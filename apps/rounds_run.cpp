@@ -60,6 +60,10 @@ class Run {
     runner::Parts parts = rounds_.parts();
     const runner::Watch watch{.interrupted = [] { return interrupted(); },
                               .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+                              .alerted =
+                                  [this](std::string_view alert) {
+                                    if (options_.alerts == Alerts::kTold) say(stderr, alert_line(alert));
+                                  },
                               .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
                               .limit = Time(kSlowestTask)};
     const auto began = std::chrono::steady_clock::now();
@@ -111,6 +115,7 @@ class Run {
                                            .driven_m = verdict.driven_m};
     report.retries = rounds_.bridge->retries();
     report.interventions = rounds_.bridge_side->arming().interventions();
+    report.health = health_of(rounds_.bridge_side->health());
     report.findings = verdict.findings;
     const cerebellum::Statistics& loop = rounds_.cerebellum->statistics();
     report.limits = {.violations = static_cast<std::int64_t>(loop.violations),
@@ -180,7 +185,12 @@ int run_rounds(const RoundsOptions& options, world::World world) {
   fs::create_directories(*speech, error);
   if (error) return bad_input({error.message(), *speech, "name a folder that can be written for --speech"});
 
-  RoundsSetup setup{.seed = options.seed, .journal = *journal, .socket = {}, .speech = *speech, .pace = options.pace};
+  RoundsSetup setup{.seed = options.seed,
+                    .journal = *journal,
+                    .socket = {},
+                    .speech = *speech,
+                    .pace = options.pace,
+                    .keep_free = options.keep_free};
   if (!options.socket.empty()) {
     setup.socket = options.socket;
   } else if (options.pace == runner::Pace::kRealTime) {

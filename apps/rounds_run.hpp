@@ -20,7 +20,9 @@ struct RoundsOptions {
   std::filesystem::path report, log, picture, socket, speech;
   runner::Pace pace = runner::Pace::kLockstep;
   Explain explain = Explain::kNothing;
-  std::string of_a_cell = {};  // an option was given that only a cell with an arm knows: its name
+  Alerts alerts = Alerts::kTold;
+  std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
+  std::string of_a_cell = {};                   // an option was given that only a cell with an arm knows: its name
 };
 
 // The tasks in those files, each to be asked for at its time. Error: a file that is none, a time that is none.

@@ -31,6 +31,7 @@ struct RunOptions {
   std::string journal;
   fs::path report, log, picture, socket, speech;
   std::vector<std::string> tasks;
+  std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
   bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
 
@@ -69,6 +70,10 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 }
               },
           .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+          .alerted =
+              [&](std::string_view alert) {
+                if (!options.quiet) progress.put(alert_line(alert));
+              },
           .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
           .limit = Time(slowest(static_cast<std::size_t>(total)))};
 }
@@ -86,10 +91,10 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   progress.finish();
   if (!result) return bad_run(result.error());
 
-  const auto reckoning =
-      reckon(cell.world, *cell.body, *cell.above->journal,
-             {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(), cell.above->bridge->retries(),
-              wall_s, cell.above->bridge_side->brain_stalls(), cell.above->bridge_side->interventions()});
+  const auto reckoning = reckon(cell.world, *cell.body, *cell.above->journal,
+                                {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(),
+                                 cell.above->bridge->retries(), wall_s, cell.above->bridge_side->brain_stalls(),
+                                 cell.above->bridge_side->interventions(), &cell.above->bridge_side->health()});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
@@ -117,6 +122,8 @@ RoundsOptions rounds_options(const RunOptions& options) {
                        .socket = options.socket,
                        .speech = options.speech};
   rounds.pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
+  rounds.keep_free = bytes_of(options.keep_free_mib);
+  rounds.alerts = options.quiet ? Alerts::kUntold : Alerts::kTold;
   rounds.explain = options.explain ? Explain::kFindings : Explain::kNothing;
   if (options.parcels.parcels_given) rounds.of_a_cell = "--parcels";
   if (!options.parcels.manifest.empty()) rounds.of_a_cell = "--manifest";
@@ -168,7 +175,8 @@ int run(const RunOptions& options) {
   AssemblyOptions assembly{.journal = *journal,
                            .body = std::move(inputs->setup),
                            .pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep,
-                           .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused};
+                           .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused,
+                           .keep_free = bytes_of(options.keep_free_mib)};
   if (!options.socket.empty()) {
     assembly.socket = options.socket;
   } else if (options.realtime) {
@@ -196,6 +204,7 @@ void add_options(CLI::App& command, RunOptions& options) {
                      "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
   command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");
   add_body_setup_options(command, options.body);
+  add_keep_free(command, options.keep_free_mib);
   command.add_flag("--recover", options.recover, "Bring an arm that is found outside its position limits slowly in");
   command.add_flag("--explain", options.explain, "A line for each parcel that was not sorted as ordered");
   command.add_flag("--quiet", options.quiet, "No progress");

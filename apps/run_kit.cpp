@@ -132,6 +132,13 @@ Expected<world::World> cell_named(const std::string& name, const std::string& co
 
 Duration slowest(std::size_t parcels) { return from_s(kSlowestStart_s + kSlowest_s * static_cast<double>(parcels)); }
 
+void add_keep_free(CLI::App& command, std::uint64_t& mib) {
+  command
+      .add_option("--keep-free", mib,
+                  "Take no new tasks with fewer MiB than that left for the journal on its disk; 0 to 1000000 (64)")
+      ->check(whole_number & CLI::Range(0.0, 1e6));
+}
+
 void refuse_empty(CLI::App& command) {
   for (CLI::Option* option : command.get_options()) {
     if (option->get_items_expected_max() > 0) option->check(not_empty);
@@ -192,6 +199,15 @@ void LoopLog::say(Time at, std::string_view text) {
 
 std::string degraded_line(std::string_view refused) { return fmt::format("pons: degraded: {}\n", refused); }
 
+std::string alert_line(std::string_view alert) { return fmt::format("pons: {}\n", alert); }
+
+record::Report::Health health_of(const runner::Health& health) {
+  record::Report::Health parts;
+  for (const auto& [part, fares] : health.parts())
+    parts[part] = {std::string(runner::name(fares.condition)), fares.why, fares.alerts};
+  return parts;
+}
+
 bool Reckoning::good() const {
   return verdict.lost == 0 && verdict.missorted == 0 && verdict.duplicated == 0 && report.limits.violations == 0;
 }
@@ -235,6 +251,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
     report.arms.sorted.emplace_back(world.arms()[i].arm, verdict->sorted_by[i]);
   if (world.arms().size() > 1) report.arms.least_apart_m = truth.least_between_arms_m();
   report.interventions = figures.interventions;
+  if (figures.health != nullptr) report.health = health_of(*figures.health);
   report.findings = verdict->findings;
   Time first = result.end;
   for (const sim::ParcelTruth& parcel : truth.parcels()) {

@@ -54,6 +54,10 @@ void add_parcel_options(CLI::App& command, ParcelOptions& options);
 // The longest that a run of so many parcels takes (run time): one that takes longer hangs.
 [[nodiscard]] Duration slowest(std::size_t parcels);
 
+// --keep-free, in MiB.
+void add_keep_free(CLI::App& command, std::uint64_t& mib);
+[[nodiscard]] inline std::uint64_t bytes_of(std::uint64_t mib) { return mib << 20; }
+
 // Refuses an option that was given an empty text, most often a variable of a script that was never set.
 void refuse_empty(CLI::App& command);
 
@@ -98,6 +102,9 @@ class LoopLog {
 
 // For people, at once, --quiet or not: what the operating system refused, and what would help.
 [[nodiscard]] std::string degraded_line(std::string_view refused);
+// Likewise, unless --quiet: a part that came to be worse.
+enum class Alerts : std::uint8_t { kTold, kUntold };
+[[nodiscard]] std::string alert_line(std::string_view alert);
 
 // ---- the end ----
 
@@ -112,6 +119,7 @@ struct RunFigures {
   double wall_s = 0;
   std::int64_t brain_stalls = 0;
   std::optional<std::int64_t> interventions = std::nullopt;
+  const runner::Health* health = nullptr;
 };
 
 struct Reckoning {
@@ -124,6 +132,9 @@ struct Reckoning {
 // Holds the simulation's truth against the journal. Error: the journal cannot be read.
 [[nodiscard]] Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
                                          const RunFigures& figures);
+
+// How each part fares at the end, and how often it came to be worse.
+[[nodiscard]] record::Report::Health health_of(const runner::Health& health);
 
 // What the loop and the bridge were like, for the report.
 void put_loop(const runner::RunResult& result, record::Report& report);

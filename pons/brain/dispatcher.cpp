@@ -14,7 +14,6 @@ namespace {
 constexpr int kFramesToTrust = 3;
 constexpr int kMostTries = 3;
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
-constexpr double kHeard_s = 0.02;                         // from a decision to the belt's drive
 constexpr double kBeltStands_s = 3600;                    // for so long at most, altogether, while a task waits
 constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
 
@@ -196,11 +195,7 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
 bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
   const auto known = known_.find(belief.code);
   if (known == known_.end() || !known->second.asked) return false;
-  const world::Belt& belt = belt_;
-  const double speed_m_s = std::max(belief.velocity_m_s.x(), 0.0);
-  const double stops_m = speed_m_s * (kHeard_s + speed_m_s / (2 * belt.ramp_m_s2));
-  const double x_m = belief.world_from_top.translation().x();
-  return x_m + stops_m > belt.waits_at_m() && x_m < belt.pick_x_max_m;
+  return belt_.must_wait_for(belief.world_from_top.translation().x(), std::max(belief.velocity_m_s.x(), 0.0));
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {

@@ -92,6 +92,7 @@ Expected<Bridge::Candidate> Bridge::examine(task::Task task, std::size_t others,
   if (!held) return std::unexpected(held.error());
   if (*held) return Candidate{.task = std::move(task), .program = {}, .asked = {}, .accepted = Accepted::kAlready};
   if (stopping_) return fail("the bridge is stopping", {}, "submit to the next run");
+  if (closed_) return std::unexpected(*closed_);
   auto program = review_.check(task, now);
   if (!program) return std::unexpected(program.error());
   const std::vector<UseOf> uses = Review::uses(task, program->get());

@@ -148,7 +148,9 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
     keep(journal_.event(task.id, now, kFoundDoneEvent, {{"step", step}}));
   if (!what.outcome && what.done == last) what.outcome = task::Outcome::kSucceeded;
   if (what.outcome) {
-    finish_unopened(task.id, *what.outcome, what.reason, now);
+    Json detail = Json::object();
+    if (!what.detail.empty()) detail["steps"] = {{{"skill", task.steps[what.done].skill}, {"detail", what.detail}}};
+    finish_unopened(task.id, *what.outcome, what.reason, now, std::move(detail));
     return {};
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", what.done}}));
@@ -183,7 +185,7 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
       what = resume({.id = task.id, .order = task.order, .steps = {step}}, 0);
     }
     if (what.outcome == task::Outcome::kException) {
-      tree->settle(leaf, {task::Status::kException, what.reason, Json::object()});
+      tree->settle(leaf, {task::Status::kException, what.reason, what.detail});
     } else if (what.outcome && what.outcome != task::Outcome::kSucceeded) {
       tree->settle(leaf, {task::Status::kFailed, what.reason, Json::object()});
     } else if (what.done > 0 || what.outcome) {
@@ -224,11 +226,12 @@ std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_
   return tree;
 }
 
-void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now) {
-  const auto written = journal_.outcome(id, outcome, reason, now);
+void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now,
+                             Json detail) {
+  const auto written = journal_.outcome(id, outcome, reason, now, detail);
   keep(written);
   review_.contradictions().release(id);
-  if (written) ended_.push_back({id, outcome, reason, Json::object()});
+  if (written) ended_.push_back({id, outcome, reason, std::move(detail)});
 }
 
 // ---- a tick ----

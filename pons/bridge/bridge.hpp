@@ -55,6 +55,7 @@ struct Resumption {
   std::size_t done = 0;                  // so many of its first steps have succeeded, by the look of the world
   std::optional<task::Outcome> outcome;  // nothing: it goes on with the next step; when there is none, it SUCCEEDED
   std::string reason;                    // of the outcome
+  Json detail = Json::object();          // of the step that it comes from
 };
 // Looks at the world. `done`: of so many of its first steps the journal has it; an answer of fewer counts as that many.
 // Of a tree it is asked for each skill that nobody saw end, as for a task of that one step.
@@ -117,6 +118,14 @@ class Bridge {
   enum class Hold : std::uint8_t { kOff, kOn, kGone };
   void hold(Hold hold, std::size_t robot = 0) { robots_[robot].hold = hold; }
 
+  // What keeps new tasks from being taken, as their senders are told, and orders from being claimed; nothing: they are.
+  // Those that are open go on.
+  void refuse_new(std::optional<Error> why) { closed_ = std::move(why); }
+
+  // Withheld, no task is given a resource, and none makes way for another: who needs some waits, and its time passes.
+  // Those that have them go on, and so do those that need none.
+  void withhold(Arbiter::Withheld what) { arbiter_.withhold(what); }
+
   // A journal entry of no task; `order` is what it belongs to, if anything.
   void note(std::string_view kind, const Json& detail, Time now, std::string_view order = {});
   // Makes all that happened so far durable. Error: the journal cannot be written, which is then fault(), too.
@@ -144,6 +153,7 @@ class Bridge {
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
+  [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] bool held() const;                                 // all robots
   [[nodiscard]] std::int64_t retries() const { return retries_; }  // starts of a step beyond its first
   [[nodiscard]] std::int64_t refused() const { return refused_; }  // submissions
@@ -217,7 +227,8 @@ class Bridge {
   void end_running(Open& open, Ending ending, Time now, std::string_view reason);
   void end_waiting(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
-  void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now);
+  void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now,
+                       Json detail = Json::object());
   [[nodiscard]] Expected<void> journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now);
   void keep(const Expected<void>& written);
   void set_fault(Error error);
@@ -240,7 +251,7 @@ class Bridge {
   std::set<std::string> parked_;
   std::set<std::string> asking_;                 // a person
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
-  std::optional<Error> fault_;
+  std::optional<Error> fault_, closed_;
   std::size_t shared_work_ = 0;  // of this tick, by those that need no resource
   std::string next_;             // of those, who has the first turn in the next tick; empty: all have had theirs
   Time last_commit_, last_tick_, look_at_;  // the last: into the order book again

@@ -167,13 +167,18 @@ TEST_F(BridgeTest, WhatCannotGoOnEndsWhenAnotherBridgeComes) {
   bridge_->tick(now_);
   reopen();
   ASSERT_TRUE(bridge_->recover(
-      [](const task::Task&, std::size_t) { return Resumption{0, Outcome::kFailed, "nothing held"}; }, now_));
+      [](const task::Task&, std::size_t) {
+        return Resumption{0, Outcome::kException, "fell", {{"fell_into", "chute_1"}}};
+      },
+      now_));
   EXPECT_TRUE(bridge_->idle());
-  EXPECT_EQ(recorded("a")->outcome, Outcome::kFailed);
-  EXPECT_EQ(recorded("a")->reason, "nothing held");
+  EXPECT_EQ(recorded("a")->outcome, Outcome::kException);
+  EXPECT_EQ(recorded("a")->reason, "fell");
   const auto reports = bridge_->take_outcomes();
   ASSERT_EQ(reports.size(), 1U);
   EXPECT_EQ(reports[0].id, "a");
+  EXPECT_EQ(recorded("a")->detail, reports[0].detail);
+  EXPECT_EQ(reports[0].detail, Json::parse(R"({"steps":[{"skill":"slow","detail":{"fell_into":"chute_1"}}]})"));
 }
 
 TEST_F(BridgeTest, OneTaskHoldsTheArmAndTheNextStartsInTheTickThatFreesIt) {

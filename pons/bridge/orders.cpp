@@ -11,7 +11,7 @@ constexpr std::size_t kAhead = 4;
 }  // namespace
 
 void Bridge::take_orders(Time now) {
-  const bool may = !fault_ && !stopping_ && !std::ranges::all_of(robots_, &Robot::emergency) && !held();
+  const bool may = !fault_ && !stopping_ && !closed_ && !std::ranges::all_of(robots_, &Robot::emergency) && !held();
   if (!may || now < look_at_) return;
   look_at_ = now + kLookPeriod;
   const std::size_t waiting = arbiter_.queue_length() + asking_.size();

@@ -1,6 +1,8 @@
 #include "pons/core/belief.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace pons {
 namespace {
@@ -14,25 +16,28 @@ constexpr double kUpright = 0.9986;  // cosine of 3 degrees
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
 
+bool overlap(const ObjectBelief& a, const ObjectBelief& b, double least_m) { return apart_m(a, b) <= -least_m; }
+
+}  // namespace
+
 // Two rectangles are apart when they are along a side of one of them.
-bool overlap(const ObjectBelief& a, const ObjectBelief& b, double least_m) {
+double apart_m(const ObjectBelief& a, const ObjectBelief& b) {
   const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
+  double most_m = -std::numeric_limits<double>::infinity();
   for (const ObjectBelief* one : {&a, &b}) {
     for (const Eigen::Index side : {0, 1}) {
       const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
-      double reach_m = -least_m;
+      double reach_m = 0;
       for (const ObjectBelief* each : {&a, &b}) {
         for (const Eigen::Index s : {0, 1}) {
           reach_m += 0.5 * each->size_m[s] * std::abs(along.dot(each->world_from_top.linear().col(s).head<2>()));
         }
       }
-      if (std::abs(along.dot(between.head<2>())) > reach_m) return false;
+      most_m = std::max(most_m, std::abs(along.dot(between.head<2>())) - reach_m);
     }
   }
-  return true;
+  return most_m;
 }
-
-}  // namespace
 
 bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
   if (upper.track == lower.track) return false;

@@ -45,6 +45,9 @@ struct BaseBelief {
   std::vector<Vector2> unmapped;                         // of these, those that end far from anything on the map
 };
 
+// Between the two as seen from above, along the side of one of them that parts them most; less than 0: they overlap.
+[[nodiscard]] double apart_m(const ObjectBelief& a, const ObjectBelief& b);
+
 // Whether `upper` lies or leans on `lower`, as far as can be told: lifted first, the lower one would carry it along.
 [[nodiscard]] bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower);
 

@@ -24,7 +24,7 @@ constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
     "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "approve",
-                    "observe", "chunk", "robot", "stop", "emergency_stop", "reset", "arm"]},
+                    "observe", "chunk", "health", "robot", "stop", "emergency_stop", "reset", "arm"]},
     "task": {"type": "object"},
     "tasks": {"type": "array", "items": {"type": "object"}},
     "which": {"enum": ["open", "ended"]},
@@ -44,9 +44,9 @@ constexpr std::string_view kSchema = R"({
 
 // Those with nothing beside their name.
 const std::map<std::string, Operation, std::less<>> kBare = {
-    {"observe", Operation::kObserve}, {"robot", Operation::kRobot},
-    {"stop", Operation::kStop},       {"emergency_stop", Operation::kEmergencyStop},
-    {"reset", Operation::kReset},     {"arm", Operation::kArm},
+    {"observe", Operation::kObserve}, {"health", Operation::kHealth}, {"robot", Operation::kRobot},
+    {"stop", Operation::kStop},       {"reset", Operation::kReset},   {"emergency_stop", Operation::kEmergencyStop},
+    {"arm", Operation::kArm},
 };
 
 const Schema& schema() {

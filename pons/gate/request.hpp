@@ -21,6 +21,8 @@
 //                                   "speed":[…],"objects":[…]}
 //   {"op":"chunk","stream":1,"observed":…,"period_ms":…,"actions":[[…],…],"last":false}
 //                                → {"ok":true,"executed":…}
+//   {"op":"health"}              → {"ok":true,"time_s":…,"health":{"alerts":…,"parts":[{"part":…,"condition":…,"why":…,
+//                                   "since_s":…,"alerts":…},…]}}
 //   {"op":"robot"}               → {"ok":true,"robot":{"state":…,"cause":…,"standstill":…,"epoch":…,"needs":…}}
 //   {"op":"stop"} and emergency_stop, reset, arm, a person's words to the arm, are answered like robot
 //   anything wrong               → {"ok":false,"error":"…"}
@@ -49,9 +51,10 @@ enum class Operation : std::uint8_t {
   kCancel,
   kHalt,
   kApprove,
-  // Of streams and of the arm:
+  // Of streams, of all parts and of the arm:
   kObserve,
   kChunk,
+  kHealth,
   kRobot,
   kStop,
   kEmergencyStop,

@@ -37,6 +37,7 @@ TEST(AskedFrom, ReadsEachQuestion) {
   EXPECT_EQ(asked_from(R"({"op":"cancel","id":"a"})")->operation, Operation::kCancel);
   EXPECT_EQ(asked_from(R"({"op":"halt","id":"a","reason":""})")->operation, Operation::kHalt);
   EXPECT_EQ(asked_from(R"({"op":"robot"})")->operation, Operation::kRobot);
+  EXPECT_EQ(asked_from(R"({"op":"health"})")->operation, Operation::kHealth);
   EXPECT_EQ(asked_from(R"({"op":"stop"})")->operation, Operation::kStop);
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);
   EXPECT_EQ(asked_from(R"({"op":"reset"})")->operation, Operation::kReset);
@@ -80,6 +81,7 @@ TEST(AskedFrom, RefusesEverythingElse) {
                            R"({"op":"list","after":-1})",
                            R"({"op":"show","id":"a","limit":1})",
                            R"({"op":"stop","id":"a"})",
+                           R"({"op":"health","id":"a"})",
                            R"({"op":"show"})",
                            R"({"op":"history"})",
                            R"({"op":"history","id":"a","stream":1})",

@@ -67,6 +67,20 @@ Json to_json(const Report::Rounds& rounds) {
           {"driven_m", number(rounds.driven_m)}};
 }
 
+namespace {
+
+Json to_json(const Report::Health& health) {
+  Json parts = Json::object();
+  std::int64_t alerts = 0;
+  for (const auto& [part, fares] : health) {
+    parts[part] = {{"condition", fares.condition}, {"why", fares.why}, {"alerts", fares.alerts}};
+    alerts += fares.alerts;
+  }
+  return {{"alerts", alerts}, {"parts", std::move(parts)}};
+}
+
+}  // namespace
+
 nlohmann::ordered_json to_json(const Report& report) {
   const auto& loop = report.loop;
   Json json;
@@ -84,6 +98,7 @@ nlohmann::ordered_json to_json(const Report& report) {
   }
   json["retries"] = report.retries;
   json["interventions"] = report.interventions ? Json(*report.interventions) : Json(nullptr);
+  json["health"] = report.health ? to_json(*report.health) : Json(nullptr);
   json["fault_plan"] = report.fault_plan;
   json["faults"] = Json::object();
   for (const auto& [fault, times] : report.faults) json["faults"][fault] = times;
@@ -140,6 +155,17 @@ void tell_parcels(const Line& line, const Report& report) {
                          : std::string("nothing sorted"));
 }
 
+// Of those that were ever worse.
+void tell_health(const Line& line, const Report::Health& health) {
+  std::string text;
+  for (const auto& [part, fares] : health) {
+    if (fares.alerts == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", part, fares.alerts);
+    if (fares.condition != "good") text += fmt::format(" (and is {})", fares.condition);
+  }
+  if (!text.empty()) line("alerts", text);
+}
+
 void tell_rounds(const Line& line, const Report& report) {
   const Report::Rounds& rounds = *report.rounds;
   line("tasks", fmt::format("{} of {} succeeded", rounds.succeeded, rounds.tasks));
@@ -159,6 +185,7 @@ std::string summary(const Report& report) {
   };
   line("world", fmt::format("{}, seed {}", report.world, report.seed));
   report.rounds ? tell_rounds(line, report) : tell_parcels(line, report);
+  if (report.health) tell_health(line, *report.health);
   line("limits", fmt::format("{} violations, closest {:.1f} % of a limit{}", report.limits.violations,
                              100 * report.limits.worst_ratio,
                              report.limits.saturated == 0

@@ -83,6 +83,14 @@ struct Report {
     double driven_m = 0;
   };
 
+  // How a part fares at the end: "good", "poor" or "bad", and why; and how often it came to be worse.
+  struct Part {
+    std::string condition = "good", why{};
+    std::int64_t alerts = 0;
+    bool operator==(const Part&) const = default;
+  };
+  using Health = std::map<std::string, Part>;
+
   std::uint64_t seed = 0;
   std::string world{};
   Parcels parcels{};
@@ -91,6 +99,7 @@ struct Report {
   std::optional<Rounds> rounds{};  // of a world with a base, instead of parcels and throughput
   std::int64_t retries = 0;
   std::optional<std::int64_t> interventions{};  // times the arm came to need a person; unknown to pons body
+  std::optional<Health> health{};               // by part; unknown to pons body
   std::string fault_plan = "none";              // what was injected on purpose; of each fault of the plan, how often
   std::vector<std::pair<std::string, std::int64_t>> faults{};
   Limits limits{};

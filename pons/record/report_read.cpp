@@ -51,6 +51,21 @@ Report::Loop loop_of(const Fields& json) {
           .degraded = json.text("degraded")};
 }
 
+Report::Health health_of(const Fields& json) {
+  const Fields parts = json.of("parts");
+  Report::Health health;
+  std::int64_t alerts = 0;
+  for (const auto& [part, fares] : parts.all().items()) {
+    const Fields fields(fares, parts.place(part));
+    const Report::Part& one = health[part] = {fields.text("condition"), fields.text("why"), fields.count("alerts")};
+    if (one.condition != "good" && one.condition != "poor" && one.condition != "bad")
+      throw BadField{fields.place("condition"), "is none of good, poor, bad"};
+    alerts += one.alerts;
+  }
+  if (json.count("alerts") != alerts) throw BadField{json.place("alerts"), "is not the sum of those of the parts"};
+  return health;
+}
+
 std::uint64_t hash_of(const Fields& json) {
   const std::string text = json.text("state_hash");
   std::uint64_t hash = 0;
@@ -79,6 +94,7 @@ Report report_of(const Fields& json) {
   }
   report.retries = json.count("retries");
   if (!json.at("interventions").is_null()) report.interventions = json.count("interventions");
+  if (!json.at("health").is_null()) report.health = health_of(json.of("health"));
   report.fault_plan = json.text("fault_plan");
   const Fields faults = json.of("faults");
   for (const auto& fault : faults.all().items())

@@ -35,6 +35,7 @@ using Json = nlohmann::ordered_json;
           .throughput = throughput(570, 190),
           .retries = 7,
           .interventions = 2,
+          .health = Report::Health{{"arm", {}}, {"brain", {"bad", "silent for 2.0 s", 3}}},
           .fault_plan = "robin",
           .faults = {{"missed_grasp", 3}},
           .limits = {.violations = 0, .worst_ratio = 0.985, .saturated = 12},
@@ -78,7 +79,10 @@ TEST(Report, KeepsEveryFigure) {
                                "reasons": {"label unreadable": {"deserved": 4, "undeserved": 1},
                                            "lost from sight": {"deserved": 0, "undeserved": 4}}}, "damaged": 6},
     "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
-    "interventions": 2, "fault_plan": "robin", "faults": {"missed_grasp": 3},
+    "interventions": 2,
+    "health": {"alerts": 3, "parts": {"arm": {"condition": "good", "why": "", "alerts": 0},
+                                      "brain": {"condition": "bad", "why": "silent for 2.0 s", "alerts": 3}}},
+    "fault_plan": "robin", "faults": {"missed_grasp": 3},
     "limits": {"violations": 0, "worst_ratio": 0.985, "saturated": 12},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,
              "late_p50_us": 14.0, "late_p99_us": 60.0, "late_max_us": 880.0, "degraded": "SCHED_FIFO refused"},
@@ -165,6 +169,8 @@ TEST_F(ReadReport, RefusesByNameWhatIsNone) {
   expect_refused(changed("/state_hash", "F0"), "/state_hash");
   expect_refused(changed("/findings", 3), "/findings");
   expect_refused(changed("/faults", {{"missed_grasp", -1}}), "/faults/missed_grasp");
+  expect_refused(changed("/health/alerts", 4), "/health/alerts");
+  expect_refused(changed("/health/parts/arm/condition", "fine"), "/health/parts/arm/condition");
   Json old = to_json(example());
   old.erase("version");
   expect_refused(old.dump(), "is of version 0");
@@ -175,8 +181,9 @@ TEST_F(ReadReport, RefusesByNameWhatIsNone) {
 
 TEST(Report, SummaryIsAligned) {
   const std::string text = summary(example());
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 18);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 19);
   EXPECT_THAT(text, HasSubstr("  a person      needed 2 times\n"));
+  EXPECT_THAT(text, HasSubstr("  alerts        brain 3 (and is bad)\n"));
   EXPECT_THAT(text, HasSubstr("  faults        robin: 3 missed_grasp\n"));
   EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
   EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));

@@ -14,16 +14,25 @@ using bridge::Json;
 
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
-constexpr Duration kBrainSilent = std::chrono::milliseconds(300);
-// Frames come four times a second and later by what it takes to see what they show.
-constexpr Duration kBlind = std::chrono::milliseconds(800);
 
 }  // namespace
 
 BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots,
-                       const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors)
-    : bridge_(bridge), brain_(brain), visitors_(std::move(visitors)) {
-  for (SkillPort& port : robots) robots_.push_back(std::make_unique<Robot>(bridge, std::move(port), zones, recovery));
+                       const world::World& world, Recovery recovery, std::function<void(Time)> visitors)
+    : world_(world),
+      bridge_(bridge),
+      brain_(brain),
+      health_([this](std::string_view part, const PartHealth& health, Time now) {
+        bridge_.note("health", {{"part", part}, {"condition", name(health.condition)}, {"why", health.why}}, now);
+      }),
+      vitals_(world, health_),
+      visitors_(std::move(visitors)) {
+  const auto one_of = robots.size() > 1 ? RobotVitals::OneOf::kSeveral : RobotVitals::OneOf::kOne;
+  for (SkillPort& port : robots) {
+    const std::string name = port.name;
+    robots_.push_back(std::make_unique<Robot>(bridge, std::move(port), world.zones, recovery,
+                                              RobotVitals(world.robot, name, one_of, health_)));
+  }
 }
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
@@ -31,6 +40,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
+    if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
     if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
   const auto events = journal.notes();
@@ -65,6 +75,7 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   for (const auto& robot : robots_) {
     if (auto good = robot->arming.tick(now); !good) return good;
   }
+  look_after_parts(now);
   const bool belt_waits = !stopping_ && ask_brain(objects, now);
   // What nobody sees must not ride by unread, nor into the arm.
   const bool blind = observer.watches_belt() && now - seen_.belt_clear > kBlind;
@@ -74,10 +85,14 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   bridge_.tick(now);
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
   for (const auto& robot : robots_) {
-    if (!bridge_.uses_resources(robot->skills.robot) && !robot->arming.settles()) robot->skills.rest(now);
+    if (!bridge_.uses_resources(robot->skills.robot) && !robot->arming.settles()) {
+      const bool parks = (vitals_.belt_unseen() || falls_back_) && robot->skills.park;
+      parks ? robot->skills.park(now) : robot->skills.rest(now);
+    }
     if (auto noted = note_carried(*robot, now); !noted) return noted;
   }
   for (const bridge::OutcomeReport& report : bridge_.take_outcomes()) {
+    asked_.erase(report.id);
     if (brain_.heard(report.id, report.outcome)) last_outcome_ = now;
   }
   for (const auto& robot : robots_) {
@@ -98,6 +113,7 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
     }
   }
   seen_ = snapshot;
+  seen_behind_ = now - snapshot.due;
   if (snapshot.base && first().locate) first().locate(*snapshot.base);
 }
 
@@ -139,6 +155,30 @@ std::int64_t BridgeSide::interventions() const {
   return interventions;
 }
 
+void BridgeSide::look_after_parts(Time now) {
+  vitals_.eyes(seen_, seen_behind_, now);
+  for (const auto& robot : robots_) {
+    const link::State& state = robot->skills.state();
+    robot->vitals.arm(
+        state, robot->arming.needs_person() ? RobotVitals::Resumes::kByPerson : RobotVitals::Resumes::kByItself, now);
+    if (robot->skills.grip) robot->skills.grip(robot->vitals.vacuum(state, now));
+    robot->vitals.loop(state, now);
+  }
+  // The belt stands as soon as one of them lets it stand.
+  const auto stays = std::ranges::find_if(robots_, [](const auto& robot) {
+    return !robot->operational() || robot->skills.state().belt != link::Belt::kRuns;
+  });
+  vitals_.belt((stays == robots_.end() ? robots_.front() : *stays)->skills.state(), now);
+  vitals_.bridge(bridge_.open_count(), now);
+  vitals_.journal(bridge_.journal(), now);
+  // What is begun goes on. A new task would be one more that a camera has to show the way to.
+  bridge_.withhold(vitals_.belt_unseen() ? bridge::Arbiter::Withheld::kResources : bridge::Arbiter::Withheld::kNothing);
+  bridge_.refuse_new(vitals_.lacks_room().empty()
+                         ? std::nullopt
+                         : std::optional(Error{"no room for new tasks: " + vitals_.lacks_room(), "journal",
+                                               "free some space; tasks are taken again by themselves"}));
+}
+
 std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                 double belt_travel_m) const {
   std::vector<ObjectBelief> objects;
@@ -152,17 +192,29 @@ std::vector<ObjectBelief> BridgeSide::predicted(const std::vector<ObjectBelief>&
   return objects;
 }
 
-bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
-  // A brain that says nothing asks for nothing: what it has not decided on must not ride by meanwhile.
-  if (stalls_ && stalls_->on(now)) return brain_holds_belt_ || now - brain_heard_ > kBrainSilent;
-  brain_heard_ = now;
-  std::optional<double> taken_until_m;
+// Where along the belt a robot that works takes hold last; nothing: none works.
+std::optional<double> BridgeSide::taken_until_m() const {
+  std::optional<double> until_m;
   for (const auto& robot : robots_) {
-    if (!robot->arming.needs_person())
-      taken_until_m = std::max(taken_until_m.value_or(robot->skills.takes_until_m), robot->skills.takes_until_m);
+    if (robot->arming.needs_person()) continue;
+    until_m = std::max(until_m.value_or(robot->skills.takes_until_m), robot->skills.takes_until_m);
   }
-  if (taken_until_m) brain_.taken_until(*taken_until_m);
-  const brain::Decisions decisions = brain_.observe(objects, now, bridge_.set_aside());
+  return until_m;
+}
+
+bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
+  const bool silent = stalls_ && stalls_->on(now);
+  if (!silent) brain_heard_ = now;
+  vitals_.brain(brain_heard_, now);
+  // A brain that says nothing asks for nothing, nor is it asked for what there is no room for.
+  if (silent || !vitals_.lacks_room().empty()) return fall_back(objects, now);
+  decided_ = now;
+  if (std::exchange(falls_back_, false)) bridge_.note("fallback", {{"decides", "brain"}}, now);
+  tell_brain_what_rode();
+  if (const auto until_m = taken_until_m()) brain_.taken_until(*until_m);
+  std::vector<ObjectBelief> undecided = objects;
+  std::erase_if(undecided, [&](const ObjectBelief& object) { return rode(object); });
+  const brain::Decisions decisions = brain_.observe(undecided, now, bridge_.set_aside());
   for (const Json& task : decisions.tasks) {
     note_seen(task.value("order", std::string{}), objects, now);
     if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
@@ -170,6 +222,8 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
       const std::string code = task.value("order", id);
       bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
       brain_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
+    } else {
+      asked_.emplace(task.at("id").get<std::string>(), task.value("order", std::string{}));
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
@@ -178,6 +232,38 @@ bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
   }
   brain_holds_belt_ = decisions.belt_waits;
   return decisions.belt_waits;
+}
+
+// What is not decided on must not ride by meanwhile; or, by the world's rules, it does, and only what was asked for
+// before gets its turn.
+bool BridgeSide::fall_back(const std::vector<ObjectBelief>& objects, Time now) {
+  const Duration undecided = now - decided_;
+  const world::Fallback& fallback = world_.fallback;
+  if (fallback.undecided == world::Fallback::Undecided::kHold || undecided <= from_s(fallback.after_s))
+    return brain_holds_belt_ || undecided > kBrainSilent;
+  if (!std::exchange(falls_back_, true)) bridge_.note("fallback", {{"decides", "rules"}}, now);
+  world::Belt belt = world_.belt;
+  belt.pick_x_max_m = taken_until_m().value_or(first().takes_until_m);
+  bool waits = false;
+  for (const ObjectBelief& object : objects) {
+    const bool asked = std::ranges::any_of(asked_, [&](const auto& task) { return task.second == object.code; });
+    const double x_m = object.world_from_top.translation().x();
+    if (asked) {
+      waits = waits || belt.must_wait_for(x_m, std::max(object.velocity_m_s.x(), 0.0));
+    } else if (x_m > belt.pick_x_max_m) {
+      let_ride(object, now);
+    }
+  }
+  return waits;
+}
+
+void BridgeSide::let_ride(const ObjectBelief& object, Time now) {
+  if (rode(object)) return;
+  rode_tracks_.push_back(object.track);
+  if (rode_tracks_.size() > kGoneRemembered) rode_tracks_.erase(rode_tracks_.begin());
+  rode_.push_back(object.code);
+  const char* const reason = vitals_.lacks_room().empty() ? "the brain was silent" : "no room for tasks";
+  bridge_.note("ride", {{"track", object.track}, {"code", object.code}, {"reason", reason}}, now, object.code);
 }
 
 // What the brain decided on.
@@ -215,7 +301,16 @@ void BridgeSide::stop(Time now, const std::string& reason) {
 
 bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }
 
+bool BridgeSide::rode(const ObjectBelief& object) const {
+  return std::ranges::find(rode_tracks_, object.track) != rode_tracks_.end();
+}
+
+void BridgeSide::tell_brain_what_rode() {
+  for (const std::string& code : std::exchange(rode_, {})) brain_.recall_ride(code);
+}
+
 void BridgeSide::close(Time now) {
+  tell_brain_what_rode();
   const std::vector<std::string> unseen = brain_.unseen();
   for (const std::string& code : unseen) {
     bridge_.note("ride",

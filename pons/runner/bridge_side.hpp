@@ -15,8 +15,11 @@
 #include "pons/brain/brain.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/health.hpp"
 #include "pons/runner/observer.hpp"
+#include "pons/runner/robot_vitals.hpp"
 #include "pons/runner/skill_port.hpp"
+#include "pons/runner/vitals.hpp"
 #include "pons/world/faults.hpp"
 #include "pons/world/world.hpp"
 
@@ -26,10 +29,10 @@ inline constexpr Duration kBridgePeriod = std::chrono::milliseconds(10);
 
 class BridgeSide {
  public:
-  // All must outlive it. `robots` are those of the bridge, in its order; `zones` the world's. `visitors` is called once
-  // a period, before the bridge's tick: requests from outside.
-  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots,
-             const std::vector<world::Zone>& zones, Recovery recovery, std::function<void(Time)> visitors);
+  // All must outlive it. `robots` are those of the bridge, in its order. `visitors` is called once a period, before the
+  // bridge's tick: requests from outside.
+  BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots, const world::World& world,
+             Recovery recovery, std::function<void(Time)> visitors);
 
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
   // that one told it to, and takes up what is open; nothing starts before the arm was armed anew. Error: the journal.
@@ -44,6 +47,8 @@ class BridgeSide {
 
   // From now on the brain is silent in these spells.
   void stall_brain(const world::Spells& stalls) { stalls_ = stalls; }
+  // See Vitals.
+  void keep_free(std::uint64_t bytes) { vitals_.keep_free(bytes); }
   [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
@@ -53,20 +58,30 @@ class BridgeSide {
   // For a person's words; of a robot there is.
   [[nodiscard]] Arming& arming(std::size_t robot = 0) { return robots_[robot]->arming; }
   [[nodiscard]] std::vector<Arming*> armings();
+  [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:
   void take_in(const Snapshot& snapshot, Time now);
+  void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  // Likewise, while nothing is decided.
+  bool fall_back(const std::vector<ObjectBelief>& objects, Time now);
+  void let_ride(const ObjectBelief& object, Time now);
+  [[nodiscard]] bool rode(const ObjectBelief& object) const;
+  void tell_brain_what_rode();
+  [[nodiscard]] std::optional<double> taken_until_m() const;
   void note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now);
   // What is one a robot.
   struct Robot {
-    Robot(bridge::Bridge& bridge, SkillPort port, const std::vector<world::Zone>& zones, Recovery recovery)
-        : skills(std::move(port)), arming(bridge, skills, zones, recovery) {}
+    Robot(bridge::Bridge& bridge, SkillPort port, const std::vector<world::Zone>& zones, Recovery recovery,
+          RobotVitals of_it)
+        : skills(std::move(port)), arming(bridge, skills, zones, recovery), vitals(std::move(of_it)) {}
     SkillPort skills;
     Arming arming;
+    RobotVitals vitals;
     bridge::Json carried = {};  // as last noted
     [[nodiscard]] bool operational() const { return skills.state().safety == link::SafetyState::kOperational; }
   };
@@ -76,15 +91,24 @@ class BridgeSide {
   void tell_belt(bool waits, Time now);
   [[nodiscard]] Expected<void> note_carried(Robot& robot, Time now);
 
+  const world::World& world_;
   bridge::Bridge& bridge_;
   brain::Brain& brain_;
+  Health health_;
+  Vitals vitals_;
   std::vector<std::unique_ptr<Robot>> robots_;
   std::function<void(Time)> visitors_;
   Snapshot seen_;
+  Duration seen_behind_{0};               // of when it was due
   std::vector<std::uint32_t> gone_;       // taken off the belt, while snapshots may still show them
   std::vector<std::uint32_t> forgotten_;  // to tell perception with the next frame
   Time last_outcome_, brain_heard_;
-  bool brain_holds_belt_ = false;  // as it last said
+  Time decided_;                                           // when the brain was last asked
+  bool falls_back_ = false;                                // to the world's rules
+  std::map<std::string, std::string, std::less<>> asked_;  // code by task: what the brain asked for and has no outcome
+  std::vector<std::string> rode_;                          // codes, by those rules: to tell the brain
+  std::vector<std::uint32_t> rode_tracks_;                 // likewise; nothing is left for it to decide
+  bool brain_holds_belt_ = false;                          // as it last said
   std::optional<world::Spells> stalls_;
   std::int64_t unlabelled_ = 0;
   bool stopping_ = false;

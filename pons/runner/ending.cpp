@@ -1,5 +1,7 @@
 #include "pons/runner/ending.hpp"
 
+#include <string>
+
 namespace pons::runner {
 namespace {
 
@@ -13,6 +15,9 @@ bool Ending::check(Time now, bool finished) {
   if (!broken_off_ && watch_.interrupted && watch_.interrupted()) break_off(now, "interrupted");
   if (!broken_off_ && watch_.limit > Time{} && now > watch_.limit) break_off(now, "ran too long");
   if (watch_.progress) watch_.progress(now);
+  for (const std::string& line : bridge_side_.health().take_alerts()) {
+    if (watch_.alerted) watch_.alerted(line);
+  }
   if (!bridge_side_.idle() || !(broken_off_ || finished)) {
     quiet_since_.reset();
     return false;

@@ -8,11 +8,25 @@ namespace {
 
 constexpr timespec kNever{.tv_sec = 1'000'000'000, .tv_nsec = 0};
 
+// By a sample of its readings: one in a hundred is enough. A camera that is covered or broken has none.
+bool shows_anything(const RgbdFrame& frame) {
+  constexpr std::size_t kSample = 1000, kOneIn = 100;
+  const std::size_t pixels = frame.depth_m.size(), stride = std::max<std::size_t>(1, pixels / kSample);
+  std::size_t looked_at = 0, read = 0;
+  for (std::size_t i = 0; i < pixels; i += stride, ++looked_at) read += frame.depth_m[i] > 0 ? 1U : 0U;
+  return read * kOneIn >= looked_at;
+}
+
 }  // namespace
 
 Observer::Observer(const world::World& world, perception::Sight& perception, link::Frames& frames,
                    const link::FramePages& pages, std::byte* memory, Pace pace)
-    : world_(world), perception_(perception), places_(frames), pace_(pace), frames_(world.cameras.size()) {
+    : world_(world),
+      perception_(perception),
+      places_(frames),
+      pace_(pace),
+      frames_(world.cameras.size()),
+      shown_(frames_.size()) {
   for (std::size_t camera = 0; camera < frames_.size(); ++camera) {
     frames_[camera].camera = world_.cameras[camera].name;
     frames_[camera].intrinsics = world::intrinsics(world_.cameras[camera]);
@@ -64,6 +78,7 @@ Snapshot Observer::take_in(std::size_t camera) {
   RgbdFrame& frame = frames_[camera];
   frame.stamp = shot.stamp;
   perception_.process(frame, {shot.joint_position, shot.belt_travel_m});
+  if (shows_anything(frame)) shown_[camera] = shot.stamp;
   if (world_.cameras[camera].watches == "belt") {
     belt_seen_ = shot.stamp;
     if (perception_.sees_belt()) belt_clear_ = shot.stamp;
@@ -77,7 +92,8 @@ Snapshot Observer::take_in(std::size_t camera) {
                     perception_.cut(shot.stamp, shot.belt_travel_m),
                     {},
                     perception_.wants_labels(),
-                    perception_.base()};
+                    perception_.base(),
+                    shown_};
   for (const world::CameraSpec& watching : world_.cameras) {
     if (watching.watches != "belt") snapshot.occupancy[watching.watches] = perception_.occupancy(watching.watches);
   }

@@ -32,6 +32,7 @@ struct Snapshot {
   std::map<std::string, int> occupancy;    // of watched places
   bool wants_labels = false;               // Perception::wants_labels()
   std::optional<BaseBelief> base = {};     // where the base is, in a world that has one
+  std::vector<Time> shown = {};            // a camera: stamp of its newest frame that showed anything at all
 };
 
 class Observer {
@@ -62,7 +63,8 @@ class Observer {
   link::Frames& places_;
   Pace pace_;
   std::vector<RgbdFrame> frames_;  // a camera; the perceiver's only,
-  Time belt_seen_, belt_clear_;    // and so are these
+  std::vector<Time> shown_;        // and so are these
+  Time belt_seen_, belt_clear_;
 
   std::mutex mutex_;
   std::deque<Snapshot> snapshots_;                        // taken in, by stamp

@@ -47,6 +47,7 @@ struct Watch {
   std::function<bool()> interrupted;
   std::function<void(Time)> progress;
   std::function<void(Time, std::string_view)> said;  // an event of the control loop: stops, arming, refused commands
+  std::function<void(std::string_view)> alerted;     // a part came to be worse: a line (Health::take_alerts)
   std::function<void(std::string_view)> refused;     // real time only: what the operating system refused, at the start
   Time limit;                                        // a run that takes longer is broken off
 };

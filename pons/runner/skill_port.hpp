@@ -14,6 +14,12 @@
 
 namespace pons::runner {
 
+// How well the cups hold now, by their vacuum.
+struct Grip {
+  double share = 1;   // of their full force, once sealed; above 0
+  bool lifts = true;  // false: they do not seal well enough to lift anything
+};
+
 // Of one robot.
 struct SkillPort {
   std::string name = "arm";  // the robot's, as the world has it
@@ -27,7 +33,9 @@ struct SkillPort {
   std::function<void(Time)> arm;                               // one step out of a stop, towards operational
   std::function<double()> outside_rad;                         // how far the arm stands outside its position limits
   std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
-  std::function<void(Time)> rest;                              // once a period while no skill runs
+  std::function<void(Time)> rest;                              // once a period while no skill runs,
+  std::function<void(Time)> park;                              // or this, out of the cameras' view; may be empty
+  std::function<void(const Grip&)> grip;                       // once a period; may be empty
   std::function<void(link::Belt)> belt;                        // once a period
   std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
   std::function<void()> halt;                                         // a protective stop

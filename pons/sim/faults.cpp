@@ -37,7 +37,8 @@ Faults::Faults(const world::FaultPlan& plan, std::uint64_t seed)
       jams_(spells(plan, seed, Fault::kBeltJam)),
       occlusions_(spells(plan, seed, Fault::kOcclusion)),
       blackouts_(spells(plan, seed, Fault::kBlackout)),
-      shifts_(spells(plan, seed, Fault::kShiftedView)) {}
+      shifts_(spells(plan, seed, Fault::kShiftedView)),
+      weak_(spells(plan, seed, Fault::kVacuumWeak)) {}
 
 bool Faults::draws(Fault fault) {
   const double share = plan_[fault].often;
@@ -75,7 +76,14 @@ Suction Faults::suction(std::size_t arm, std::uint32_t vacuum_on, const Gripper&
                         Time now) {
   Attempt& attempt = attempts_[arm];
   if (std::exchange(attempt.vacuum_on, vacuum_on) == 0 && vacuum_on != 0) begin_attempt(attempt);
-  if (vacuum_on == 0) return {};
+  const bool weak = weak_.on(now);
+  Suction suction = vacuum_on == 0 ? Suction{} : attempted(attempt, gripper, ledger, now);
+  if (weak) suction.pump = plan_[Fault::kVacuumWeak].share;
+  return suction;
+}
+
+// By what was drawn for this attempt.
+Suction Faults::attempted(Attempt& attempt, const Gripper& gripper, const Ledger& ledger, Time now) {
   const int slot = gripper.touched();
   if (attempt.misses) {
     if (slot >= 0 && !std::exchange(attempt.missed, true)) ++counts_[Fault::kMissedGrasp];
@@ -175,6 +183,7 @@ world::FaultCounts Faults::counts() const {
   counts[Fault::kOcclusion] = occlusions_.begun();
   counts[Fault::kBlackout] = blackouts_.begun();
   counts[Fault::kShiftedView] = shifts_.begun();
+  counts[Fault::kVacuumWeak] = weak_.begun();
   return counts;
 }
 

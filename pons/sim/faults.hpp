@@ -59,6 +59,7 @@ class Faults {
     bool missed = false, leaked = false, dropped = false;  // has come to pass
     std::optional<Time> lifted;
   };
+  [[nodiscard]] Suction attempted(Attempt& attempt, const Gripper& gripper, const Ledger& ledger, Time now);
   [[nodiscard]] bool draws(world::Fault fault);
   void begin_attempt(Attempt& attempt);
   [[nodiscard]] int newly_held(std::span<const ArmStep> arms, const Ledger& ledger) const;
@@ -67,7 +68,7 @@ class Faults {
   world::FaultPlan plan_;
   std::uint64_t seed_;
   std::array<Random, world::kFaults> streams_;
-  world::Spells jams_, occlusions_, blackouts_, shifts_;
+  world::Spells jams_, occlusions_, blackouts_, shifts_, weak_;
   world::FaultCounts counts_;
   std::array<Attempt, kMaxArms> attempts_;       // of each arm
   int owed_doubles_ = 0;                         // of picks that had no neighbour

@@ -41,7 +41,7 @@ void Gripper::update(const Composed& cell, mjData* data, std::uint32_t vacuum_on
   for (std::size_t i = 0; i < count_; ++i) {
     Cup& cup = cups_[i];
     const bool on = ((vacuum_on >> i) & 1U) != 0;
-    const double target = !on ? 0 : (cup.slot >= 0 ? suction.sealed_kpa : kOpen_kpa);
+    const double target = !on ? 0 : suction.pump * (cup.slot >= 0 ? suction.sealed_kpa : kOpen_kpa);
     const double rate = target > cup.pressure_kpa ? kOn_s : kOff_s;
     cup.pressure_kpa += (target - cup.pressure_kpa) * (1 - std::exp(-step_s / rate));
     data->ctrl[arm_->cups[i].actuator] = cup.slot >= 0 ? std::min(1.0, cup.pressure_kpa / kFull_kpa) : 0;

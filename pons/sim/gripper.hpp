@@ -14,6 +14,7 @@ namespace pons::sim {
 struct Suction {
   bool seals = true;
   double sealed_kpa = 60;  // that a sealed cup is evacuated to
+  double pump = 1;         // share of that, and of what an open one draws, that the pump gives
 };
 
 // A cup that is switched on and whose lip lies on a parcel, facing it, is evacuated to about 60 kPa with a time

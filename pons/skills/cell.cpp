@@ -32,7 +32,9 @@ constexpr double kSlowGripShare = 0.70;
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
 constexpr int kFineCorrections = 5;
-constexpr double kUnsure_kg = 0.1;  // the scale's
+constexpr double kUnsure_kg = 0.1;                 // the scale's
+constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
+constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
@@ -80,6 +82,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
+    lost = std::move(held);
     holds_nothing();
   }
   const double passed_s = to_s(now - now_);
@@ -103,6 +106,8 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
+  strays.look(objects_);
+  recognise_left();
   take_in_cut();
   add_unseen();
 }
@@ -144,20 +149,52 @@ void Cell::holds_nothing() {
   arm.payload(0, Vector3::Zero());
 }
 
+const world::Place* Cell::fallen_since(const Falls& before) const {
+  for (std::size_t i = 0; i < world.places.size(); ++i) {
+    const world::Place& place = world.places[i];
+    if (place.kind == world::PlaceKind::kChute && falls()[i] != before[i]) return &place;
+  }
+  return nullptr;
+}
+
 std::vector<task::Note> Cell::take_notes() {
   for (const SentMotion& motion : arm.take_sent())
     note("motion", {{"first_tick", motion.first_tick}, {"last_tick", motion.last_tick}});
   return std::exchange(notes_, {});
 }
 
-void Cell::left_on_belt(const Load& load, const Vector3& position) {
-  ObjectBelief object;
-  object.stamp = now_;
-  object.world_from_top.translation() = position;
+void Cell::left_on_belt(const Pose& world_from_tip) {
+  ObjectBelief object = held_at(*held, world_from_tip);
+  object.world_from_top.translation().z() = world.belt.surface_z_m + object.size_m.z();
+  object.track = kFirstLeft + lefts_++;
+  object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
-  object.size_m = load.size_m;
   left_.push_back(object);
   objects_.push_back(object);
+}
+
+void Cell::lifted(const ObjectBelief& object) {
+  forgotten_.push_back(object.track);
+  std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
+}
+
+// Nothing else can have come to lie just there.
+void Cell::recognise_left() {
+  for (ObjectBelief& object : objects_) {
+    if (object.track == 0) continue;
+    std::erase_if(left_, [&](const ObjectBelief& left) {
+      const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
+      const bool lies_there =
+          object.code.empty() && !left.code.empty() && object.last_seen > left.last_seen && off.norm() < kSlides_m;
+      if (lies_there) labelled_[object.track] = left.code;
+      return lies_there || (object.code == left.code && !left.code.empty());
+    });
+    const auto label = labelled_.find(object.track);
+    if (label != labelled_.end() && object.code.empty()) object.code = label->second;
+  }
+  std::erase_if(labelled_, [&](const auto& entry) {
+    return std::ranges::find(objects_, entry.first, &ObjectBelief::track) == objects_.end();
+  });
 }
 
 void Cell::hides(double reach_m, double height_m) {
@@ -340,11 +377,11 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     const double mass_kg = held->mass_kg + kUnsure_kg;
     const double cups = grip_use(model, world.robot.tool, held->load, mass_kg, *way);
     const double motors = torque_use(model, world.robot, held->load, mass_kg, *way);
-    const double use = std::max(cups / kGripShare, motors / kTorqueShare);
+    const double use = std::max(cups / (kGripShare * grip_share), motors / kTorqueShare);
     if (use <= 1) return way;
     if (search.share <= kSlowestShare) {
-      if (search.must || (cups <= kSlowGripShare && motors <= 1)) return way;
-      return too_heavy(held->mass_kg, cups, motors);
+      if (search.must || (cups <= kSlowGripShare * grip_share && motors <= 1)) return way;
+      return too_heavy(held->mass_kg, cups / grip_share, motors);
     }
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;
     search.share = std::max(kSlowestShare, search.share * std::clamp(1 / use, kBoldest, timid));
@@ -360,7 +397,7 @@ Expected<void> Cell::stop(Time now) {
     if (!way) break;
     const double mass_kg = held->mass_kg + kUnsure_kg;
     softest = std::move(*way);
-    if (grip_use(model, world.robot.tool, held->load, mass_kg, *softest) <= kGripShare) break;
+    if (grip_use(model, world.robot.tool, held->load, mass_kg, *softest) <= kGripShare * grip_share) break;
   }
   return softest ? arm.stream(*softest) : arm.stop(now);
 }

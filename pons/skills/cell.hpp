@@ -3,8 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +15,7 @@
 #include "pons/core/belief.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
+#include "pons/skills/company.hpp"
 #include "pons/skills/reach.hpp"
 #include "pons/skills/route.hpp"
 #include "pons/task/policy.hpp"
@@ -24,11 +27,16 @@ namespace pons::skills {
 // What the tip may meet while cups press on a parcel, lift one whose mass is not known yet, or let go of one.
 inline constexpr double kHandling_n = 100;
 
+// How often something fell into each of the world's places, as their light curtains count it.
+using Falls = std::array<std::uint16_t, kMaxPlaces>;
+
 // The parcel on the cups.
 struct Held {
   std::string code;
   Load load;
   double mass_kg = 0;
+  Company company = {};
+  Falls falls = {};  // when it was lifted
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.
@@ -75,9 +83,9 @@ class Cell {
   void hold_belt(Time now) { belt_held_ = now; }
   [[nodiscard]] bool holds_belt(Time now) const { return belt_held_ && now < *belt_held_ + kBeltHeldFor; }
 
-  // Put back on the belt at `position` (middle of its top face): out of the cameras' view it stays an obstacle until it
-  // has ridden off the end.
-  void left_on_belt(const Load& load, const Vector3& position);
+  // What is held was put back on the belt, with the tip there. Until a camera sees it, it is known from that, riding
+  // with the belt; then it keeps its label, which no camera may be able to read any more.
+  void left_on_belt(const Pose& world_from_tip);
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
   // counts as so high an obstacle, until the tip has left it; so long unseen_end() counts as no higher, either, or it
   // would hold the arm.
@@ -87,13 +95,16 @@ class Cell {
   // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
   // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
+  [[nodiscard]] const Falls& falls() const { return arm.state().fallen_into; }
+  // The chute into which something has fallen since; nullptr: none. What rides off the belt's end breaks no chute's.
+  [[nodiscard]] const world::Place* fallen_since(const Falls& before) const;
   // For the journal, of whatever task runs.
   void note(std::string kind, task::Json detail) { notes_.push_back({std::move(kind), std::move(detail)}); }
   // Since the last call, the motions that were sent among them.
   [[nodiscard]] std::vector<task::Note> take_notes();
 
   // Taken off the belt: perception is told to let go of the track.
-  void forget(std::uint32_t track) { forgotten_.push_back(track); }
+  void lifted(const ObjectBelief& object);
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
 
   // Tip pose, tool pointing down, over (x, y, z) with its x axis at `yaw`.
@@ -151,12 +162,18 @@ class Cell {
   Reach reach;
   std::optional<Held> held;
   std::optional<Miss> missed;
+  std::optional<std::string> hooked;  // the last code on which another was found to hang
+  std::optional<Held> lost;           // from the cups in the last stop in which anything was
+  Strays strays;
+  double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
+  bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does
   std::uint64_t streams = 0;            // there were so far
 
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
+  void recognise_left();
   void take_in_cut();
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
@@ -174,7 +191,9 @@ class Cell {
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;
-  std::vector<ObjectBelief> left_;  // unlabelled, as of now_
+  std::vector<ObjectBelief> left_;                 // on the belt, and not seen since, as of now_
+  std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since
+  std::uint32_t lefts_ = 0;
   std::optional<ObjectBelief> hidden_;
   struct Unseen {
     double from_m, height_m;  // its hindmost, and over the belt

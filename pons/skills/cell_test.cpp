@@ -97,6 +97,57 @@ TEST_F(RestTest, WhatItHoldsRisesToo) {
   EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.32 + 0.15 + 0.01);
 }
 
+class LeftOnBeltTest : public CarryTest {
+ protected:
+  void SetUp() override {
+    CarryTest::SetUp();
+    Pose tip = Cell::tip_down({0.1, 0.05, 1.2}, 0.3);
+    cell_.held = Held{"P000001", {.size_m = {0.2, 0.15, 0.1}, .yaw_in_tip_rad = 0.3}, 1.0};
+    cell_.left_on_belt(tip);
+    cell_.holds_nothing();
+  }
+  // Without a label, there.
+  [[nodiscard]] ObjectBelief seen(double x_m, double y_m) const {
+    ObjectBelief object;
+    object.track = 7;
+    object.stamp = object.last_seen = now_ + from_s(0.5);
+    object.size_m = {0.2, 0.15, 0.1};
+    object.world_from_top.translation() = Vector3(x_m, y_m, world_.belt.surface_z_m + 0.1);
+    return object;
+  }
+};
+
+TEST_F(LeftOnBeltTest, IsKnownWithoutACameraAsLyingOnTheBelt) {
+  cell_.refresh(now_ + from_s(0.01), {});
+  const ObjectBelief* const left = cell_.find("P000001");
+  ASSERT_NE(left, nullptr);
+  EXPECT_NEAR(left->world_from_top.translation().x(), 0.1, 1e-9);
+  EXPECT_NEAR(left->world_from_top.translation().z(), world_.belt.surface_z_m + 0.1, 1e-9);
+  EXPECT_NEAR(left->world_from_top.linear()(0, 0), 1, 1e-9) << "turned as it hung";
+  EXPECT_NE(left->track, 0U);
+}
+
+TEST_F(LeftOnBeltTest, WhatIsSeenThereKeepsItsLabelAndIsOne) {
+  cell_.refresh(now_ + from_s(0.5), {seen(0.12, 0.05)});
+  ASSERT_EQ(cell_.objects().size(), 1U);
+  EXPECT_EQ(cell_.objects()[0].code, "P000001");
+  cell_.refresh(now_ + from_s(1), {seen(0.3, 0.05)});
+  ASSERT_NE(cell_.find("P000001"), nullptr) << "the same track, wherever it has ridden";
+  EXPECT_EQ(cell_.find("P000001")->track, 7U);
+  cell_.lifted(*cell_.find("P000001"));
+  EXPECT_EQ(cell_.take_forgotten(), std::vector<std::uint32_t>{7});
+}
+
+TEST_F(LeftOnBeltTest, WhatIsSeenElsewhereIsAnother) {
+  cell_.refresh(now_ + from_s(0.5), {seen(0.2, 0.05)});
+  ASSERT_EQ(cell_.objects().size(), 2U);
+  EXPECT_EQ(cell_.objects()[0].code, "");
+  EXPECT_NE(cell_.find("P000001")->track, 7U);
+  cell_.lifted(*cell_.find("P000001"));
+  cell_.refresh(now_ + from_s(0.6), {seen(0.2, 0.05)});
+  EXPECT_EQ(cell_.find("P000001"), nullptr);
+}
+
 class UnseenEndTest : public ObedientArmTest {
  protected:
   // It comes after what was seen.
@@ -182,6 +233,15 @@ TEST_F(CarryTest, WhatIsHeavyAndTallGoesSlowerThanWhatIsLightAndFlat) {
     // It does not crawl either: no carry is slower than the cups ask for.
     EXPECT_GT(use(heavy), 0.7 * kReserve) << mass_kg << " kg";
   }
+}
+
+TEST_F(CarryTest, WhatTheCupsHoldWithLessVacuumGoesSlower) {
+  const Vector3 size_m{0.2, 0.2, 0.3};
+  const double base_s = duration_s(carry(size_m, 2));
+  cell_.grip_share = 0.5;
+  const motion::Trajectory slow = carry(size_m, 2);
+  EXPECT_LE(use(slow), 0.5 * kReserve);
+  EXPECT_GT(duration_s(slow), 1.1 * base_s);
 }
 
 TEST_F(CarryTest, AsHighOrAsHeavyAloneAlreadySlowsItDown) {

@@ -14,6 +14,11 @@
 namespace pons::skills {
 namespace {
 
+constexpr double kPressFurther_m = 0.003, kPressTakes_s = 0.08, kPressRides_s = 0.4;
+constexpr double kWithin_m = 0.02;    // the zone, where the arm waits,
+constexpr double kWait_m = 0.15;      // over the parcel that it waits for,
+constexpr double kWaitOver_m = 0.06;  // and over the others, which pass below
+
 constexpr double kHover_m = 0.035;      // the straight part above the parcel
 constexpr double kComeDown_m_s = 0.25;  // speed there
 constexpr double kPress_m = 0.006;      // bellows pressed together at the contact
@@ -183,6 +188,43 @@ Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation) {
   Load load{.size_m = object.size_m, .yaw_in_tip_rad = yaw_of(orientation) - yaw_of(axes)};
   load.size_m.z() = std::max(kThinnest_m, (object.size_m.z() - middle_over_edge_m) / axes(2, 2));
   return load;
+}
+
+Expected<motion::Trajectory> way_to_wait(Cell& cell, const ObjectBelief& object, const Grasp& grasp, Time now) {
+  const Time from = cell.arm.splice_time(now);
+  const AxisState state = cell.arm.planned(from);
+  Vector3 point = grasp.contact_point;
+  point.x() = cell.world.belt.pick_x_min_m + kWithin_m;
+  point.z() = object.world_from_top.translation().z() + kWait_m;
+  for (const ObjectBelief& other : cell.objects())
+    point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
+  const auto q = cell.model.inverse(Cell::tip_down(point, yaw_of(grasp.orientation)), state.position);
+  if (!q) return std::unexpected(q.error());
+  return cell.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell.objects(),
+                           cell.limits_empty());
+}
+
+Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation) {
+  const Vector3 belt{cell.belt_speed_m_s(), 0, 0};
+  auto down = nudge(cell, start, at, orientation, kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt,
+                    cell.limits_empty());
+  if (!down) return std::unexpected(down.error());
+  const Time end = down->back().end();
+  const auto along = ride(cell, motion::sample(*down, end, cell.model.axes()), end, orientation, kPressRides_s);
+  if (!along) return std::unexpected(along.error());
+  down->insert(down->end(), along->begin(), along->end());
+  return PressedDown{*std::move(down), end};
+}
+
+ObjectBelief held_at(const Held& held, const Pose& world_from_tip) {
+  ObjectBelief object;
+  object.size_m = held.load.size_m;
+  object.world_from_top = world_from_tip * Eigen::Translation3d(held.load.offset_in_tip_m);
+  const double yaw = yaw_of(world_from_tip.linear()) - held.load.yaw_in_tip_rad;
+  object.world_from_top.linear() = Eigen::AngleAxisd(yaw, Vector3::UnitZ()).toRotationMatrix();
+  object.confidence = 1;
+  object.code = held.code;
+  return object;
 }
 
 Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation,

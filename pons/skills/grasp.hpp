@@ -74,6 +74,23 @@ struct Lift {
 // its middle is high.
 [[nodiscard]] Load load_of(const ObjectBelief& object, const Eigen::Matrix3d& orientation);
 
+// For one still too far upstream: to over where it will come within reach, higher than what passes below. Errors: out
+// of reach; no way.
+[[nodiscard]] Expected<motion::Trajectory> way_to_wait(Cell& cell, const ObjectBelief& object, const Grasp& grasp,
+                                                       Time now);
+
+// The cups a little further down onto what they touch, riding along with the belt from `pressed` on. Error: out of
+// reach.
+struct PressedDown {
+  motion::Trajectory trajectory;
+  Time pressed;
+};
+[[nodiscard]] Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at,
+                                               const Eigen::Matrix3d& orientation);
+
+// What hangs on the cups, as if it were seen there.
+[[nodiscard]] ObjectBelief held_at(const Held& held, const Pose& world_from_tip);
+
 // A straight move of the tip by `offset`, ending at `tip_speed`, planned in joint space.
 [[nodiscard]] Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at,
                                                  const Eigen::Matrix3d& orientation, const Vector3& offset,

@@ -20,9 +20,7 @@ using task::Status;
 constexpr Duration kVacuumLead = std::chrono::milliseconds(40);   // before the contact
 constexpr Duration kSealWithin = std::chrono::milliseconds(330);  // after it, while riding along
 constexpr Duration kPressAfter = std::chrono::milliseconds(90);   // the contact, when too few cups have sealed
-constexpr double kPressFurther_m = 0.003;
 constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
-constexpr double kPressTakes_s = 0.08;
 constexpr int kPresses = 2;
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
@@ -47,9 +45,8 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
+constexpr double kNearEnd_m = 0.25;    // of the pick zone: what is lifted there has to be put back soon
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
-constexpr double kWaitOver_m = 0.06;   // the others, which pass below
-constexpr double kWait_m = 0.15;       // over the parcels, where the arm waits for one to come
 
 class Pick final : public ArmSkill {
  public:
@@ -91,7 +88,7 @@ class Pick final : public ArmSkill {
     if (phase_ == Phase::kSetDown) {
       verdict_ = {Status::kFailed, "cancelled", {}};
     } else if (phase_ == Phase::kLift) {
-      begin_put_back(now, {Status::kFailed, "cancelled", {}});
+      begin_put_back(now, kPutAside, {Status::kFailed, "cancelled", {}});
       if (phase_ != Phase::kSetDown) begin_retreat(now, {Status::kFailed, "cancelled; still held", {}});
     } else if (phase_ != Phase::kRetreat) {
       begin_retreat(now, {Status::kFailed, "cancelled", {}});
@@ -137,13 +134,15 @@ class Pick final : public ArmSkill {
       const Progress begun = begin_set_down(now, wanted ? overweight(mass) : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
+    if (!cell_.lifts) return {Status::kException, "the vacuum is too weak", {}};
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
       step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
-      return {Status::kFailed, "lost from sight", {}};
+      return absent();
     }
     seen_ = now;
+    keep_in_reach(*object, now);
     const world::Belt& belt = cell_.world.belt;
     if (cell_.world.rules.too_large(object->size_m)) {
       return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
@@ -169,7 +168,9 @@ class Pick final : public ArmSkill {
     if (comes_too_late(met_x)) return {};
     // One side of the parcel may have room for the wrist where another has a tall neighbour.
     std::optional<Eigen::Matrix3d> turned;
-    if (soonest && quarters_ != 0) turned = quarter_turns(*object, quarters_) * soonest->orientation;
+    if (soonest && quarters_ != 0)
+      turned = Eigen::AngleAxisd(quarters_ * std::numbers::pi / 2, object->world_from_top.linear().col(2)) *
+               soonest->orientation;
     auto grasp = plan_grasp(cell_, state, from, *object, turned, search_);
     if (!grasp) {
       if (cell_.router.spent()) {
@@ -185,6 +186,18 @@ class Pick final : public ArmSkill {
     if (grasp->contact_point.x() < belt.pick_x_min_m) return wait_for(*object, *grasp, now);
     if (comes_too_late(grasp->contact_point.x())) return {};
     return start(*grasp, *object, now);
+  }
+
+  [[nodiscard]] Progress absent() const {
+    const std::string* const place = cell_.strays.place_of(code_);
+    if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
+    return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
+  }
+
+  // The brain has the belt wait for what it sees; what was put back, nobody may see.
+  void keep_in_reach(const ObjectBelief& object, Time now) {
+    const double x_m = object.world_from_top.translation().x();
+    if (cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
   }
 
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
@@ -205,13 +218,13 @@ class Pick final : public ArmSkill {
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
 
-  // What cannot be sorted goes back beside its neighbours, to where it was lifted from, which has moved on with the
-  // belt, and rides on into the exception chute.
-  Progress begin_put_back(Time now, Progress verdict) {
+  // To where it was lifted from, which has moved on with the belt: what cannot be sorted so much farther from its
+  // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place.
+  Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     const AxisState state = cell_.arm.planned(from);
-    Vector3 to = kPutAside * lift_offset(cell_, target_) + lift_from_;
+    Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
     to.x() += belt_travel_m(from) - lift_travel_m_;
     to.z() = lift_from_.z() + kPutBack_m;
     const Vector3 offset = to - cell_.model.world_from_tip(state.position).translation();
@@ -232,9 +245,11 @@ class Pick final : public ArmSkill {
   }
 
   Progress set_down(Time now) {
+    if (verdict_.status == Status::kRetry) cell_.hold_belt(now);
     const auto laid = set_down_.tick(now);
     if (!laid) return {Status::kRetry, laid.error().line(), {}};
     if (!*laid) return {};
+    if (verdict_.status == Status::kRetry) cell_.missed = Miss{code_, now};
     if (verdict_.status == Status::kRunning) {
       phase_ = Phase::kFind;
       seen_ = now;
@@ -247,18 +262,7 @@ class Pick final : public ArmSkill {
   // The parcel is still too far upstream: hang over the place where it will come within reach.
   Progress wait_for(const ObjectBelief& object, const Grasp& grasp, Time now) {
     if (waiting_) return {};
-    const Time from = cell_.arm.splice_time(now);
-    const AxisState state = cell_.arm.planned(from);
-    Vector3 point = grasp.contact_point;
-    point.x() = cell_.world.belt.pick_x_min_m + 0.02;
-    point.z() = object.world_from_top.translation().z() + kWait_m;
-    for (const ObjectBelief& other : cell_.objects()) {
-      point.z() = std::max(point.z(), other.world_from_top.translation().z() + kWaitOver_m);
-    }
-    const auto q = cell_.model.inverse(Cell::tip_down(point, yaw_of(grasp.orientation)), state.position);
-    if (!q) return {};
-    const auto way = cell_.router.route(state, from, {*q, AxisVector::Zero(q->size())}, nullptr, cell_.objects(),
-                                        cell_.limits_empty());
+    const auto way = way_to_wait(cell_, object, grasp, now);
     if (way && cell_.arm.stream(*way)) waiting_ = true;
     return {};
   }
@@ -281,6 +285,7 @@ class Pick final : public ArmSkill {
 
   Progress approach(Time now) {
     if (const ObjectBelief* object = cell_.find(code_)) {
+      keep_in_reach(*object, now);
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
       const double moved_m = off.head<2>().norm();
       if (const auto other = tied_to(cell_, *object)) return give_up(now, *other);
@@ -306,9 +311,11 @@ class Pick final : public ArmSkill {
     if (moved_m <= kMoved_m && cell_.router.clear(grasp_.trajectory, now, grasp_.hover, nullptr, cell_.objects()))
       return;
     const Time from = cell_.arm.splice_time(now);
-    const double turn = yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear());
+    // A belief's yaw is known up to half a turn.
+    const double turn = std::remainder(yaw_of(object.world_from_top.linear()) - yaw_of(target_.world_from_top.linear()),
+                                       std::numbers::pi);
     const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
-                                   Eigen::AngleAxisd(wrapped(turn), Vector3::UnitZ()) * grasp_.orientation, search_);
+                                   Eigen::AngleAxisd(turn, Vector3::UnitZ()) * grasp_.orientation, search_);
     planned_ = now;
     if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
   }
@@ -324,6 +331,8 @@ class Pick final : public ArmSkill {
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
+      // It was not there, and no camera has seen it since another was taken from beside it.
+      if (cups.sealed_cups == 0 && cell_.strays.missed_twice(code_)) return begin_retreat(now, absent()), Progress{};
       return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};
@@ -340,16 +349,9 @@ class Pick final : public ArmSkill {
   bool press_further(Time now) {
     if (weigh_now(cell_) < -kPressedHard_kg) return false;
     const Time from = cell_.arm.splice_time(now);
-    const Vector3 belt{cell_.belt_speed_m_s(), 0, 0};
-    auto down = nudge(cell_, cell_.arm.planned(from), from, grasp_.orientation,
-                      kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt, cell_.limits_empty());
-    if (!down) return false;
-    const Time end = down->back().end();
-    const auto along = ride(cell_, motion::sample(*down, end, cell_.model.axes()), end, grasp_.orientation, 0.4);
-    if (!along) return false;
-    down->insert(down->end(), along->begin(), along->end());
-    if (!cell_.arm.stream(*down)) return false;
-    grasp_.contact = end;
+    const auto down = press_down(cell_, cell_.arm.planned(from), from, grasp_.orientation);
+    if (!down || !cell_.arm.stream(down->trajectory)) return false;
+    grasp_.contact = down->pressed;
     ++presses_;
     return true;
   }
@@ -365,11 +367,16 @@ class Pick final : public ArmSkill {
     }
     lift_end_ = up->top;
     rides_until_ = up->rides_until;
-    cell_.held = Held{.code = code_, .load = load_of(target_, grasp_.orientation)};
+    const ObjectBelief* const seen = cell_.find(code_);
+    cell_.held = Held{.code = code_,
+                      .load = load_of(target_, grasp_.orientation),
+                      .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
+                      .falls = cell_.falls()};
+    cell_.lost.reset();
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
     cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
-    cell_.forget(target_.track);
+    cell_.lifted(seen != nullptr ? *seen : target_);
     phase_ = Phase::kLift;
     return {};
   }
@@ -388,19 +395,27 @@ class Pick final : public ArmSkill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
-    const bool lopsided = weighed && hangs_beside(cell_.held->load, *weighed);
+    const Held& held = *cell_.held;
+    const Companion* const other = weighed ? felt_on(held.load, *weighed, held.company) : nullptr;
+    const bool lopsided =
+        weighed && (other != nullptr ||
+                    hangs_beside(held.load, *weighed, cell_.hooked == code_ ? Uneven::kDoubted : Uneven::kUsual));
+    // If it is put back, then within reach.
+    const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
+    if (lopsided || (near_end && !held.company.empty())) cell_.hold_belt(now);
     if ((!weighed || heavy || lopsided) && !at_rest) return {};
-    if (target_.crowded && now < lift_end_) return {};
+    if ((target_.crowded || !held.company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(0.0, mass));
     cell_.arm.expect_contact(0);
     if (mass > limit) {
-      return begin_put_back(now, overweight(mass));
+      return begin_put_back(now, kPutAside, overweight(mass));
     }
     if (lopsided) {
-      cell_.missed = Miss{code_, now};
-      return begin_put_back(now, {Status::kRetry, "another hangs on it: its weight is felt beside it", {}});
+      cell_.hooked = code_;
+      const std::string name = other != nullptr && !other->code.empty() ? other->code : "another";
+      return begin_put_back(now, 0, {Status::kRetry, name + " hangs on it: its weight is felt beside it", {}});
     }
     return success(now);
   }
@@ -439,19 +454,10 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
-    return {Status::kSucceeded,
-            {},
-            {{"mass_kg", cell_.held->mass_kg},
-             {"sealed", cell_.arm.cups().sealed_cups},
-             {"seconds", to_s(now - started_)}}};
+    task::Json detail{{"mass_kg", cell_.held->mass_kg}};
+    detail.update({{"sealed", cell_.arm.cups().sealed_cups}, {"seconds", to_s(now - started_)}});
+    return {Status::kSucceeded, {}, std::move(detail)};
   }
-
-  static Eigen::Matrix3d quarter_turns(const ObjectBelief& object, int count) {
-    const Vector3 up = object.world_from_top.linear().col(2);
-    return Eigen::AngleAxisd(count * std::numbers::pi / 2, up).toRotationMatrix();
-  }
-  // A belief's yaw is known up to half a turn.
-  static double wrapped(double angle) { return std::remainder(angle, M_PI); }
 
   Cell& cell_;
   std::string code_;

@@ -50,12 +50,7 @@ constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim
 class Place final : public ArmSkill {
  public:
   Place(Cell& cell, std::string name, std::string object, Time now)
-      : cell_(cell),
-        name_(std::move(name)),
-        object_(std::move(object)),
-        started_(now),
-        delay_(cell.arm),
-        fallen_into_(cell.arm.state().fallen_into) {}
+      : cell_(cell), name_(std::move(name)), object_(std::move(object)), started_(now), delay_(cell.arm) {}
 
   Progress tick(Time now) override {
     move_along(delay_.take());
@@ -114,6 +109,7 @@ class Place final : public ArmSkill {
   }
 
   Progress plan(Time now) {
+    if (!cell_.held && cell_.lost && cell_.lost->code == object_) return begin_fall(now, *cell_.lost);
     if (!cell_.held) return {Status::kFailed, "nothing is held", {}};
     if (!object_.empty() && cell_.held->code != object_) {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
@@ -221,21 +217,22 @@ class Place final : public ArmSkill {
   }
 
   Progress carry(Time now) {
-    if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now);
+    if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now, *cell_.held);
     look_out(now);
     const bool level = hangs_level(now);
     if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
     let_go_ = cell_.held->code;
+    cell_.strays.let_go(cell_.held->company, name_, now);
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
   }
 
-  Progress begin_fall(Time now) {
-    fallen_ = cell_.held->code;
+  Progress begin_fall(Time now, Held load) {
+    fallen_ = std::move(load);
     cell_.arm.vacuum(false);
     cell_.holds_nothing();
     fell_at_ = now;
@@ -246,15 +243,12 @@ class Place final : public ArmSkill {
   // The mouths' light curtains tell into which it went, and the journal whom to send there. What lies on the belt again
   // is seen again.
   Progress fall(Time now) {
-    task::Json detail{{"place", name_}, {"object", fallen_}};
-    for (std::size_t i = 0; i < cell_.world.places.size(); ++i) {
-      const world::Place& place = cell_.world.places[i];
-      // What rides off the belt's end falls through the exception chute's.
-      if (place.kind != world::PlaceKind::kChute) continue;
-      if (cell_.arm.state().fallen_into[i] == fallen_into_[i]) continue;
-      if (place.name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
-      detail["fell_into"] = place.name;
-      return {Status::kException, "fell into " + place.name, std::move(detail)};
+    task::Json detail{{"place", name_}, {"object", fallen_.code}};
+    if (const world::Place* const chute = cell_.fallen_since(fallen_.falls)) {
+      cell_.strays.let_go(fallen_.company, chute->name, now);
+      if (chute->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
+      detail["fell_into"] = chute->name;
+      return {Status::kException, "fell into " + chute->name, std::move(detail)};
     }
     if (now < fell_at_ + kFallsWithin) return {};
     return {Status::kFailed, "dropped", std::move(detail)};
@@ -313,8 +307,7 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
-  std::array<std::uint16_t, kMaxPlaces> fallen_into_;  // before it was carried
-  std::string fallen_;                                 // what the cups lost on the way
+  Held fallen_;  // what the cups lost on the way
   Time fell_at_;
   bool cancelled_ = false;
 };

@@ -4,12 +4,13 @@ namespace pons::skills {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(100);     // called later than that: a skill ran
+constexpr Duration kTryEvery = std::chrono::milliseconds(200);   // to find a way out of the view
 constexpr Duration kLeftAlone = std::chrono::milliseconds(500);  // then nobody wants what is held
 
 }  // namespace
 
 void Rest::tick(Time now) {
-  if (now > last_ + kPeriod) since_ = now, laying_ = false;
+  if (now > last_ + kPeriod) since_ = now, laying_ = false, parked_ = false;
   last_ = now;
   if (!cell_.arm.operational()) return;
   laying_ = laying_ && cell_.held;  // lost in a stop
@@ -34,6 +35,14 @@ void Rest::tick(Time now) {
   if (!cell_.held || now < since_ + kLeftAlone) return;
   since_ = now;
   laying_ = set_down_.begin(now).has_value();
+}
+
+void Rest::park(Time now) {
+  tick(now);
+  if (!cell_.arm.operational() || laying_ || cell_.held || now < cell_.arm.motion_end()) return;
+  if (parked_ || now < tried_ + kTryEvery) return;
+  tried_ = now;
+  parked_ = cell_.step_aside(now);
 }
 
 }  // namespace pons::skills

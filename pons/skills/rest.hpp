@@ -12,13 +12,17 @@ class Rest {
   explicit Rest(Cell& cell) : cell_(cell), weighing_(cell), set_down_(cell) {}
   // Once a period while no skill runs.
   void tick(Time now);
+  // Likewise, and with empty cups it stands out of the cameras' view: what they show then, when they show anything
+  // again, is the belt.
+  void park(Time now);
 
  private:
   Cell& cell_;
   LateWeighing weighing_;
   SetDown set_down_;
-  Time last_, since_;
+  Time last_, since_, tried_;
   bool laying_ = false;
+  bool parked_ = false;  // or on its way
 };
 
 }  // namespace pons::skills

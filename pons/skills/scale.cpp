@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
@@ -15,8 +14,11 @@ constexpr double kSwing_s_per_root_kg = 0.08;
 constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
-constexpr double kNearEdge = 0.75;  // of the way from the middle to an edge
-constexpr double kFelt_nm = 0.4;    // a moment below that the cups bear easily
+constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
+constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
+constexpr double kUneven_m = 0.012;  // between where a load's middle seems to be and where it weighs: both are measured
+constexpr double kFeltLeast_nm = 0.06;  // the wrist's own error
+constexpr double kTowards = 0.6;        // cosine: a companion may reach around a corner
 
 // What pulls the wrist down.
 double pull_n(Cell& cell) {
@@ -43,11 +45,21 @@ constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 
-bool hangs_beside(const Load& load, const Weight& weight) {
+bool hangs_beside(const Load& load, const Weight& weight, Uneven uneven) {
   const Eigen::Vector2d beside =
       Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
+  const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside.norm();
+  if (uneven == Uneven::kDoubted) return beside.norm() > kUneven_m && moment_nm > kFeltLeast_nm;
   const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
-  return share > kNearEdge && weight.mass_kg * kGravity_m_s2 * beside.norm() > kFelt_nm;
+  return share > kNearEdge && moment_nm > kFelt_nm;
+}
+
+const Companion* felt_on(const Load& load, const Weight& weight, const Company& company) {
+  if (!hangs_beside(load, weight, Uneven::kDoubted)) return nullptr;
+  const Eigen::Vector2d uneven_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
+  for (const Companion& companion : company)
+    if (uneven_m.dot(companion.aside_m.normalized()) > kTowards * uneven_m.norm()) return &companion;
+  return nullptr;
 }
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }
@@ -100,18 +112,6 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
 }
 
-// As if it were seen.
-ObjectBelief LateWeighing::held_at(const Pose& tip) const {
-  const Load& load = cell_.held->load;
-  ObjectBelief object;
-  object.track = std::numeric_limits<std::uint32_t>::max();  // nobody's
-  object.size_m = load.size_m;
-  object.world_from_top = tip * Eigen::Translation3d(load.offset_in_tip_m);
-  object.world_from_top.linear() =
-      Eigen::AngleAxisd(yaw_of(tip.linear()) - load.yaw_in_tip_rad, Vector3::UnitZ()).toRotationMatrix();
-  return object;
-}
-
 bool LateWeighing::tick(Time now) {
   if (cell_.held->mass_kg > 0) return true;
   cell_.hold_belt(now);  // or what rides along comes against it, and bears a part of it
@@ -124,7 +124,8 @@ bool LateWeighing::tick(Time now) {
     rested_ = now;
     scale_ = {};
     if (free_m < kFree_m) {
-      const auto up = lift(cell_, state, from, tip.linear(), lift_offset(cell_, held_at(tip)), kFreed_m_s2);
+      const auto up =
+          lift(cell_, state, from, tip.linear(), lift_offset(cell_, held_at(*cell_.held, tip)), kFreed_m_s2);
       if (up && cell_.arm.stream(up->trajectory)) rested_ = up->top;
     }
   }

@@ -14,9 +14,13 @@ struct Weight {
   Eigen::Vector2d beside_tip_m{0, 0};  // of its centre of mass, tip frame: how far from the tip's axis
 };
 
-// Whether so much of it hangs near the load's edge or beyond that it cannot be the load's alone: no parcel is that
-// uneven, so another came along.
-[[nodiscard]] bool hangs_beside(const Load& load, const Weight& weight);
+// Whether it hangs so far beside the load's middle that it cannot be the load's alone: near its edge or beyond, where
+// no parcel is that uneven; or, where another has hung on it before, at all.
+enum class Uneven : std::uint8_t { kUsual, kDoubted };
+[[nodiscard]] bool hangs_beside(const Load& load, const Weight& weight, Uneven uneven);
+
+// Towards whom the load, hanging still, weighs more than one alone does; nullptr: nobody.
+[[nodiscard]] const Companion* felt_on(const Load& load, const Weight& weight, const Company& company);
 
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same
@@ -54,8 +58,6 @@ class LateWeighing {
   [[nodiscard]] bool tick(Time now);
 
  private:
-  [[nodiscard]] ObjectBelief held_at(const Pose& tip) const;
-
   Cell& cell_;
   Scale scale_;
   std::optional<Time> rested_;  // hangs still by then

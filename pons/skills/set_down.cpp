@@ -85,7 +85,7 @@ Expected<bool> SetDown::tick(Time now) {
   cell_.arm.vacuum(false);
   cell_.arm.expect_contact(kHandling_n);
   if (!cell_.arm.cups().open && now < released_at_ + kOpensWithin) return false;
-  cell_.left_on_belt(cell_.held->load, cell_.model.world_from_tip(cell_.arm.state().position).translation());
+  cell_.left_on_belt(cell_.model.world_from_tip(cell_.arm.state().position));
   cell_.holds_nothing();
   cell_.arm.expect_contact(0);
   return true;

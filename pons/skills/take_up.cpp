@@ -4,6 +4,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "pons/skills/grasp.hpp"
 
@@ -38,22 +40,33 @@ Json TakeUp::carries() const {
           {"mass_kg", held.mass_kg},
           {"size_m", of(held.load.size_m)},
           {"yaw_rad", held.load.yaw_in_tip_rad},
-          {"offset_m", of(held.load.offset_in_tip_m)}};
+          {"offset_m", of(held.load.offset_in_tip_m)},
+          {"falls", std::span(held.falls).first(cell_.world.places.size())}};
 }
 
 void TakeUp::restore(const Json& carried) {
   cell_.unseen_end(kTall_m);
   if (!carried.is_object()) return;
   carried_ = carried.value("code", std::string{});
-  if (cell_.arm.cups().open) {
-    cell_.holds_nothing();
+  const Held held{.code = carried_,
+                  .load = {.size_m = vector_from(carried, "size_m"),
+                           .yaw_in_tip_rad = carried.value("yaw_rad", 0.0),
+                           .offset_in_tip_m = vector_from(carried, "offset_m")},
+                  .mass_kg = carried.value("mass_kg", 0.0),
+                  .falls = falls_from(carried)};
+  if (!cell_.arm.cups().open) {
+    cell_.held = held;
     return;
   }
-  cell_.held = Held{.code = carried_,
-                    .load = {.size_m = vector_from(carried, "size_m"),
-                             .yaw_in_tip_rad = carried.value("yaw_rad", 0.0),
-                             .offset_in_tip_m = vector_from(carried, "offset_m")},
-                    .mass_kg = carried.value("mass_kg", 0.0)};
+  cell_.lost = held;
+  cell_.holds_nothing();
+}
+
+Falls TakeUp::falls_from(const Json& carried) const {
+  Falls falls = cell_.falls();
+  const auto written = carried.value("falls", std::vector<std::uint16_t>{});
+  std::ranges::copy(std::span(written).first(std::min(written.size(), falls.size())), falls.begin());
+  return falls;
 }
 
 TakeUp::Fate TakeUp::fate(const task::Task& task, std::size_t done) const {
@@ -64,7 +77,14 @@ TakeUp::Fate TakeUp::fate(const task::Task& task, std::size_t done) const {
   if (object.empty() || object != carried_) return Fate::kBroken;
   if (cell_.held) return Fate::kGoesOn;
   if (next.skill != "place") return Fate::kBroken;
-  return is_over(next.arguments.value("place", std::string{})) ? Fate::kDone : Fate::kLost;
+  const auto place = next.arguments.value("place", std::string{});
+  if (const std::string chute = fell_into(); !chute.empty()) return chute == place ? Fate::kDone : Fate::kAstray;
+  return is_over(place) ? Fate::kDone : Fate::kLost;  // let go of there, and still falling
+}
+
+std::string TakeUp::fell_into() const {
+  const world::Place* const chute = cell_.lost && !cell_.held ? cell_.fallen_since(cell_.lost->falls) : nullptr;
+  return chute != nullptr ? chute->name : std::string();
 }
 
 bool TakeUp::is_over(const std::string& name) const {

@@ -16,7 +16,7 @@ class TakeUp {
   explicit TakeUp(Cell& cell) : cell_(cell) {}
 
   // What is on the cups, to be written down whenever it changes: {"code":…,"mass_kg":…,"size_m":[…],"yaw_rad":…,
-  // "offset_m":[…]}, as in Held; null when nothing is.
+  // "offset_m":[…],"falls":[…]}, as in Held; null when nothing is.
   [[nodiscard]] task::Json carries() const;
 
   // After refresh(): believes what was written last, as far as the cups still hold something. What only the bridge that
@@ -25,12 +25,15 @@ class TakeUp {
 
   enum class Fate : std::uint8_t {
     kGoesOn,  // what the next step needs is at hand
-    kDone,    // the next step had done its work: the load was let go over its place
+    kDone,    // the next step had done its work: the load has fallen into its place
+    kAstray,  // it was carried, and has fallen into the chute fell_into(), which is not its place
     kLost,    // it was carried, and is no more
     kBroken,  // it was in the middle of something that cannot be gone on with; nothing is held
   };
   // Of a task whose first `done` steps have succeeded, after restore().
   [[nodiscard]] Fate fate(const task::Task& task, std::size_t done) const;
+  // By the light curtains, since it was written down; empty: into none, or nothing was carried.
+  [[nodiscard]] std::string fell_into() const;
 
   // Each tick once the arm is armed again, until it is true: only then may anything else move it. Lets go of what the
   // cups hold and nobody knows. An arm that stands low over the belt goes straight up first, for this bridge has not
@@ -39,6 +42,7 @@ class TakeUp {
   [[nodiscard]] bool settle(Time now);
 
  private:
+  [[nodiscard]] Falls falls_from(const task::Json& carried) const;
   [[nodiscard]] bool is_over(const std::string& place) const;
   [[nodiscard]] bool is_over_belt() const;
   [[nodiscard]] double too_low_m() const;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <vector>
 
 #include "pons/skills/test_kit.hpp"
 
@@ -23,6 +24,10 @@ class TakeUpTest : public testing::Test {
     state.cup_vacuum_kpa.fill(kpa);
     state.vacuum_on = on;
     state.vacuum.open = kpa == 0;
+    for (const char* const chute : fallen_into_) {
+      const auto place = std::ranges::find(world_.places, chute, &world::Place::name);
+      ++state.fallen_into[static_cast<std::size_t>(place - world_.places.begin())];
+    }
     state.safety = link::SafetyState::kProtectiveStop;
     link::CerebellumEnd(*link_).publish(state);
     now_ += from_s(0.01);
@@ -51,6 +56,7 @@ class TakeUpTest : public testing::Test {
   TakeUp take_up_{cell_};
   Time now_;
   std::string place_ = "chute_1";
+  std::vector<const char*> fallen_into_;  // so far
   const Held held_{"P1", {{0.3, 0.2, 0.1}, 0.7, {0.01, -0.02, 0}}, 1.25};
 };
 
@@ -96,6 +102,30 @@ TEST_F(TakeUpTest, WhatTheCupsNoLongerHoldWasLetGoOrLost) {
   EXPECT_EQ(take_up_.fate(task(), 0), Fate::kBroken);
   cups(0, 15, over("chute_1"));
   EXPECT_EQ(take_up_.fate(task(), 1), Fate::kLost) << "nobody told it to let go";
+}
+
+// Wherever the arm was stopped meanwhile.
+TEST_F(TakeUpTest, TheLightCurtainsSayWhereItFell) {
+  fallen_into_ = {"chute_2"};
+  cups(kSealed_kpa, 15, over("chute_3"));
+  cell_.held = held_;
+  cell_.held->falls = cell_.falls();
+  const task::Json written = take_up_.carries();
+  cell_.held.reset();
+  cups(0, 0, world_.robot.home);
+  take_up_.restore(written);
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kLost) << "what fell there before is something else";
+  fallen_into_.push_back("exception");
+  cups(0, 0, world_.robot.home);
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kLost) << "whatever rides off the belt falls there";
+  fallen_into_.push_back("chute_1");
+  cups(0, 0, world_.robot.home);
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kDone);
+  place_ = "chute_3";
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kAstray);
+  EXPECT_EQ(take_up_.fell_into(), "chute_1");
+  cups(0, 0, over("chute_3"));
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kAstray) << "the arm stands over its place without it";
 }
 
 TEST_F(TakeUpTest, WhatNobodyKnowsIsLetGoOnceArmed) {

@@ -34,7 +34,8 @@ constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick},
                                             {"occlusion", Unit::kHour},
                                             {"blackout", Unit::kHour},
                                             {"shifted_view", Unit::kHour},
-                                            {"brain_stall", Unit::kHour}}};
+                                            {"brain_stall", Unit::kHour},
+                                            {"vacuum_weak", Unit::kHour}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;
@@ -55,12 +56,16 @@ FaultRate read_rate(const YamlValue& value, std::size_t fault) {
       break;
   }
   const bool shifts = static_cast<Fault>(fault) == Fault::kShiftedView;
-  const YamlMap map = shifts ? YamlMap(value, {"an_hour", "lasts_s", "by_m"}) : YamlMap(value, {"an_hour", "lasts_s"});
+  const bool weakens = static_cast<Fault>(fault) == Fault::kVacuumWeak;
+  const YamlMap map = shifts    ? YamlMap(value, {"an_hour", "lasts_s", "by_m"})
+                      : weakens ? YamlMap(value, {"an_hour", "lasts_s", "share"})
+                                : YamlMap(value, {"an_hour", "lasts_s"});
   rate.often = map["an_hour"].number(0, kMostAnHour);
   const auto bounds = map["lasts_s"].list(2, 2);
   rate.shortest_s = bounds[0].positive(kLongest_s);
   rate.longest_s = bounds[1].number(rate.shortest_s, kLongest_s);
   if (shifts) rate.by_m = map["by_m"].positive(kFarthest_m);
+  if (weakens) rate.share = map["share"].number(0, 1);
   return rate;
 }
 
@@ -93,7 +98,7 @@ FaultPlan read_plan(const fs::path& file) {
   const YamlValue value = read_yaml(file);
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
-                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name});
+                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name});
   FaultPlan plan;
   if (map.has("base")) plan = read_base(map, file);
   if (map.has("times")) {

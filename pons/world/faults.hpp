@@ -26,8 +26,9 @@ enum class Fault : std::uint8_t {
   kBlackout,     // an hour: the belt's cameras deliver black frames without depth
   kShiftedView,  // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
   kBrainStall,   // an hour: the brain is silent
+  kVacuumWeak,   // an hour: the pump gives only a share of its vacuum, to all cups
 };
-inline constexpr std::size_t kFaults = 10;
+inline constexpr std::size_t kFaults = 11;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 
@@ -36,6 +37,7 @@ struct FaultRate {
   double often = 0;
   double shortest_s = 0, longest_s = 0;  // of an event
   double by_m = 0;                       // of kShiftedView
+  double share = 1;                      // of kVacuumWeak: of the full vacuum
 };
 
 struct FaultPlan {

@@ -18,13 +18,14 @@
 namespace pons::world {
 namespace {
 
-constexpr double kReach = 100;         // m
-constexpr double kMaxSeconds = 3600;   // of a period, a phase, a latency
-constexpr int kNobodysPriority = 101;  // a task has 100 at most
-constexpr int kMostRunning = 1000;     // tasks that need no resource
-constexpr double kMaxMass = 1000;      // kg
-constexpr double kMaxBeltRamp = 50;    // m/s²
-constexpr double kSlowest = 0.05;      // share of the speed limits: slower, nothing gets anywhere
+constexpr double kReach = 100;            // m
+constexpr double kMaxSeconds = 3600;      // of a period, a phase, a latency
+constexpr int kNobodysPriority = 101;     // a task has 100 at most
+constexpr int kMostRunning = 1000;        // tasks that need no resource
+constexpr double kMaxMass = 1000;         // kg
+constexpr double kMaxBeltRamp = 50;       // m/s²
+constexpr double kSlowest = 0.05;         // share of the speed limits: slower, nothing gets anywhere
+constexpr double kSoonestFallback = 0.5;  // s: a brain may be late by as much
 constexpr double kSumTolerance = 1e-6;
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -151,6 +152,21 @@ std::vector<Zone> read_zones(const YamlValue& value) {
   return zones;
 }
 
+Fallback read_fallback(const YamlValue& value) {
+  const YamlMap map(value, {"undecided"}, {"after_s"});
+  const std::string word = map["undecided"].name();
+  if (word != "hold" && word != "rules") map["undecided"].refuse(fmt::format("is '{}'", word), "write hold or rules");
+  Fallback fallback;
+  if (word == "rules") {
+    if (!map.has("after_s")) value.refuse("has no after_s", "write after how many seconds the parcels ride on");
+    fallback.undecided = Fallback::Undecided::kRules;
+    fallback.after_s = map["after_s"].number(kSoonestFallback, kMaxSeconds);
+  } else if (map.has("after_s")) {
+    map["after_s"].refuse("is of no use with undecided: hold", "leave it out, or write undecided: rules");
+  }
+  return fallback;
+}
+
 Rules read_rules(const YamlValue& value, const Robot& robot) {
   const YamlMap map(value, {"max_mass_kg", "max_size_m", "max_press_n", "max_drop_m"});
   Rules rules;
@@ -233,7 +249,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   world.folder = folder;
   const YamlValue file = read_yaml(folder / "world.yaml");
   if (has_key(file, "base")) {
-    for (const char* of_a_cell : {"belt", "arrivals", "rules", "cameras", "places", "zones", "arms"}) {
+    for (const char* of_a_cell : {"belt", "arrivals", "rules", "cameras", "places", "zones", "arms", "fallback"}) {
       if (has_key(file, of_a_cell))
         file.refuse(fmt::format("has both 'base' and '{}'", of_a_cell), "a world has a base, or a cell with an arm");
     }
@@ -241,7 +257,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   }
   const YamlMap map(
       file, {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "review", "zones", "arms"});
+      {"schedule", "review", "zones", "arms", "fallback"});
   read_common(map, world);
   const Arms arms = map.has("arms") ? Arms::kSeveral : Arms::kOne;
   world.robot = read_robot(map["robot"], folder, arms);
@@ -250,6 +266,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   if (arms == Arms::kOne) check_destinations(map["places"], world.places);
   world.cameras = read_cameras(map["cameras"], world.places, world.belt);
   if (map.has("zones")) world.zones = read_zones(map["zones"]);
+  if (map.has("fallback")) world.fallback = read_fallback(map["fallback"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
   if (arms == Arms::kSeveral) read_arms(map["arms"], world);

@@ -88,6 +88,12 @@ struct Belt {
 
   // Where it brings to rest what is asked for and was not taken by then.
   [[nodiscard]] double waits_at_m() const { return pick_x_max_m - 0.02; }
+  // Whether it must be told now to wait for something at `x_m`, which rides at that speed, or it leaves the pick zone.
+  [[nodiscard]] bool must_wait_for(double x_m, double speed) const {
+    constexpr double kHeard_s = 0.02;  // from a decision to its drive
+    const double stops_m = speed * (kHeard_s + speed / (2 * ramp_m_s2));
+    return x_m + stops_m > waits_at_m() && x_m < pick_x_max_m;
+  }
 };
 
 // A camera, or, with a fan, a lidar: a camera of one row in polar form, on the base. Its column i looks along the angle
@@ -164,6 +170,16 @@ struct Schedule {
   OnEmergencyStop on_emergency_stop = OnEmergencyStop::kHold;
 };
 
+// What a cell does when nothing decides any more: the brain is silent, or there is no room for tasks.
+struct Fallback {
+  enum class Undecided : std::uint8_t {
+    kHold,   // the belt waits
+    kRules,  // after a while what was not decided on rides to the exception chute, and the arm parks
+  };
+  Undecided undecided = Undecided::kHold;
+  double after_s = 0;  // kRules
+};
+
 // Where a base can be sent by name.
 struct Station {
   std::string name;
@@ -209,6 +225,7 @@ struct World {
   std::vector<Resource> resources;
   Schedule schedule;
   Review review;
+  Fallback fallback;
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;
   Rules rules;

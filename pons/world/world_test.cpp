@@ -274,6 +274,23 @@ TEST_F(BrokenWorld, TheScheduleIsTheFilesOrElseTheUsualOne) {
   EXPECT_THAT(error(put("fifo: yes")), HasSubstr("schedule.fifo: unknown key"));
 }
 
+TEST_F(BrokenWorld, TheFallbackIsTheFilesOrElseThatTheBeltWaits) {
+  const auto usual = load_text(text_);
+  ASSERT_TRUE(usual) << usual.error().line();
+  EXPECT_EQ(usual->fallback.undecided, Fallback::Undecided::kHold);
+  const auto put = [&](const std::string& keys) { return text_ + "\nfallback: {" + keys + "}\n"; };
+  const auto own = load_text(put("undecided: rules, after_s: 12"));
+  ASSERT_TRUE(own) << own.error().line();
+  EXPECT_EQ(own->fallback.undecided, Fallback::Undecided::kRules);
+  EXPECT_EQ(own->fallback.after_s, 12);
+  EXPECT_TRUE(load_text(put("undecided: hold")));
+  EXPECT_THAT(error(put("undecided: panic")), HasSubstr("fallback.undecided: is 'panic'; write hold or rules"));
+  EXPECT_THAT(error(put("undecided: rules")), HasSubstr("fallback: has no after_s"));
+  EXPECT_THAT(error(put("undecided: rules, after_s: 0")), HasSubstr("fallback.after_s: 0 is out of range"));
+  EXPECT_THAT(error(put("undecided: hold, after_s: 3")), HasSubstr("fallback.after_s: is of no use"));
+  EXPECT_THAT(error(put("after_s: 3")), HasSubstr("fallback"));
+}
+
 TEST_F(BrokenWorld, RefusesImpossibleZones) {
   EXPECT_THAT(changed("slow: 0.3", "slow: 0"), HasSubstr("zones[0].slow"));
   EXPECT_THAT(changed("slow: 0.3", "slow: 1.5"), HasSubstr("zones[0].slow"));

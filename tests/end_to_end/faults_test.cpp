@@ -53,6 +53,21 @@ TEST(Faults, WhatFallsOnTheWayIsAccountedFor) {
       << run.said;
 }
 
+// Felt at the wrist, both are put back where they lay and taken one by one.
+TEST(Faults, WhatHangsOnAnotherIsPutBack) {
+  const Faulty run = run_with("double_pick: {a_pick: 0.1}\n", 40, 6);
+  EXPECT_GE(run.injected("double_pick"), 3);
+  EXPECT_LE(run.report["parcels"]["exceptions"].value("undeserved", 99), 2) << run.said;
+}
+
+// In this run one comes along unfelt.
+TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
+  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 30);
+  const json reasons = run.report["parcels"]["exceptions"]["reasons"];
+  EXPECT_EQ(reasons.value("came along with another, into chute_#", json::object()).value("undeserved", 0), 1)
+      << run.said;
+}
+
 TEST(Faults, ABeltThatJamsCostsTimeOnly) {
   const Faulty run = run_with("belt_jam: {an_hour: 300, lasts_s: [2, 6]}\n", 20, 1);
   EXPECT_GE(run.injected("belt_jam"), 1);
@@ -96,7 +111,7 @@ TEST(Faults, AStormOfOneSeedIsOneResult) {
   const json one = storm("one.json"), two = storm("two.json");
   EXPECT_EQ(one["state_hash"], two["state_hash"]);
   EXPECT_EQ(one["faults"], two["faults"]);
-  EXPECT_EQ(one["faults"].size(), 10U);
+  EXPECT_EQ(one["faults"].size(), 10U) << "all but a weak pump";
 }
 
 TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {

@@ -204,7 +204,7 @@ TEST_F(Visitor, HearsAcceptedOnlyOfWhatTheDiskHas) {
   std::string refusal;
   const Finished run = run_pons_and(
       {"run", "small_cell", "--parcels", "8", "--seed", "3", "--lockstep", "--socket", folder_ / "s", "--journal",
-       folder_ / "j.db"},
+       folder_ / "j.db", "--keep-free", "0"},
       1, [&](pid_t run_id) {
         // Stopped, it starts nothing: what is written is what is submitted.
         EXPECT_EQ(robot("stop").code, 0);

@@ -60,7 +60,7 @@ class TakeOverTest : public testing::Test {
   Darkroom darkroom_{world_};
   perception::Perception perception_{world_, model::RobotModel::load(world_.robot).value()};
   Observer observer_{world_, perception_, darkroom_.frames, darkroom_.pages, darkroom_.memory(), Pace::kRealTime};
-  BridgeSide side_{bridge_, dispatcher_, {port()}, world_.zones, Recovery::kRefused, {}};
+  BridgeSide side_{bridge_, dispatcher_, {port()}, world_, Recovery::kRefused, {}};
   link::State state_;
   std::optional<link::Belt> belt_;
   int rests_ = 0, restores_ = 0;

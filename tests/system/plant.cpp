@@ -91,9 +91,12 @@ void Plant::leave(Parcel& parcel, std::string_view how) {
   }
   parcel.where = Parcel::Where::kPlace;
   parcel.place = "tray";
-  for (const world::Place& place : world_.places) {
-    if ((place.kind == world::PlaceKind::kChute || place.kind == world::PlaceKind::kException) && is_over(place, from))
-      parcel.place = place.name;
+  for (std::size_t i = 0; i < world_.places.size(); ++i) {
+    const world::Place& place = world_.places[i];
+    if (place.kind != world::PlaceKind::kChute && place.kind != world::PlaceKind::kException) continue;
+    if (!is_over(place, from)) continue;
+    parcel.place = place.name;
+    ++sensors_.fallen_into[i];  // its light curtain
   }
   say_(fmt::format("{} is {} over {}", parcel.code, how, parcel.place));
 }

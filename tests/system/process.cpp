@@ -103,10 +103,10 @@ Expected<std::unique_ptr<Process>> Process::start(const Outside& outside) {
     half->outside_.steps.doing(Doing::kTicking);
   };
   self->side_ = std::make_unique<runner::BridgeSide>(*self->bridge_, *self->brain_, std::vector{self->skill_port()},
-                                                     outside.world.zones, runner::Recovery::kAllowed, visitors);
+                                                     outside.world, runner::Recovery::kAllowed, visitors);
   self->desk_ = std::make_unique<apps::Desk>(std::make_unique<Counter>(outside.network, steps, outside.now),
                                              *self->bridge_, *self->journal_, self->side_->armings(),
-                                             [half = self.get()] { return half->cell_.stream; });
+                                             self->side_->health(), [half = self.get()] { return half->cell_.stream; });
   steps.doing(Doing::kTakingOver);
   auto taken = self->side_->take_over(*self->journal_, outside.now);
   if (!taken) return std::unexpected(taken.error());
@@ -157,7 +157,7 @@ runner::SkillPort Process::skill_port() {
 // A printer remembers what it has printed.
 Resumption Process::resume(const task::Task& task, std::size_t done) {
   const task::Step& next = task.steps[done];
-  if (next.skill != "print") return apps::resumption(take_up_.fate(task, done), done);
+  if (next.skill != "print") return apps::resumption(take_up_, task, done);
   const Json& arguments = next.arguments;
   const int printed =
       outside_.plant.printed(arguments.at("task").get<std::string>(), arguments.at("number").get<int>());

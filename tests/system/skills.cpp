@@ -115,7 +115,7 @@ class Pick final : public ByArm {
     cell_.hold_belt(now);
     if (cell_.arm.cups().phase == link::VacuumPhase::kSealed) {
       const skills::Load load{.size_m = {kParcelLength_m, kParcelWidth_m, kParcelHeight_m}};
-      cell_.held = skills::Held{.code = object_, .load = load};
+      cell_.held = skills::Held{.code = object_, .load = load, .falls = cell_.falls()};
       return begin_lift();
     }
     if (now < since_ + kSealsWithin) return {};
@@ -161,7 +161,7 @@ class Place final : public ByArm {
 
   Progress tick(Time now) override {
     if (phase_ == Phase::kLetGo) return let_go(now);
-    if (!cell_.held) return {Status::kFailed, "nothing is held"};
+    if (!cell_.held) return missing();
     if (cell_.held->code != object_) return {Status::kFailed, fmt::format("the cups hold {}", cell_.held->code)};
     if (!cell_.arm.operational()) {
       phase_ = Phase::kSetOut;
@@ -199,6 +199,15 @@ class Place final : public ByArm {
 
  private:
   enum class Phase : std::uint8_t { kSetOut, kCarry, kLetGo };
+
+  // Let go of, or lost, in a stop.
+  Progress missing() {
+    const bool was_held = cell_.lost && cell_.lost->code == object_;
+    const world::Place* const chute = was_held ? cell_.fallen_since(cell_.lost->falls) : nullptr;
+    if (chute == nullptr) return {Status::kFailed, "nothing is held"};
+    if (chute->name == place_) return {Status::kSucceeded};
+    return {Status::kException, "fell into " + chute->name};
+  }
 
   // The cups are off, through every stop: what is over the mouth falls in.
   Progress let_go(Time now) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -111,6 +112,8 @@ class Database {
   [[nodiscard]] virtual std::int64_t inserted() const = 0;
   // Of the owner, once the tables are there: from now on what was committed is durable. Error: it would not be.
   [[nodiscard]] virtual Expected<void> promise_durability() = 0;
+  // Journal::room().
+  [[nodiscard]] virtual std::optional<std::uint64_t> room() const { return std::nullopt; }
   // Before a commit. Error: what it would write nobody would find again.
   [[nodiscard]] virtual Expected<void> still_there() = 0;
 

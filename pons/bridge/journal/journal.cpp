@@ -218,7 +218,10 @@ Expected<void> Journal::Impl::make_durable() {
     give_up(there.error());
     return there;
   }
-  if (auto done = write(commit); !done) return std::unexpected(done.error());
+  const Time began = clock ? clock() : Time{};
+  const auto done = write(commit);
+  if (clock) longest_commit = std::max(longest_commit, clock() - began);
+  if (!done) return std::unexpected(done.error());
   durable = std::max(durable, last_written);
   return {};
 }
@@ -232,6 +235,12 @@ Expected<void> Journal::Impl::look_up_what_is_there() {
   ended = *outcomes;
   return {};
 }
+
+std::optional<std::uint64_t> Journal::room() const { return impl_->database->room(); }
+
+void Journal::time_commits(std::function<Time()> clock) { impl_->clock = std::move(clock); }
+
+Duration Journal::take_longest_commit() const { return std::exchange(impl_->longest_commit, Duration{0}); }
 
 Expected<std::int64_t> Journal::Impl::begin_at(Time now) {
   if (auto begun = ensure_transaction(); !begun) return std::unexpected(begun.error());

@@ -155,6 +155,13 @@ class Journal {
   // Every event, task by task in the order of their ids, those of no task first. Stops at the first error of `take`.
   [[nodiscard]] Expected<void> each_event(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<Counts> counts() const;
+  // How many bytes the file may still grow by: what is free on its disk, or what this process may write of it, where
+  // that is less. Nothing where nobody here can tell: in a database, in memory, through a VFS.
+  [[nodiscard]] std::optional<std::uint64_t> room() const;
+  // From now on each wait for the disk is timed by that clock.
+  void time_commits(std::function<Time()> clock);
+  // The longest of them since the last call; 0 without a clock.
+  [[nodiscard]] Duration take_longest_commit() const;
   // Of this opening; the first is 1.
   [[nodiscard]] std::int64_t run() const;
 

@@ -31,6 +31,8 @@ struct Journal::Impl {
       every_event, count, count_ended, endings, newest;
   std::int64_t last_written = 0, durable = 0;  // sequences
   std::int64_t ended = 0;                      // tasks
+  std::function<Time()> clock;                 // none: nobody asks how long a commit takes
+  Duration longest_commit{0};
   Statement add_first, add_event, add_note, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();

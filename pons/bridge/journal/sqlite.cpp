@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cerrno>
 #include <filesystem>
@@ -131,6 +133,7 @@ class SqliteDatabase final : public Database {
 
   Expected<void> open(const std::string& file, Mode mode, const char* vfs) {
     shown_ = file;
+    on_disk_ = file != ":memory:" && vfs == nullptr;
     const bool create = mode == Mode::kOwn;
     const int flags = SQLITE_OPEN_NOMUTEX |
                       (create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
@@ -177,10 +180,29 @@ class SqliteDatabase final : public Database {
     return fail("the journal's file is gone", shown_, "put it back where it was, and start again");
   }
 
+  // Both grow: the file, and the log beside it that goes into the file from time to time.
+  [[nodiscard]] std::optional<std::uint64_t> room() const override {
+    if (!on_disk_) return std::nullopt;
+    std::error_code unknown;
+    const std::filesystem::path file(shown_);
+    const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
+    if (unknown) return std::nullopt;
+    rlimit most{};
+    if (getrlimit(RLIMIT_FSIZE, &most) != 0 || most.rlim_cur == RLIM_INFINITY) return space.available;
+    std::uint64_t large = 0;
+    for (const char* const beside : {"", "-wal"}) {
+      const std::uint64_t size = std::filesystem::file_size(shown_ + beside, unknown);
+      if (!unknown) large = std::max(large, size);
+    }
+    return std::min<std::uint64_t>(space.available, most.rlim_cur > large ? most.rlim_cur - large : 0);
+  }
+
   [[nodiscard]] bool read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
 
  private:
   sqlite3* database_ = nullptr;
+  bool on_disk_ = false;  // the operating system's
 };
 
 }  // namespace

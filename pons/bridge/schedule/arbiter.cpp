@@ -141,7 +141,7 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
   age();
   std::vector<std::string> granted;
   if (!changed_ && !fits) return granted;
-  Mask taken = held_;
+  Mask taken = held_ | withheld_;
   std::set<Ways> passed;
   std::map<Ways, Rank> looked;
   for (int looks = 0; looks < kLooks || !fits; ++looks) {
@@ -179,6 +179,12 @@ void Arbiter::give(const Entry& waits, std::size_t way, std::vector<std::string>
 
 bool Arbiter::is_free(Mask needs, Mask taken) const {
   return needs != 0 ? (needs & taken) == 0 : seated_ < schedule_.running;
+}
+
+void Arbiter::withhold(Withheld what) {
+  const Mask withheld = what == Withheld::kResources ? ~Mask{0} : 0;
+  changed_ = changed_ || withheld != withheld_;
+  withheld_ = withheld;
 }
 
 void Arbiter::give_back(const Entry& entry) {
@@ -250,6 +256,7 @@ std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays, const 
       free_seats(lanes_.find(first->ways)->second, stays, by);
       continue;
     }
+    if (withheld_ != 0) continue;
     for (const std::size_t way : fitting(*first, fits)) {
       const Mask needs = first->ways[way];
       const bool alone = (claimed & needs) == 0;

@@ -64,6 +64,9 @@ class Arbiter {
   // A task that was granted waits again, for the same way, at the place in the queue that the age gives it with which
   // it was granted; its deadline was met.
   void hand_over(std::string_view id);
+  // Withheld, no resource is given to anybody from the next grant() on; seats are.
+  enum class Withheld : std::uint8_t { kNothing, kResources };
+  void withhold(Withheld what);
   // Takes a task out of the queue; false when it is not in it.
   bool remove(std::string_view id);
   // Takes out the queued tasks whose deadline is before `now`, in the queue's order.
@@ -125,7 +128,7 @@ class Arbiter {
   Entries waiting_, running_;
   Lanes lanes_;  // none empty
   Agenda ageing_, deadlines_;
-  Mask held_ = 0;
+  Mask held_ = 0, withheld_ = 0;
   int seated_ = 0;
   std::uint64_t added_ = 0;
   Time now_;

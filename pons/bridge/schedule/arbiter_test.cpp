@@ -52,6 +52,22 @@ TEST(Arbiter, OrdersByPriorityThenDeadlineThenAcceptance) {
   EXPECT_EQ(started, order);
 }
 
+// Who has some keeps them, and who needs none is none the worse.
+TEST(Arbiter, GivesNoResourceWhileTheyAreWithheld) {
+  Arbiter arbiter({"arm"}, {});
+  arbiter.add(claim("runs", 50, {"arm"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"runs"});
+  arbiter.withhold(Arbiter::Withheld::kResources);
+  arbiter.add(claim("urgent", 99, {"arm"}));
+  arbiter.add(claim("sits", 10, {}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"sits"});
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "nobody makes way for one that gets nothing";
+  arbiter.release("runs");
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{});
+  arbiter.withhold(Arbiter::Withheld::kNothing);
+  EXPECT_EQ(arbiter.grant(at(2)), Ids{"urgent"});
+}
+
 TEST(Arbiter, GivesAllOrNothing) {
   Arbiter arbiter({"arm", "camera"}, {});
   arbiter.add(claim("a", 50, {"arm"}));
