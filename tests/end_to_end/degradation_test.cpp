@@ -184,7 +184,7 @@ TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
     const auto camera = parts.find("camera overhead");
     if (camera == parts.end() || camera->second.condition != runner::Condition::kBad) return;
     if (now - camera->second.since < std::chrono::seconds(3) || above.bridge->uses_resources()) return;
-    const Vector3 tip = above.cell->model.world_from_tip(above.cell->arm.state().position).translation();
+    const Vector3 tip = above.cell().model.world_from_tip(above.cell().arm.state().position).translation();
     const bool aside = std::abs(tip.x() - cell->world.belt.pick_x_max_m) < 0.02;
     ++(aside ? parked : elsewhere);
   }};
@@ -263,7 +263,7 @@ TEST_F(Degradation, WithLessVacuumTheArmKnowsWhatTheCupsHold) {
   const auto cell = built("vacuum_weak: {an_hour: 300, lasts_s: [12, 16], share: 0.7}\n", 16);
   ASSERT_TRUE(cell);
   double least = 1;
-  const runner::Watch watch{.progress = [&](Time) { least = std::min(least, cell->above->cell->grip_share); }};
+  const runner::Watch watch{.progress = [&](Time) { least = std::min(least, cell->above->cell().grip_share); }};
   runner::Parts parts = cell->parts();
   const auto result = runner::run_lockstep(parts, watch);
   ASSERT_TRUE(result) << result.error().line();
