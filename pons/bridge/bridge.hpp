@@ -148,7 +148,8 @@ class Bridge {
   [[nodiscard]] std::string_view state(std::string_view id) const;
   // Waiting ones that a person has paused, or is asked about.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
-  // Those, and the ones that a robot has begun which is gone: nobody need wait for what they are about.
+  // Those, the ones that a robot has begun which is gone, and the ones that wait for what it keeps: nobody need wait
+  // for what they are about.
   [[nodiscard]] std::set<std::string> set_aside() const;
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
@@ -190,6 +191,9 @@ class Bridge {
   [[nodiscard]] std::vector<std::size_t> robots_for(const task::Task& task, const tree::Program* program) const;
   [[nodiscard]] std::vector<std::string> resources_for(const task::Task& task, const tree::Program* program,
                                                        std::size_t robot) const;
+  // What robots hold that are gone.
+  [[nodiscard]] std::vector<std::string> kept_by_gone() const;
+  [[nodiscard]] bool needs_any(const Open& open, std::size_t robot, const std::vector<std::string>& resources) const;
   [[nodiscard]] Arbiter::Fits fits() const;
   [[nodiscard]] task::Chance chance(const Open& open, std::size_t robot) const;
   [[nodiscard]] bool is_held(std::size_t robot) const { return robots_[robot].hold != Hold::kOff; }

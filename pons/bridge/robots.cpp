@@ -32,7 +32,31 @@ std::set<std::string> Bridge::set_aside() const {
   for (const auto& [id, open] : running_) {
     if (robots_[open->robot].hold == Hold::kGone) ids.insert(id);
   }
+  const std::vector<std::string> kept = kept_by_gone();
+  if (kept.empty()) return ids;
+  for (const auto& [id, open] : open_) {
+    if (open->stage != Open::Stage::kWaits) continue;
+    const bool waits = std::ranges::all_of(open->robots, [&](std::size_t robot) {
+      return robots_[robot].hold == Hold::kGone || needs_any(*open, robot, kept);
+    });
+    if (waits) ids.insert(id);
+  }
   return ids;
+}
+
+std::vector<std::string> Bridge::kept_by_gone() const {
+  std::vector<std::string> kept;
+  for (const auto& [id, open] : running_) {
+    if (robots_[open->robot].hold == Hold::kGone)
+      std::ranges::move(resources_for(open->task, open->program.get(), open->robot), std::back_inserter(kept));
+  }
+  return kept;
+}
+
+bool Bridge::needs_any(const Open& open, std::size_t robot, const std::vector<std::string>& resources) const {
+  return std::ranges::any_of(resources_for(open.task, open.program.get(), robot), [&](const std::string& needed) {
+    return std::ranges::find(resources, needed) != resources.end();
+  });
 }
 
 std::vector<std::string> Bridge::resources_for(const task::Task& task, const tree::Program* program,
@@ -73,13 +97,14 @@ task::Chance Bridge::chance(const Open& open, std::size_t robot) const {
   return worst;
 }
 
-// What no robot that works can take any more is given to any: its skill says what has become of it.
+// What no robot that works can take any more is given to any: its skill says what has become of it. What waits for
+// something that a robot keeps which is gone, keeps nothing else from others meanwhile.
 Arbiter::Fits Bridge::fits() const {
   if (robots_.size() == 1) return {};
-  return [this](std::string_view id, std::size_t way) {
+  return [this, kept = kept_by_gone()](std::string_view id, std::size_t way) {
     const Open& open = *open_.find(id)->second;
     const std::size_t robot = open.robots[way];
-    if (is_held(robot)) return false;
+    if (is_held(robot) || needs_any(open, robot, kept)) return false;
     if (open.begun || open.robots.size() == 1) return true;
     const task::Chance own = chance(open, robot);
     if (own != task::Chance::kGone) return own == task::Chance::kNow;

@@ -136,6 +136,27 @@ TEST_F(Robots, ABegunTaskStaysWhereItIsAndItsTimeStands) {
   EXPECT_EQ(actors_[0].log.cancels, 0);
 }
 
+TEST_F(Robots, WhatWaitsForTheZoneOfOneThatIsGoneKeepsNothingFromOthers) {
+  zoned_ = {"b", "a"};
+  chance_ = {Chance::kGone, Chance::kNow};
+  submit("a");
+  tick(2);
+  ASSERT_EQ(robot_of("a"), "arm_2");
+  chance_ = {Chance::kNow, Chance::kNow};
+  bridge_->hold(Bridge::Hold::kGone, 1);
+  submit("b");
+  tick();
+  submit("c");
+  tick(2);
+  EXPECT_EQ(robot_of("b"), "");
+  EXPECT_EQ(robot_of("c"), "arm_1");
+  EXPECT_EQ(bridge_->set_aside(), (std::set<std::string>{"a", "b"}));
+  bridge_->hold(Bridge::Hold::kOff, 1);
+  tick(60);
+  EXPECT_TRUE(bridge_->set_aside().empty());
+  EXPECT_TRUE(recorded("b"));
+}
+
 TEST_F(Robots, TakeTurnsInTheZoneBetweenThem) {
   zoned_ = {"a", "b"};
   chance_[0] = Chance::kNow;

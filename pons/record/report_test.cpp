@@ -78,6 +78,7 @@ TEST(Report, KeepsEveryFigure) {
                 "exceptions": {"deserved": 4, "undeserved": 5,
                                "reasons": {"label unreadable": {"deserved": 4, "undeserved": 1},
                                            "lost from sight": {"deserved": 0, "undeserved": 4}}}, "damaged": 6},
+    "arms": {"sorted": {}, "least_apart_m": null},
     "throughput": {"seconds_per_parcel": 3.0, "parcels_per_hour": 1200.0}, "retries": 7,
     "interventions": 2,
     "health": {"alerts": 3, "parts": {"arm": {"condition": "good", "why": "", "alerts": 0},

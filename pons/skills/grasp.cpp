@@ -155,6 +155,15 @@ Expected<motion::Trajectory> nudge(Cell& cell, const AxisState& start, Time at, 
   return motion::move(start, at, {*q, joint_speed(cell, *q, tip_speed)}, covering(limits, start));
 }
 
+std::optional<task::Progress> never_taken(const world::World& world, const ObjectBelief& object) {
+  using task::Progress, task::Status;
+  if (world.rules.too_large(object.size_m))
+    return Progress{Status::kException, fmt::format("too large: {:.2f} m", object.size_m.maxCoeff()), {}};
+  if (object.world_from_top.translation().x() <= world.belt.pick_x_max_m) return std::nullopt;
+  if (world.next_arm.empty()) return Progress{Status::kException, "rode past the pick zone", {}};
+  return Progress{Status::kFailed, "rode past the pick zone of " + world.arm, {}};  // another arm may take it
+}
+
 std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {
   for (const ObjectBelief& other : cell.objects()) {
     if (other.track == 0) continue;  // only an obstacle

@@ -53,6 +53,9 @@ struct GraspSearch {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search);
 
+// How the pick of one ends that this arm can take no more, or never could; nothing if it can.
+[[nodiscard]] std::optional<task::Progress> never_taken(const world::World& world, const ObjectBelief& object);
+
 // What would come along with that object, and why; nothing if it lies by itself.
 [[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);
 

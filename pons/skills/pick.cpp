@@ -144,14 +144,7 @@ class Pick final : public ArmSkill {
     seen_ = now;
     keep_in_reach(*object, now);
     const world::Belt& belt = cell_.world.belt;
-    if (cell_.world.rules.too_large(object->size_m)) {
-      return {Status::kException, fmt::format("too large: {:.2f} m", object->size_m.maxCoeff()), {}};
-    }
-    if (object->world_from_top.translation().x() > belt.pick_x_max_m) {
-      // Another arm may take it.
-      if (!cell_.world.next_arm.empty()) return {Status::kFailed, "rode past the pick zone of " + cell_.world.arm, {}};
-      return {Status::kException, "rode past the pick zone", {}};
-    }
+    if (auto never = never_taken(cell_.world, *object)) return *std::move(never);
     if (must_look_again(*object, now)) {
       step_aside(now);
       return {};
@@ -173,10 +166,7 @@ class Pick final : public ArmSkill {
                soonest->orientation;
     auto grasp = plan_grasp(cell_, state, from, *object, turned, search_);
     if (!grasp) {
-      if (cell_.router.spent()) {
-        tried_.reset();
-        return {};
-      }
+      if (cell_.router.spent()) return tried_.reset(), Progress{};
       ++quarters_;
       // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
       if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
@@ -454,9 +444,10 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
-    task::Json detail{{"mass_kg", cell_.held->mass_kg}};
-    detail.update({{"sealed", cell_.arm.cups().sealed_cups}, {"seconds", to_s(now - started_)}});
-    return {Status::kSucceeded, {}, std::move(detail)};
+    const int sealed = cell_.arm.cups().sealed_cups;
+    return {Status::kSucceeded,
+            {},
+            {{"mass_kg", cell_.held->mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
   }
 
   Cell& cell_;

@@ -6,6 +6,7 @@
 
 #include <map>
 #include <optional>
+#include <tuple>
 
 #include "apps/run_kit.hpp"
 #include "pons/sim/truth.hpp"
@@ -23,13 +24,14 @@ world::World two_arms() {
   return std::move(*world);
 }
 
-class ArmDown : public testing::TestWithParam<std::size_t> {};
+class ArmDown : public testing::TestWithParam<std::tuple<std::size_t, std::uint64_t>> {};
 
 // A person stops it where it hangs clear of the belt and of the other arm with nothing on its cups, and comes back when
-// nothing is left to do: what it would have taken is the other's, but for what its own task is about.
+// nothing is left to do: what it would have taken is the other's, but for what its own task is about. On seed 7 that
+// task holds the zone between them, and what is for a chute there rides by.
 TEST_P(ArmDown, TheOtherTakesItsShare) {
-  const std::size_t down = GetParam();
-  TaskRun cell(two_arms(), kParcels, 4);
+  const auto [down, seed] = GetParam();
+  TaskRun cell(two_arms(), kParcels, seed);
   const sim::Truth truth(cell.simulation());
   runner::Arming& arming = cell.above().bridge_side->arming(down);
   skills::Cell& arm = cell.above().arms[down]->cell;
@@ -42,7 +44,7 @@ TEST_P(ArmDown, TheOtherTakesItsShare) {
       arming.emergency_stop(now);
       stopped = now;
     } else if (!back) {
-      if (!cell.simulation().finished() || cell.bridge().open_count() > 1) return;
+      if (!cell.simulation().finished() || cell.bridge().open_count() > cell.bridge().set_aside().size()) return;
       EXPECT_TRUE(arming.reset(now));
       back = now;
     } else if (arming.needs_person()) {
@@ -62,11 +64,11 @@ TEST_P(ArmDown, TheOtherTakesItsShare) {
     if (parcel.where == sim::Whereabouts::kChute && parcel.arrived > *stopped + from_s(1)) ++after[parcel.arm];
   }
   EXPECT_EQ(after[static_cast<int>(down)], 0);
-  EXPECT_GE(after[static_cast<int>(1 - down)], 6);
+  EXPECT_GE(after[static_cast<int>(1 - down)], 4);
   EXPECT_GE(reckoning->verdict.sorted, kParcels - 8) << fmt::format("{}", fmt::join(reckoning->verdict.findings, "\n"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Each, ArmDown, testing::Values(0U, 1U));
+INSTANTIATE_TEST_SUITE_P(Each, ArmDown, testing::Combine(testing::Values(0U, 1U), testing::Values(4U, 7U)));
 
 }  // namespace
 }  // namespace pons::tests

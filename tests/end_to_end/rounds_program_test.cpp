@@ -117,7 +117,7 @@ TEST_F(RoundsProgram, OptionsOfTheOtherKindOfWorldAreRefused) {
 }
 
 TEST_F(RoundsProgram, WhatThereIsIsTold) {
-  EXPECT_THAT(run_pons({"worlds"}).out, HasSubstr("rounds         porter2 (base, 0.5 m/s), 5 stations"));
+  EXPECT_THAT(run_pons({"worlds"}).out, HasSubstr("rounds               porter2 (base, 0.5 m/s), 5 stations"));
   const Finished skills = run_pons({"skills", "--world", "rounds"});
   EXPECT_THAT(skills.out, AllOf(HasSubstr("navigate"), HasSubstr("dock"), HasSubstr("scan"), HasSubstr("speak")));
   EXPECT_THAT(run_pons({"skills", "navigate", "--world", "rounds"}).out, HasSubstr("middle_aisle"));

@@ -126,7 +126,7 @@ TEST(Sorting, APlaceOutOfReachStopsNothing) {
   move("scene.xml", "0.4 -1.015 ", "0.4 -3.015 ");
   move("scene.xml", "0.4 -0.625 ", "0.4 -2.625 ");
   const Finished doctor = run_pons({"doctor", "--jitter", "0"}, {"PONS_WORLDS=" + worlds.string()});
-  EXPECT_NE(doctor.out.find("the tool does not reach east"), std::string::npos) << doctor.out;
+  EXPECT_NE(doctor.out.find("the tool of 'arm' does not reach east"), std::string::npos) << doctor.out;
   const Finished run =
       run_pons({"run", "small_cell", "--parcels", "3", "--quiet", "--explain", "--report", folder / "report.json"},
                {"PONS_WORLDS=" + worlds.string()});
