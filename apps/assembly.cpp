@@ -230,6 +230,13 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
                             Time seen) { cell.refresh(now, std::move(objects), seen); },
          .state = [&cell]() -> const link::State& { return cell.arm.state(); },
          .take_forgotten = [&cell] { return cell.take_forgotten(); },
+         .take_strays =
+             [&cell] {
+               std::vector<task::Json> strays;
+               for (const skills::Stray& stray : cell.strays->take_found_gone())
+                 strays.push_back({{"code", stray.code}, {"fell_into", stray.place}});
+               return strays;
+             },
          .arm = [&cell](Time now) { cell.arm.arm(now); },
          .outside_rad = [&cell] { return cell.arm.outside_rad(); },
          .recover = [&cell](Time now) { return cell.arm.recover(now); },

@@ -23,7 +23,7 @@ struct Entry {
   bool succeeded = false;
   bool ride = false;  // let go by on purpose
   std::string last_reason;
-  std::string fell_into;  // the chute that the last outcome names
+  std::string fell_into;  // the chute that the last outcome, or a later entry, names
 };
 
 // The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
@@ -54,8 +54,15 @@ void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) 
     entry.fell_into = task::text_of(step.value("detail", Json{}), "fell_into");
 }
 
-Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
-  std::map<std::string, Entry> entries;
+// What it says of all of them.
+struct Story {
+  std::map<std::string, Entry> entries;           // by code
+  std::map<std::string, int> unread_strays = {};  // by the chute into which nobody knows whose parcels went
+};
+
+Expected<Story> read(const bridge::Journal& journal) {
+  Story story;
+  auto& entries = story.entries;
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
@@ -64,22 +71,29 @@ Expected<std::map<std::string, Entry>> read(const bridge::Journal& journal) {
   const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
   for (const bridge::Event& event : *events) {
+    const std::string code = task::text_of(event.detail, "code");
+    if (event.kind == "stray") {
+      const std::string place = task::text_of(event.detail, "fell_into");
+      if (code.empty())
+        ++story.unread_strays[place];
+      else
+        entries[code].fell_into = place;
+    }
     if (event.kind != "ride") continue;
-    Entry& entry = entries[task::text_of(event.detail, "code")];
+    Entry& entry = entries[code];
     entry.ride = true;
     if (entry.tasks == 0) entry.last_reason = task::text_of(event.detail, "reason");
   }
-  return entries;
+  return story;
 }
 
 class Judge {
  public:
-  Judge(Verdict& verdict, const std::map<std::string, Entry>& entries, RunEnd end)
-      : verdict_(verdict), entries_(entries), end_(end) {}
+  Judge(Verdict& verdict, Story story, RunEnd end) : verdict_(verdict), story_(std::move(story)), end_(end) {}
 
   void parcel(const ParcelTruth& parcel) {
-    const auto found = entries_.find(parcel.parcel_id);
-    const Entry entry = found == entries_.end() ? Entry{} : found->second;
+    const auto found = story_.entries.find(parcel.parcel_id);
+    const Entry entry = found == story_.entries.end() ? Entry{} : found->second;
     if (entry.successes > 1) ++verdict_.duplicated;
     switch (parcel.where) {
       case Whereabouts::kNotOffered:
@@ -108,6 +122,10 @@ class Judge {
     if (!entry.succeeded && parcel.place == entry.fell_into) {
       undeserved(entry);
       find(parcel, entry, "fell into another chute, which the journal names");
+    } else if (entry.tasks == 0 && story_.unread_strays[parcel.place] > 0) {
+      --story_.unread_strays[parcel.place];
+      undeserved(entry);
+      find(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
     } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted");
@@ -156,7 +174,7 @@ class Judge {
   }
 
   Verdict& verdict_;
-  const std::map<std::string, Entry>& entries_;
+  Story story_;
   RunEnd end_;
 };
 
@@ -180,11 +198,11 @@ std::string kind_of(std::string_view reason) {
 
 Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const std::vector<sim::ArmTruth>& arms,
                         const bridge::Journal& journal, const Rules& rules, RunEnd end) {
-  const auto entries = read(journal);
-  if (!entries) return std::unexpected(entries.error());
+  auto story = read(journal);
+  if (!story) return std::unexpected(story.error());
   Verdict verdict;
   verdict.sorted_by.resize(arms.size());
-  Judge judge(verdict, *entries, end);
+  Judge judge(verdict, *std::move(story), end);
   for (const ParcelTruth& parcel : parcels) {
     if (parcel.where == Whereabouts::kNotOffered) continue;
     ++verdict.offered;

@@ -38,6 +38,9 @@ class RefereeTest : public ::testing::Test {
     const bridge::Json detail{{"steps", {{{"skill", "place"}, {"detail", {{"fell_into", place}}}}}}};
     ASSERT_TRUE(journal_->outcome(id, Outcome::kException, "fell into " + place, Time{}, detail));
   }
+  void stray(const std::string& code, const std::string& place) {
+    ASSERT_TRUE(journal_->note(Time{}, "stray", {{"code", code}, {"fell_into", place}}));
+  }
   void ride(const std::string& code) { ASSERT_TRUE(journal_->note(Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
 
   Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
@@ -119,6 +122,32 @@ TEST_F(RefereeTest, AnotherChuteIsMissortedUnlessTheJournalNamesIt) {
   EXPECT_EQ(verdict.missorted, 3);
   EXPECT_EQ(verdict.undeserved, 1);
   EXPECT_EQ(verdict.reasons.at("fell into chute_#").undeserved, 1);
+}
+
+TEST_F(RefereeTest, WhoCameAlongWithAnotherIsNamedAfterItsOwnTaskHasEnded) {
+  accept("A", "A");
+  end("A", Outcome::kFailed);
+  stray("A", "chute_2");
+  accept("B", "B");
+  end("B", Outcome::kFailed);
+  stray("B", "chute_3");
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_2"), parcel("B", Whereabouts::kChute, "chute_2")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.missorted, 1) << "B is not where the journal says";
+}
+
+TEST_F(RefereeTest, OfThoseNobodyHasReadAsManyAreNamedAsTheJournalSays) {
+  stray("", "chute_2");
+  ride("A");  // never identified
+  ride("B");
+  accept("C", "C");
+  end("C", Outcome::kFailed);
+  const Verdict verdict =
+      judge({parcel("C", Whereabouts::kChute, "chute_2"), parcel("A", Whereabouts::kChute, "chute_2"),
+             parcel("B", Whereabouts::kChute, "chute_2")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.missorted, 2) << "one more, and one that was known";
 }
 
 TEST_F(RefereeTest, ExceptionNeedsAnEntryAndDeservesAReason) {

@@ -100,6 +100,9 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
       gone_.push_back(track);
       forgotten_.push_back(track);
     }
+    if (!robot->skills.take_strays) continue;
+    for (const Json& stray : robot->skills.take_strays())
+      bridge_.note("stray", stray, now, task::text_of(stray, "code"));
   }
   if (gone_.size() > kGoneRemembered) gone_.erase(gone_.begin(), gone_.end() - kGoneRemembered);
   return {};

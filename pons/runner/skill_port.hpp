@@ -30,13 +30,15 @@ struct SkillPort {
   std::function<void(const BaseBelief&)> locate;               // with each scan of a base's lidar; may be empty
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
-  std::function<void(Time)> arm;                               // one step out of a stop, towards operational
-  std::function<double()> outside_rad;                         // how far the arm stands outside its position limits
-  std::function<Expected<void>(Time)> recover;                 // one step from there to inside them
-  std::function<void(Time)> rest;                              // once a period while no skill runs,
-  std::function<void(Time)> park;                              // or this, out of the cameras' view; may be empty
-  std::function<void(const Grip&)> grip;                       // once a period; may be empty
-  std::function<void(link::Belt)> belt;                        // once a period
+  // What is found to have come along with others, {"code", "fell_into"} each, since the last call; may be empty.
+  std::function<std::vector<bridge::Json>()> take_strays;
+  std::function<void(Time)> arm;                // one step out of a stop, towards operational
+  std::function<double()> outside_rad;          // how far the arm stands outside its position limits
+  std::function<Expected<void>(Time)> recover;  // one step from there to inside them
+  std::function<void(Time)> rest;               // once a period while no skill runs,
+  std::function<void(Time)> park;               // or this, out of the cameras' view; may be empty
+  std::function<void(const Grip&)> grip;        // once a period; may be empty
+  std::function<void(link::Belt)> belt;         // once a period
   std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
   std::function<void()> halt;                                         // a protective stop
   std::function<void()> raise_emergency, release_emergency;           // the link's emergency word

@@ -106,7 +106,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
-  strays.look(objects_);
+  strays->look(objects_, view_end_m_.value_or(world.belt.x_end_m));
   recognise_left();
   take_in_cut();
   add_unseen();
@@ -175,6 +175,7 @@ void Cell::left_on_belt(const Pose& world_from_tip) {
 
 void Cell::lifted(const ObjectBelief& object) {
   forgotten_.push_back(object.track);
+  strays->taken(object.track);
   std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -148,7 +149,10 @@ class Cell {
     return std::ranges::any_of(others_, [&](Cell* other) { return other->stands_in(zone); });
   }
   // Another arm of the same belt, which must outlive the last look at a zone.
-  void beside(Cell& other) { others_.push_back(&other); }
+  void beside(Cell& other) {
+    others_.push_back(&other);
+    strays = other.strays;
+  }
   // Whether what rides along the belt passes below the arm and what it holds, where it stands.
   [[nodiscard]] bool lets_pass();
 
@@ -162,9 +166,9 @@ class Cell {
   Reach reach;
   std::optional<Held> held;
   std::optional<Miss> missed;
-  std::optional<std::string> hooked;  // the last code on which another was found to hang
-  std::optional<Held> lost;           // from the cups in the last stop in which anything was
-  Strays strays;
+  std::optional<std::string> hooked;                            // the last code on which another was found to hang
+  std::optional<Held> lost;                                     // from the cups in the last stop in which anything was
+  std::shared_ptr<Strays> strays = std::make_shared<Strays>();  // of all arms of a belt
   double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
   bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does

@@ -179,7 +179,7 @@ class Pick final : public ArmSkill {
   }
 
   [[nodiscard]] Progress absent() const {
-    const std::string* const place = cell_.strays.place_of(code_);
+    const std::string* const place = cell_.strays->place_of(code_);
     if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
     return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
   }
@@ -322,7 +322,7 @@ class Pick final : public ArmSkill {
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       // It was not there, and no camera has seen it since another was taken from beside it.
-      if (cups.sealed_cups == 0 && cell_.strays.missed_twice(code_)) return begin_retreat(now, absent()), Progress{};
+      if (cups.sealed_cups == 0 && cell_.strays->missed_twice(code_)) return begin_retreat(now, absent()), Progress{};
       return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};
