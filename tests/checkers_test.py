@@ -166,6 +166,12 @@ class Style(Checkers):
     def test_good_tree(self):
         self.passes("check_style", {})
 
+    def test_dead_link(self):
+        there = {"docs/a.md": "[b](b.md#part) [c](../README.md) [d](https://e.org/x)\n```\nf[](int)\n```\n",
+                 "docs/b.md": "# B\n", "README.md": "# P\n"}
+        self.passes("check_style", there)
+        self.style(there | {"docs/a.md": "# A\n\n[b](c.md)\n"}, "docs/a.md:3: links to c.md, which is not there")
+
     def test_long_file(self):
         self.passes("check_style", {"apps/a.cpp": "int a;\n" * 500})
         self.style({"apps/a.cpp": "int a;\n" * 501}, "apps/a.cpp:501: 501 lines")

@@ -104,7 +104,7 @@ Arbiter::Fits Bridge::fits() const {
   return [this, kept = kept_by_gone()](std::string_view id, std::size_t way) {
     const Open& open = *open_.find(id)->second;
     const std::size_t robot = open.robots[way];
-    if (is_held(robot) || needs_any(open, robot, kept)) return false;
+    if (is_held(robot) || (!kept.empty() && needs_any(open, robot, kept))) return false;
     if (open.begun || open.robots.size() == 1) return true;
     const task::Chance own = chance(open, robot);
     if (own != task::Chance::kGone) return own == task::Chance::kNow;

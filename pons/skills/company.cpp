@@ -25,6 +25,8 @@ Company company_of(const ObjectBelief& target, const std::vector<ObjectBelief>& 
 void Strays::let_go(const Company& company, const std::string& place, Time now) {
   for (const Companion& companion : company) {
     taken(companion.track);
+    std::erase_if(doubted_,
+                  [&](const Doubted& one) { return one.stray.code == companion.code && !companion.code.empty(); });
     doubted_.push_back({companion.track, {companion.code, place}, now});
   }
   if (doubted_.size() > kRemembered) doubted_.erase(doubted_.begin(), doubted_.end() - kRemembered);

@@ -77,6 +77,15 @@ TEST(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
   EXPECT_EQ(strays.place_of(""), nullptr);
 }
 
+// A track may be lost and found again under another number.
+TEST(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
+  Strays strays;
+  strays.let_go({{2, "B", {0, 0}}}, "chute_1", Time(from_s(10)));
+  strays.let_go({{7, "B", {0, 0}}}, "chute_2", Time(from_s(20)));
+  ASSERT_NE(strays.place_of("B"), nullptr);
+  EXPECT_EQ(*strays.place_of("B"), "chute_2");
+}
+
 // Whether anybody still asks for it or not.
 TEST(StraysTest, WhoIsBelievedNowhereAnyMoreHasGone) {
   Strays strays;

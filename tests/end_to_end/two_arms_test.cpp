@@ -36,6 +36,8 @@ TEST(TwoArms, ShareWhatComes) {
   EXPECT_GE(report["arms"]["sorted"]["arm_2"], 10) << run.out;
   EXPECT_GE(report["arms"]["least_apart_m"], kApart_m) << run.out;
   EXPECT_LT(report["throughput"]["seconds_per_parcel"], 1.9) << "so few, and the first ones far between";
+  for (const char* part : {"arm_1", "arm_2", "loop arm_1", "loop arm_2", "vacuum arm_1", "vacuum arm_2"})
+    EXPECT_EQ(report["health"]["parts"][part]["condition"], "good") << part;
   for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
 }
 
