@@ -266,6 +266,8 @@ void Cerebellum::watch_following(Time now) {
   const bool stands = state_.safety == SafetyState::kProtectiveStop;
   if (stop(stands ? StopCause::kNoStandstill : StopCause::kFollowingError, now))
     log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
+  // Something holds it off, and may creep for as long as it is pressed: it would never stand. Springs have given way.
+  gives_way_ = !springs && is_braking(state_.safety);
 }
 
 bool Cerebellum::enter(SafetyEvent event) {

@@ -133,6 +133,65 @@ TEST(Collision, IsNoticedInMillisecondsAtFullSpeed) {
   }
 }
 
+// A heap of parcels: gives way slowly under whoever presses it, and stays where it was pressed to.
+struct Heap {
+  Wall wall;
+  double grip_ns_m = 2000;
+  double gave_way_m = 0;
+
+  void push(Bench& bench, model::RobotModel& model) {
+    wall.push(bench, model);
+    const double way_m = wall.force_n / grip_ns_m * 1e-3;  // in a tick
+    wall.point += way_m * wall.against;
+    gave_way_m += way_m;
+  }
+};
+
+// An arm that goes on pressing it creeps with it for longer than that.
+Settings impatient() {
+  Settings settings = deaf();
+  settings.confirm_within = 500ms;
+  return settings;
+}
+
+// Whoever held the commanded place would press on, and the heap would creep on: no standstill, and a person to call.
+TEST(FollowingError, InWhatGivesWaySlowlyIsAProtectiveStopThatStands) {
+  Heap heap{wall_across(0.2, 400ms)};
+  auto model = bench_model();
+  Bench bench({.step = 1ms}, impatient());
+  bench.arm();
+  set_out(bench, 0.2);
+  for (int tick = 0; tick < 5000; ++tick) {
+    bench.tick();
+    heap.push(bench, model);
+  }
+  EXPECT_GT(heap.gave_way_m, 0.001);
+  EXPECT_EQ(bench.state().cause, StopCause::kFollowingError);
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  EXPECT_LT(heap.wall.force_n, 10);
+}
+
+// Likewise where another cause began the stop.
+TEST(FollowingError, IsNotPressedOnInAStopThatWasCommandedBefore) {
+  Heap heap{wall_across(0.2, 400ms)};
+  auto model = bench_model();
+  Bench bench({.step = 1ms}, impatient());
+  bench.arm();
+  set_out(bench, 0.2);
+  for (int tick = 0; tick < 5000; ++tick) {
+    bench.tick();
+    heap.push(bench, model);
+    if (bench.operational() && bench.error_rad() > 0.8 * Settings{}.following_error_rad)
+      bench.send(plain_command(CommandKind::kProtectiveStop));
+  }
+  EXPECT_GT(heap.gave_way_m, 0.001);
+  EXPECT_EQ(bench.state().cause, StopCause::kCommanded);
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
+  EXPECT_LT(heap.wall.force_n, 10);
+}
+
 TEST(Collision, IsLeftLikeAnyProtectiveStop) {
   Bench bench;
   bench.arm();

@@ -128,11 +128,6 @@ void Cerebellum::judge_stop(Time now) {
     return;
   }
   enter(SafetyEvent::kStandstill);
-  if (state_.cause == StopCause::kFollowingError) {
-    // Something holds the arm off: holding the commanded place would go on pressing.
-    laws_.forget();
-    go_on_from(at_rest(measured_position_));
-  }
   queue_.rest(commanded_.position, now);
 }
 
