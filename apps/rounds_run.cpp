@@ -65,7 +65,8 @@ class Run {
                                     if (options_.alerts == Alerts::kTold) say(stderr, alert_line(alert));
                                   },
                               .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
-                              .limit = Time(kSlowestTask)};
+                              .limit = Time(kSlowestTask),
+                              .attended = rounds_.desk != nullptr};
     const auto began = std::chrono::steady_clock::now();
     const bool realtime = options_.pace == runner::Pace::kRealTime;
     const auto result = realtime ? runner::run_realtime(parts, watch) : runner::run_lockstep(parts, watch);
@@ -95,7 +96,8 @@ class Run {
     if (!options_.journal.empty())
       say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options_.journal, rounds_.world.name))));
     if (interrupted()) return kExitInterrupted;
-    if (!result.complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
+    if (!result.complete)
+      say(stderr, fmt::format("pons: broken off: {}; --journal keeps what happened\n", result.broken_off));
     const bool good = verdict->findings.empty() && report.limits.violations == 0;
     return result.complete && good ? kExitGood : kExitBadRun;
   }

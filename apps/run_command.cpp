@@ -75,7 +75,8 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 if (!options.quiet) progress.put(alert_line(alert));
               },
           .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
-          .limit = Time(slowest(static_cast<std::size_t>(total)))};
+          .limit = Time(slowest(static_cast<std::size_t>(total))),
+          .attended = cell.above->desk != nullptr};
 }
 
 int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
@@ -108,7 +109,8 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   if (!options.journal.empty())
     say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options.journal, cell.world.name))));
   if (interrupted()) return kExitInterrupted;
-  if (!result->complete) say(stderr, "pons: broken off: it ran too long; --journal keeps what happened\n");
+  if (!result->complete)
+    say(stderr, fmt::format("pons: broken off: {}; --journal keeps what happened\n", result->broken_off));
   return result->complete && reckoning->good() ? kExitGood : kExitBadRun;
 }
 

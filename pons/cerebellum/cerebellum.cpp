@@ -243,8 +243,10 @@ void Cerebellum::watch_contact(Time now) {
 void Cerebellum::watch_cups(Time now) {
   const link::VacuumPhase before = vacuum_.seen.phase;
   vacuum_ = next(vacuum_settings_, vacuum_, vacuum_on_, state_.cup_vacuum_kpa, now);
-  if (before == link::VacuumPhase::kSealed && vacuum_.seen.phase == link::VacuumPhase::kLost)
-    log_.write(now, "the cups have lost what they held");
+  if (before != link::VacuumPhase::kSealed || vacuum_.seen.phase != link::VacuumPhase::kLost) return;
+  // Drives that go on bearing a load that is gone throw the arm up, and whoever told of it is too slow to take it back.
+  bear({});
+  log_.write(now, "the cups have lost what they held");
 }
 
 void Cerebellum::watch_following(Time now) {
@@ -266,8 +268,7 @@ void Cerebellum::watch_following(Time now) {
   const bool stands = state_.safety == SafetyState::kProtectiveStop;
   if (stop(stands ? StopCause::kNoStandstill : StopCause::kFollowingError, now))
     log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
-  // Something holds it off, and may creep for as long as it is pressed: it would never stand. Springs have given way.
-  gives_way_ = !springs && is_braking(state_.safety);
+  held_off_ = is_braking(state_.safety);
 }
 
 bool Cerebellum::enter(SafetyEvent event) {
@@ -288,7 +289,8 @@ void Cerebellum::advance(Time now) {
   }
   if (moves(state_.safety)) follow(now);
   if (is_braking(state_.safety)) sample_stop(now);
-  if (gives_way_ && now >= stop_ends_) hold_measured(now);
+  // A heap creeps while it is pressed, and an arm that creeps with it never stands.
+  if ((gives_way_ || held_off_) && now >= stop_ends_) hold_measured(now);
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);
 }
 

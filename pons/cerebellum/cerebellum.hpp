@@ -124,6 +124,7 @@ class Cerebellum {
   [[nodiscard]] bool take_motion(const link::Command& command, Time now);
   [[nodiscard]] bool take_vacuum(const link::Command& command, Time now);
   [[nodiscard]] bool take_payload(const link::Command& command, Time now);
+  void bear(const model::Payload& payload);
   [[nodiscard]] bool take_contact(const link::Command& command, Time now);
   [[nodiscard]] bool take_control(const link::Command& command, Time now);
   [[nodiscard]] bool reset(Time now);
@@ -138,7 +139,7 @@ class Cerebellum {
   bool stop(link::StopCause cause, Time now);
   void advance(Time now);
   void follow(Time now);
-  bool leave_compliance();
+  bool leave_commanded(link::StopCause cause);
   void widen_to_stop();
   double plan_stop();
   void go_on_from(const AxisState& state);
@@ -159,7 +160,7 @@ class Cerebellum {
   const std::size_t delay_ticks_;
   const Duration delay_;  // of the drives
   model::RobotModel model_;
-  model::Payload payload_;  // told
+  model::Payload payload_;  // as told, until it was seen to be lost
   AxisLimits limits_;       // in force: the robot's, and where the arm is outside them
   LimitWatch limit_watch_;
   CollisionWatch collision_;
@@ -192,7 +193,7 @@ class Cerebellum {
   Time strays_since_, hasty_since_;
 
   // After a collision the arm gives way while it brakes, and then holds where that brought it.
-  bool gives_way_ = false;
+  bool gives_way_ = false, held_off_ = false;
   AxisVector driven_nm_;  // what the drives were told last
   struct Driven {
     AxisVector torque_nm;

@@ -94,6 +94,11 @@ bool Cerebellum::take_vacuum(const link::Command& command, Time now) {
   return true;
 }
 
+void Cerebellum::bear(const model::Payload& payload) {
+  payload_ = payload;
+  collision_.carry(payload_);
+}
+
 bool Cerebellum::take_payload(const link::Command& command, Time now) {
   const auto& com = command.payload_com_m;
   const bool near = std::all_of(com.begin(), com.end(), [](double x) { return std::abs(x) <= 2; });
@@ -103,8 +108,7 @@ bool Cerebellum::take_payload(const link::Command& command, Time now) {
                  command.payload_kg);
     return false;
   }
-  payload_ = {command.payload_kg, com};
-  collision_.carry(payload_);
+  bear({command.payload_kg, com});
   return true;
 }
 
@@ -178,7 +182,7 @@ bool Cerebellum::begin(SafetyEvent event, Time now) {
   collision_.expect(0);
   laws_.reset();
   state_.belt = link::Belt::kRuns;
-  gives_way_ = false;
+  gives_way_ = held_off_ = false;
   commanded_ = before_ = at_rest(measured_position_);
   widen();
   laws_.rest(commanded_);

@@ -27,7 +27,7 @@ bool Cerebellum::stop(StopCause cause, Time now) {
   state_.cause = cause;
   state_.stop_result = event == SafetyEvent::kPowerCut ? StopResult::kUncertain : StopResult::kPending;
   if (!is_braking(before)) {
-    const bool gave_way = leave_compliance();
+    const bool gave_way = leave_commanded(cause);
     stop_began_ = stepped_;
     stop_ends_ = std::max(now, stop_began_ + from_s(plan_stop()));
     if (gave_way) widen_to_stop();
@@ -39,11 +39,12 @@ bool Cerebellum::stop(StopCause cause, Time now) {
 }
 
 // No stop relies on a spring and a damper that somebody asked for. Where admittance has brought the arm, its reference
-// says; where a spring has let it be pushed to, and how fast, only the measurement.
-bool Cerebellum::leave_compliance() {
+// says; where a spring has let it be pushed to, or what holds it off, and how fast, only the measurement.
+bool Cerebellum::leave_commanded(StopCause cause) {
   const Controller law = laws_.controller();
-  if (law == Controller::kTracking) return false;
-  if (law == Controller::kAdmittance) {
+  const bool held_off = cause == StopCause::kFollowingError;
+  if (law == Controller::kTracking && !held_off) return false;
+  if (law == Controller::kAdmittance && !held_off) {
     const AxisVector motion = commanded_.acceleration;
     commanded_ = laws_.asked();
     commanded_.acceleration = motion;  // that of a push comes and goes with it
@@ -87,7 +88,7 @@ void Cerebellum::go_on_from(const AxisState& state) {
 }
 
 void Cerebellum::hold_measured(Time now) {
-  gives_way_ = false;
+  gives_way_ = held_off_ = false;
   laws_.forget();
   laws_.reset();
   go_on_from(at_rest(measured_position_));
@@ -128,6 +129,7 @@ void Cerebellum::judge_stop(Time now) {
     return;
   }
   enter(SafetyEvent::kStandstill);
+  if (state_.cause == StopCause::kFollowingError) return hold_measured(now);  // it may have been pushed since
   queue_.rest(commanded_.position, now);
 }
 

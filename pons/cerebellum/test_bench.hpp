@@ -29,6 +29,7 @@ class Plant {
   Plant(const PlantSettings& settings, const AxisVector& position);
   void advance_to(Time time);              // once a tick of the controller
   void place(const AxisVector& position);  // at rest there, without a way
+  void lose_load() { settings_.payload = {}; }
   body::Sensors sensors;
   body::SetPoints set_points;
   AxisVector extra_torque_nm;  // from outside, at the joints

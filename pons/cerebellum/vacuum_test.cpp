@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 
 #include "pons/cerebellum/test_bench.hpp"
@@ -100,6 +101,49 @@ TEST(Vacuum, ALostLoadIsLoggedInItsTickAndPublished) {
     told = true;
   });
   EXPECT_TRUE(told);
+}
+
+struct Lost {
+  double error_rad = 0, speed_share = 0;  // the most, once it can be known
+};
+
+// A load is lost in full motion; `felt`: and the cups show it.
+Lost lose_load(bool felt) {
+  const model::Payload load{.mass_kg = 2.5, .com_m = {0, 0, 0.2}};
+  Settings settings;
+  settings.collision.torque_share = 1e9;  // else that it bears too much is a collision, as it should be
+  Bench bench({.step = 1ms, .payload = load}, settings);
+  link::Command told = plain_command(link::CommandKind::kPayload), on = plain_command(link::CommandKind::kVacuum);
+  told.payload_kg = load.mass_kg;
+  told.payload_com_m = {0, 0, 0.2};
+  on.vacuum_on = 15;
+  bench.arm();
+  bench.send(told);
+  bench.send(on);
+  std::ranges::copy(kHeld, bench.plant.sensors.cup_vacuum_kpa.begin());
+  bench.run(20ms);
+  bench.move(bench_robot().home.array() + 0.4);
+  bench.run(150ms);
+  EXPECT_EQ(bench.state().vacuum.phase, VacuumPhase::kSealed);
+  EXPECT_TRUE(bench.operational());
+  bench.plant.lose_load();
+  if (felt) bench.plant.sensors.cup_vacuum_kpa = kOpen;
+  bench.run(30ms);
+  Lost most;
+  for (int tick = 0; tick < 1000; ++tick) {
+    bench.tick();
+    const AxisVector share = bench.state().speed.cwiseAbs().cwiseQuotient(bench_robot().limits.speed_rad_s);
+    most = {std::max(most.error_rad, bench.error_rad()), std::max(most.speed_share, share.maxCoeff())};
+  }
+  return most;
+}
+
+TEST(Vacuum, ALostLoadIsBorneNoLonger) {
+  const Lost felt = lose_load(true), unfelt = lose_load(false);
+  std::printf("2.5 kg lost in motion: %.1f mrad off, %.0f %% of the speed limits; unnoticed %.1f mrad, %.0f %%\n",
+              1e3 * felt.error_rad, 100 * felt.speed_share, 1e3 * unfelt.error_rad, 100 * unfelt.speed_share);
+  EXPECT_LT(felt.error_rad, 0.7 * unfelt.error_rad);
+  EXPECT_LE(felt.speed_share, unfelt.speed_share);
 }
 
 }  // namespace

@@ -146,6 +146,10 @@ std::vector<Arming*> BridgeSide::armings() {
   return armings;
 }
 
+bool BridgeSide::waits_for_person() const {
+  return std::ranges::all_of(robots_, [](const auto& robot) { return robot->arming.needs_person(); });
+}
+
 std::int64_t BridgeSide::stops() const {
   std::int64_t stops = 0;
   for (const auto& robot : robots_) stops += robot->arming.stops();

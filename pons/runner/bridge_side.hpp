@@ -58,6 +58,7 @@ class BridgeSide {
   // For a person's words; of a robot there is.
   [[nodiscard]] Arming& arming(std::size_t robot = 0) { return robots_[robot]->arming; }
   [[nodiscard]] std::vector<Arming*> armings();
+  [[nodiscard]] bool waits_for_person() const;        // every robot
   [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:

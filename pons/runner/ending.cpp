@@ -9,16 +9,20 @@ namespace {
 // does, and cameras and carry-off see the end of it.
 constexpr Duration kAfterwards = std::chrono::seconds(2);
 
+constexpr std::string_view kNobodyComes =
+    "no robot goes on before a person resets it, and none can come; with --socket, `pons robot reset` can";
+
 }  // namespace
 
 bool Ending::check(Time now, bool finished) {
-  if (!broken_off_ && watch_.interrupted && watch_.interrupted()) break_off(now, "interrupted");
-  if (!broken_off_ && watch_.limit > Time{} && now > watch_.limit) break_off(now, "ran too long");
+  if (watch_.interrupted && watch_.interrupted()) break_off(now, "interrupted");
+  if (watch_.limit > Time{} && now > watch_.limit) break_off(now, "it ran too long");
+  if (!watch_.attended && bridge_side_.waits_for_person()) break_off(now, kNobodyComes);
   if (watch_.progress) watch_.progress(now);
   for (const std::string& line : bridge_side_.health().take_alerts()) {
     if (watch_.alerted) watch_.alerted(line);
   }
-  if (!bridge_side_.idle() || !(broken_off_ || finished)) {
+  if (!bridge_side_.idle() || (broken_off_.empty() && !finished)) {
     quiet_since_.reset();
     return false;
   }
@@ -26,9 +30,10 @@ bool Ending::check(Time now, bool finished) {
   return now - *quiet_since_ >= kAfterwards;
 }
 
-void Ending::break_off(Time now, const char* why) {
-  broken_off_ = true;
-  bridge_side_.stop(now, why);
+void Ending::break_off(Time now, std::string_view why) {
+  if (!broken_off_.empty()) return;
+  broken_off_ = why;
+  bridge_side_.stop(now, broken_off_);
 }
 
 }  // namespace pons::runner

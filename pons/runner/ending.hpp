@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "pons/runner/run.hpp"
 
@@ -14,15 +16,15 @@ class Ending {
 
   // Once a bridge period; `finished`: nothing more will come from the body. True when the run is over.
   [[nodiscard]] bool check(Time now, bool finished);
-  [[nodiscard]] bool broken_off() const { return broken_off_; }
+  [[nodiscard]] const std::string& broken_off() const { return broken_off_; }  // why; empty when it was not
 
  private:
-  void break_off(Time now, const char* why);
+  void break_off(Time now, std::string_view why);
 
   const Watch& watch_;
   BridgeSide& bridge_side_;
   std::optional<Time> quiet_since_;
-  bool broken_off_ = false;
+  std::string broken_off_;
 };
 
 }  // namespace pons::runner

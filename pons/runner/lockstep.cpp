@@ -36,7 +36,8 @@ Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
     result.end = now;
     break;
   }
-  result.complete = !ending.broken_off();
+  result.broken_off = ending.broken_off();
+  result.complete = result.broken_off.empty();
   result.loop.p50_us = 1e6 * to_s(step_time.percentile(50));
   result.loop.p99_us = 1e6 * to_s(step_time.percentile(99));
   return result;

@@ -27,7 +27,8 @@ Expected<RunResult> run_bridge(BridgeSide& bridge_side, Observer& observer, cons
   if (!good) return std::unexpected(good.error());
   const rt::Histogram& took = loop.execution();
   result.bridge = {1e3 * to_s(took.percentile(50)), 1e3 * to_s(took.percentile(99)), 1e3 * to_s(took.max())};
-  result.complete = !ending.broken_off();
+  result.broken_off = ending.broken_off();
+  result.complete = result.broken_off.empty();
   return result;
 }
 

@@ -50,6 +50,7 @@ struct Watch {
   std::function<void(std::string_view)> alerted;     // a part came to be worse: a line (Health::take_alerts)
   std::function<void(std::string_view)> refused;     // real time only: what the operating system refused, at the start
   Time limit;                                        // a run that takes longer is broken off
+  bool attended = true;  // somebody can come to reset a robot; else a run in which all wait for that is broken off
 };
 
 // From a tick's time to its begin.
@@ -70,7 +71,8 @@ struct BridgeFigures {
 
 struct RunResult {
   Time end;
-  bool complete = false;  // false: broken off
+  bool complete = false;   // false: broken off
+  std::string broken_off;  // why, where this process did
   LoopFigures loop;
   std::optional<BridgeFigures> bridge;  // real time only: in lockstep a tick waits for the cameras' frames
   std::string degraded;  // real time only: what the operating system refused this process; empty when nothing

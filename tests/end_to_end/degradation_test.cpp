@@ -195,6 +195,30 @@ TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
   EXPECT_EQ(elsewhere, 0);
 }
 
+// Nothing in virtual time would ever change for whoever waits for a person that cannot come.
+TEST_F(Degradation, ARunInWhichOnlyAPersonCouldGoOnIsBrokenOff) {
+  const auto cell = built("brain_stall: {an_hour: 0, lasts_s: [1, 1]}\n", 8);
+  ASSERT_TRUE(cell);
+  apps::BridgeHalf& above = *cell->above;
+  std::optional<Time> stopped;
+  const runner::Watch watch{.progress =
+                                [&](Time now) {
+                                  if (stopped || !above.cell().held) return;
+                                  above.bridge_side->arming().emergency_stop(now);
+                                  stopped = now;
+                                },
+                            .limit = Time(std::chrono::minutes(10)),
+                            .attended = false};
+  runner::Parts parts = cell->parts();
+  const auto result = runner::run_lockstep(parts, watch);
+  ASSERT_TRUE(result) << result.error().line();
+  ASSERT_TRUE(stopped);
+  EXPECT_FALSE(result->complete);
+  EXPECT_THAT(result->broken_off, HasSubstr("a person"));
+  EXPECT_LT(result->end - *stopped, std::chrono::seconds(10));
+  EXPECT_TRUE(above.bridge->idle()) << "every sender has heard";
+}
+
 // A file that may grow no more is a disk that is full, to who writes it.
 TEST_F(Degradation, WithoutRoomNoTaskIsTakenAndThoseThatAreGoOn) {
   const auto submit = [&](const std::string& id) {

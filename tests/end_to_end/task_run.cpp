@@ -97,7 +97,7 @@ bool TaskRun::finish(const std::function<void(Time)>& each_tick) {
     if (testing::Test::HasFatalFailure()) return false;
   } while (now_.ns() % runner::kBridgePeriod.count() != 0 || !ending.check(now_, parts_.body.plant.finished()));
   parts_.bridge_side->close(now_);
-  return !ending.broken_off();
+  return ending.broken_off().empty();
 }
 
 }  // namespace pons::tests

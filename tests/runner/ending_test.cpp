@@ -58,7 +58,7 @@ TEST_F(EndingTest, QuietIsNotTheEndWhileParcelsMayCome) {
   Ending ending(watch, *cell_->above->bridge_side);
   ASSERT_TRUE(cell_->above->bridge_side->idle());
   EXPECT_FALSE(over(ending, Time(from_s(10)), false));
-  EXPECT_FALSE(ending.broken_off());
+  EXPECT_EQ(ending.broken_off(), "");
 }
 
 TEST_F(EndingTest, ComesSomeTimeAfterTheLastOutcome) {
@@ -67,7 +67,7 @@ TEST_F(EndingTest, ComesSomeTimeAfterTheLastOutcome) {
   EXPECT_FALSE(over(ending, Time(from_s(1)), false));
   const Time quiet = now_;
   EXPECT_EQ(over(ending, Time(from_s(10)), true), quiet + kAfterwards);
-  EXPECT_FALSE(ending.broken_off());
+  EXPECT_EQ(ending.broken_off(), "");
   EXPECT_TRUE(shutdowns().empty());
 }
 
@@ -93,7 +93,7 @@ TEST_F(EndingTest, AnInterruptCancelsAndStillSeesWhatWasLetGoLand) {
   interrupted = true;
   const Time quiet = now_;
   EXPECT_EQ(over(ending, Time(from_s(10)), false), quiet + kAfterwards) << "parcels on the belt do not hold it up";
-  EXPECT_TRUE(ending.broken_off());
+  EXPECT_EQ(ending.broken_off(), "interrupted");
   EXPECT_EQ(shutdowns(), std::vector<std::string>{"interrupted"}) << "once, however long the button is held";
   const auto history = cell_->above->journal->task("open");
   ASSERT_TRUE(history && *history);
@@ -104,11 +104,11 @@ TEST_F(EndingTest, ARunThatTakesTooLongIsBrokenOff) {
   const Watch watch{.interrupted = {}, .progress = {}, .limit = Time(from_s(3))};
   Ending ending(watch, *cell_->above->bridge_side);
   EXPECT_FALSE(over(ending, Time(from_s(3)), false));
-  EXPECT_FALSE(ending.broken_off());
+  EXPECT_EQ(ending.broken_off(), "");
   const Time quiet = now_;
   EXPECT_EQ(over(ending, Time(from_s(10)), false), quiet + kAfterwards);
-  EXPECT_TRUE(ending.broken_off());
-  EXPECT_EQ(shutdowns(), std::vector<std::string>{"ran too long"});
+  EXPECT_EQ(ending.broken_off(), "it ran too long");
+  EXPECT_EQ(shutdowns(), std::vector<std::string>{"it ran too long"});
 }
 
 }  // namespace
