@@ -162,8 +162,12 @@ TEST(FollowingError, InWhatGivesWaySlowlyIsAProtectiveStopThatStands) {
   bench.arm();
   set_out(bench, 0.2);
   for (int tick = 0; tick < 5000; ++tick) {
+    const bool followed = bench.operational();
     bench.tick();
     heap.push(bench, model);
+    if (followed && !bench.operational()) {
+      EXPECT_LT(bench.error_rad(), 0.02) << "it brakes from where it is";
+    }
   }
   EXPECT_GT(heap.gave_way_m, 0.001);
   EXPECT_EQ(bench.state().cause, StopCause::kFollowingError);
