@@ -268,7 +268,7 @@ void Cerebellum::watch_following(Time now) {
   const bool stands = state_.safety == SafetyState::kProtectiveStop;
   if (stop(stands ? StopCause::kNoStandstill : StopCause::kFollowingError, now))
     log_.write(now, "axis {} is {:.3f} rad from where it was told to be", axis + 1, error);
-  held_off_ = is_braking(state_.safety);
+  held_off_ = is_braking(state_.safety) && state_.cause == StopCause::kFollowingError;
 }
 
 bool Cerebellum::enter(SafetyEvent event) {

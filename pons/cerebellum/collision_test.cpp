@@ -176,26 +176,6 @@ TEST(FollowingError, InWhatGivesWaySlowlyIsAProtectiveStopThatStands) {
   EXPECT_LT(heap.wall.force_n, 10);
 }
 
-// Likewise where another cause began the stop.
-TEST(FollowingError, IsNotPressedOnInAStopThatWasCommandedBefore) {
-  Heap heap{wall_across(0.2, 400ms)};
-  auto model = bench_model();
-  Bench bench({.step = 1ms}, impatient());
-  bench.arm();
-  set_out(bench, 0.2);
-  for (int tick = 0; tick < 5000; ++tick) {
-    bench.tick();
-    heap.push(bench, model);
-    if (bench.operational() && bench.error_rad() > 0.8 * Settings{}.following_error_rad)
-      bench.send(plain_command(CommandKind::kProtectiveStop));
-  }
-  EXPECT_GT(heap.gave_way_m, 0.001);
-  EXPECT_EQ(bench.state().cause, StopCause::kCommanded);
-  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
-  EXPECT_EQ(bench.state().stop_result, link::StopResult::kConfirmed);
-  EXPECT_LT(heap.wall.force_n, 10);
-}
-
 TEST(Collision, IsLeftLikeAnyProtectiveStop) {
   Bench bench;
   bench.arm();
