@@ -84,7 +84,8 @@ class Cerebellum {
   //                    queued (SeamTolerance), a full queue, or queued motion that ends moving: protective stop
   //                    kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from the last tick.
   //   kVacuum          operational only; a cup that the tool does not have: protective stop kBadCommand
-  //   kPayload         any state; negative, not finite or above max_payload_kg: protective stop kBadCommand
+  //   kPayload         any state, and forgotten when the cups have lost what they held; negative, not finite or above
+  //                    max_payload_kg: protective stop kBadCommand
   //   kContact         operational or in recovery, and forgotten when either begins; negative, not finite or above
   //                    CollisionSettings::contact_max_n: protective stop kBadCommand
   //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
@@ -192,7 +193,8 @@ class Cerebellum {
   bool strays_ = false, hasty_ = false;
   Time strays_since_, hasty_since_;
 
-  // After a collision the arm gives way while it brakes, and then holds where that brought it.
+  // After a collision the arm gives way while it brakes, one that was held off brakes along a path from where it was;
+  // either then holds where that brought it.
   bool gives_way_ = false, held_off_ = false;
   AxisVector driven_nm_;  // what the drives were told last
   struct Driven {

@@ -17,7 +17,8 @@ constexpr std::string_view kNobodyComes =
 bool Ending::check(Time now, bool finished) {
   if (watch_.interrupted && watch_.interrupted()) break_off(now, "interrupted");
   if (watch_.limit > Time{} && now > watch_.limit) break_off(now, "it ran too long");
-  if (!watch_.attended && bridge_side_.waits_for_person()) break_off(now, kNobodyComes);
+  const bool done = finished && bridge_side_.idle();
+  if (!watch_.attended && !done && bridge_side_.waits_for_person()) break_off(now, kNobodyComes);
   if (watch_.progress) watch_.progress(now);
   for (const std::string& line : bridge_side_.health().take_alerts()) {
     if (watch_.alerted) watch_.alerted(line);

@@ -195,28 +195,30 @@ TEST_F(Degradation, WithoutACameraTheArmParksOutOfItsView) {
   EXPECT_EQ(elsewhere, 0);
 }
 
-// Nothing in virtual time would ever change for whoever waits for a person that cannot come.
+// Nothing in virtual time would ever change for whoever waits for a person that cannot come: here after a visit to a
+// zone that only a person may open again.
 TEST_F(Degradation, ARunInWhichOnlyAPersonCouldGoOnIsBrokenOff) {
-  const auto cell = built("brain_stall: {an_hour: 0, lasts_s: [1, 1]}\n", 8);
-  ASSERT_TRUE(cell);
-  apps::BridgeHalf& above = *cell->above;
-  std::optional<Time> stopped;
-  const runner::Watch watch{.progress =
-                                [&](Time now) {
-                                  if (stopped || !above.cell().held) return;
-                                  above.bridge_side->arming().emergency_stop(now);
-                                  stopped = now;
-                                },
-                            .limit = Time(std::chrono::minutes(10)),
-                            .attended = false};
-  runner::Parts parts = cell->parts();
-  const auto result = runner::run_lockstep(parts, watch);
-  ASSERT_TRUE(result) << result.error().line();
-  ASSERT_TRUE(stopped);
-  EXPECT_FALSE(result->complete);
-  EXPECT_THAT(result->broken_off, HasSubstr("a person"));
-  EXPECT_LT(result->end - *stopped, std::chrono::seconds(10));
-  EXPECT_TRUE(above.bridge->idle()) << "every sender has heard";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, folder_ / "worlds", std::filesystem::copy_options::recursive);
+  const std::filesystem::path file = folder_ / "worlds/parcel_cell/world.yaml";
+  std::string world = read_text(file);
+  const std::string resumes = ", resume_after_s: 2.0";
+  ASSERT_NE(world.find(resumes), std::string::npos);
+  write_text(file, world.erase(world.find(resumes), resumes.size()));
+  const Finished run = run_pons({"run", "parcel_cell", "--parcels", "8", "--seed", "1", "--visit", "gate@12+1",
+                                 "--journal", folder_ / "j.db", "--report", folder_ / "r.json"},
+                                {"PONS_WORLDS=" + (folder_ / "worlds").string()});
+  EXPECT_EQ(run.code, 1) << run.out << run.err;
+  EXPECT_THAT(run.err, HasSubstr("pons: broken off: no robot goes on before a person resets it"));
+  report_ = read_json(folder_ / "r.json");
+  EXPECT_EQ(report_["interventions"], 1);
+  EXPECT_LT(report_["sim_seconds"], 40) << "at once";
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
+  const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
+  ASSERT_TRUE(journal) << journal.error().line();
+  const auto counts = (*journal)->counts();
+  ASSERT_TRUE(counts) << counts.error().line();
+  EXPECT_GE(counts->accepted, 1);
+  EXPECT_EQ(counts->open, 0) << "every sender has heard";
 }
 
 // A file that may grow no more is a disk that is full, to who writes it.
