@@ -86,15 +86,7 @@ void Dispatcher::recall(const task::Task& task, std::optional<task::Outcome> out
   if (outcome) heard(task.id, *outcome);
 }
 
-void Dispatcher::recall_ride(std::string_view code) {
-  if (code.empty()) {
-    ++tally_.settled;
-    return;
-  }
-  Known& known = known_[std::string(code)];
-  if (known.tries == 0 && !known.rode) ++tally_.settled;
-  known.rode = true;
-}
+void Dispatcher::recall_ride(std::string_view code) { let_ride(std::string(code)); }
 
 Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now,
                               const std::set<std::string>& set_aside) {
@@ -111,6 +103,11 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
                         Decisions& decisions) {
   const double x_m = belief.world_from_top.translation().x();
   const bool in_reach = x_m <= belt_.pick_x_max_m;
+  if (!belief.disputed.empty()) {
+    // It may be two that touch: as long as a camera looks, they may still be told apart.
+    if (in_reach && x_m < label_view_end_m_) return;
+    return ride(belief, kRideTwoCodes, decisions);
+  }
   if (belief.code.empty()) {
     if (in_reach && !past_label_view(belief)) return;
     return ride(belief, kRideUnreadable, decisions);
@@ -119,6 +116,8 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
 
   const auto order = orders_.find(belief.code);
   if (order == orders_.end()) return ride(belief, kRideUnknown, decisions);
+  // It may yet show another.
+  if (in_reach && !belief.settled && x_m < label_view_end_m_) return;
   Known& known = known_[belief.code];
   if (known.tries > 0 && !known.failed) {
     const bool live = std::ranges::find(all, known.track, &ObjectBelief::track) != all.end();
@@ -129,8 +128,7 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     return;
   }
   if (too_large(belief.size_m, order->second)) {
-    // It may be two that touch: as long as a camera looks, they may still be told apart.
-    if (in_reach && x_m < label_view_end_m_) return;
+    if (in_reach && x_m < label_view_end_m_) return;  // it, too, may be two
     return ride(belief, kRideTooLarge, decisions);
   }
   if (!in_reach) return ride(belief, kRideLate, decisions);
@@ -213,14 +211,22 @@ Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tr
 
 void Dispatcher::ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions) {
   decided_.insert(belief.track);
-  if (belief.code.empty()) {
+  const auto entry = [&](const std::string& code) {
+    decisions.rides.push_back({belief.track, code, std::string(reason)});
+  };
+  // Either code may be its own: whoever looks for that parcel finds the entry.
+  for (const std::string& code : belief.disputed) let_ride(code), entry(code);
+  if (belief.disputed.empty()) let_ride(belief.code), entry(belief.code);
+}
+
+void Dispatcher::let_ride(const std::string& code) {
+  if (code.empty()) {
     ++tally_.settled;
-  } else {
-    Known& known = known_[belief.code];
-    if (known.tries == 0 && !known.rode) ++tally_.settled;
-    known.rode = true;
+    return;
   }
-  decisions.rides.push_back({belief.track, belief.code, std::string(reason)});
+  Known& known = known_[code];
+  if (known.tries == 0 && !known.rode) ++tally_.settled;
+  known.rode = true;
 }
 
 std::vector<std::string> Dispatcher::unseen() const {

@@ -30,6 +30,7 @@ inline constexpr int kOrdinaryPriority = 50;  // among ordinary parcels the one 
 inline constexpr std::string_view kRideUnreadable = "label unreadable";
 inline constexpr std::string_view kRideUnknown = "unknown code";
 inline constexpr std::string_view kRideTooLarge = "too large";
+inline constexpr std::string_view kRideTwoCodes = "shows two codes";
 inline constexpr std::string_view kRideTwice = "code seen twice";
 inline constexpr std::string_view kRideLate = "identified out of reach";
 inline constexpr std::string_view kRideCovered = "covered by another";
@@ -80,6 +81,7 @@ class Dispatcher final : public Brain {
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);
+  void let_ride(const std::string& code);
 
   Orders orders_;
   const world::World& world_;

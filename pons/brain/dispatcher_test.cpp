@@ -43,6 +43,7 @@ ObjectBelief parcel(std::uint32_t track, double x_m, const std::string& code = "
   belief.frames_seen = 5;
   belief.confidence = 0.97;
   belief.code = code;
+  belief.settled = true;
   return belief;
 }
 
@@ -186,6 +187,32 @@ TEST_F(DispatcherTest, TwoParcelsWithOneCodeAreSortedOnce) {
   ASSERT_EQ(decisions.rides.size(), 1u);
   EXPECT_EQ(decisions.rides[0].track, 2u);
   EXPECT_EQ(decisions.rides[0].reason, kRideTwice);
+}
+
+TEST_F(DispatcherTest, IsAskedForOnceNoOtherCodeIsToBeExpectedOnIt) {
+  ObjectBelief one = parcel(1, 0, "P1");
+  one.settled = false;
+  EXPECT_TRUE(dispatcher_.observe({one}, at(0)).tasks.empty());
+  one.settled = true;
+  EXPECT_EQ(dispatcher_.observe({one}, at(1)).tasks.size(), 1u);
+  ObjectBelief passed = parcel(2, 0.6, "P3");
+  passed.settled = false;
+  EXPECT_EQ(dispatcher_.observe({passed}, at(1)).tasks.size(), 1u) << "no camera looks any more";
+}
+
+TEST_F(DispatcherTest, WhatShowsTwoCodesRidesUnderBothOfThem) {
+  ObjectBelief two = parcel(1, 0);
+  two.disputed = {"P1", "P3"};
+  const Decisions early = dispatcher_.observe({two}, at(0));
+  EXPECT_TRUE(early.tasks.empty() && early.rides.empty()) << "it may be two that touch";
+  two.world_from_top.translation().x() = 0.6;
+  const Decisions decisions = dispatcher_.observe({two}, at(1));
+  EXPECT_TRUE(decisions.tasks.empty());
+  ASSERT_EQ(decisions.rides.size(), 2u);
+  EXPECT_EQ(decisions.rides[0].code, "P1");
+  EXPECT_EQ(decisions.rides[1].code, "P3");
+  EXPECT_EQ(decisions.rides[1].reason, kRideTwoCodes);
+  EXPECT_EQ(dispatcher_.observe({two, parcel(2, 0, "P3")}, at(2)).tasks.size(), 1u) << "whose code it really is";
 }
 
 TEST_F(DispatcherTest, ALostTrackThatComesBackKeepsItsTask) {

@@ -25,10 +25,12 @@ struct ObjectBelief {
   double confidence = 0;                   // 0..1: seen how often, how consistently
   double flatness_m = 0;                   // RMS distance of the top's points from their plane
   int frames_seen = 0;
-  Time last_seen;          // when a camera last saw it (stamp may be predicted further)
-  bool crowded = false;    // touches, overlaps or leans on a neighbour
-  std::string code;        // label text, empty until read
-  int label_attempts = 0;  // frames good enough to read a label on it, readable or not
+  Time last_seen;                          // when a camera last saw it (stamp may be predicted further)
+  bool crowded = false;                    // touches, overlaps or leans on a neighbour
+  std::string code;                        // label text, empty until read
+  std::vector<std::string> disputed = {};  // both, of one that shows two; then `code` is empty
+  bool settled = false;                    // no other code is to be expected on it
+  int label_attempts = 0;                  // frames good enough to read a label on it, readable or not
 };
 
 // Where a base is on its map, as of one scan, and what that scan saw beside the map.

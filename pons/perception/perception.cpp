@@ -146,18 +146,24 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
   std::vector<std::size_t> wanted;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (tracks[i] == 0) continue;
-    if (sightings[i].complete && !sightings[i].covered) tracker.label_attempt(tracks[i]);
-    if (tracker.wants_label(tracks[i])) wanted.push_back(i);
+    const bool wants = tracker.wants_label(tracks[i]);
+    if (wants) wanted.push_back(i);
+    if (sightings[i].complete && !sightings[i].covered) tracker.label_shown(tracks[i], wants);
   }
   const std::vector<LabelRead> reads = label_reader.read(frame, view, segmenter.texture(), segments, sightings, wanted);
   for (const LabelRead& read : reads) {
     const Vector3 middle_m = read.middle_m - Vector3(belt_travel_m, 0, 0);
-    // Two on one are two objects taken for one: with the next frame they are told apart.
-    if (std::ranges::count(reads, read.sighting, &LabelRead::sighting) == 1) {
+    const auto other = std::ranges::find_if(reads, [&](const LabelRead& another) {
+      return another.sighting == read.sighting && another.code != read.code;
+    });
+    if (other == reads.end()) {
       tracker.label_read(tracks[read.sighting], read.code, middle_m.head<2>());
-    } else {
-      shared[read.code] = middle_m;
+      continue;
     }
+    // One object that shows two codes, or two objects taken for one, that the next frames may tell apart.
+    const Vector3 other_m = other->middle_m - Vector3(belt_travel_m, 0, 0);
+    tracker.labels_read(tracks[read.sighting], {read.code, middle_m.head<2>()}, {other->code, other_m.head<2>()});
+    shared[read.code] = middle_m;
   }
 }
 

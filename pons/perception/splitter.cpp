@@ -14,7 +14,8 @@ constexpr std::size_t kFewestSamples = 80;
 constexpr std::size_t kSamples = 2500;  // cells looked at per object
 constexpr double kPlain = 6;            // grey levels: an object of one colour spreads less
 constexpr double kExplained = 0.6;
-constexpr double kContrast = 14;     // grey levels
+constexpr double kContrast = 14;  // grey levels
+constexpr float kGreyPerMillimetre = 5;
 constexpr double kSharp = 0.55;      // share of the contrast that must appear right at the line
 constexpr double kRectangle = 0.90;  // fuller patches are one box as far as an outline can tell
 constexpr double kCornerDepth = 4;   // cells
@@ -22,7 +23,8 @@ constexpr double kGain = 0.045;
 constexpr double kLengthCost = 0.05;  // of a cut as long as the patch is wide
 constexpr double kPrintCost = 0.5;    // likewise, of one through print
 constexpr double kTold = 0.2;         // of the variance; what explains less may be shade along an edge,
-constexpr double kHinted = 0.03;      // and still less, noise
+constexpr double kHinted = 0.03;      // and still less, noise,
+constexpr double kStep_m = 0.003;     // unless one side is higher
 constexpr double kLeastGain = 0.02;   // where it is known that there are two
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
@@ -194,13 +196,12 @@ std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv:
   const auto told = between_colours(view, cells, labels);
   if (told && told->explained >= kTold) return told->line;
   if (auto line = between_corners(cells, labels)) return line;
-  if (told && told->explained >= kHinted) return told->line;
-  return halfway(cells, labels);
+  if (told && told->explained >= kHinted && told->step_m >= kStep_m) return told->line;
+  return std::nullopt;
 }
 
 std::optional<Splitter::Told> Splitter::between_colours(const TopView& view, const std::vector<cv::Point>& cells,
                                                         const Labels& labels) {
-  constexpr float kGreyPerMillimetre = 5;
   const double variance = take_samples(cells, [&](const cv::Point& cell) {
     const cv::Vec3b& colour = view.colour(cell);
     const double height_mm = 1e3 * TopView::metres(view.height(cell));
@@ -218,7 +219,14 @@ std::optional<Splitter::Told> Splitter::between_colours(const TopView& view, con
     if (cut.explained > best.explained) best = cut;
   }
   if (best.explained <= 0) return std::nullopt;
-  return Told{{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset}, best.explained};
+  const Line line{{std::cos(best.angle_rad), std::sin(best.angle_rad)}, best.offset};
+  std::array<double, 2> sum{}, count{};
+  for (const Sample& sample : samples_) {
+    const std::size_t side = line.beyond(sample.at) ? 1 : 0;
+    sum[side] += static_cast<double>(sample.colour[2]) / kGreyPerMillimetre;
+    count[side] += 1;
+  }
+  return Told{line, best.explained, 1e-3 * std::abs(sum[0] / count[0] - sum[1] / count[1])};
 }
 
 std::optional<Line> Splitter::between_corners(const std::vector<cv::Point>& cells, const Labels& labels) {
@@ -236,15 +244,6 @@ std::optional<Line> Splitter::between_corners(const std::vector<cv::Point>& cell
     if (fill > best_fill) best_fill = fill, best = line;
   }
   return best;
-}
-
-// Square to the patch.
-std::optional<Line> Splitter::halfway(const std::vector<cv::Point>& cells, const Labels& labels) {
-  const double angle = cv::minAreaRect(cells).angle * std::numbers::pi / 180;
-  const cv::Point2d along(std::cos(angle), std::sin(angle)), across(-along.y, along.x), way = labels.other - labels.one;
-  const cv::Point2d normal = std::abs(along.dot(way)) > std::abs(across.dot(way)) ? along : across;
-  if (std::abs(normal.dot(way)) < 2 * labels.clear) return std::nullopt;
-  return Line{normal, normal.dot(labels.one + labels.other) / 2};
 }
 
 std::optional<Line> Splitter::by_outline(const std::vector<cv::Point>& cells, double narrowest) const {

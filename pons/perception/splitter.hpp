@@ -30,8 +30,8 @@ class Splitter {
     cv::Point2d one, other;
     double clear = 0;
   };
-  // The line between two labels that tells colour and height of the two sides apart; where they are alike, one through
-  // an inward corner that leaves better rectangles; where there is none, the one halfway.
+  // The line between two labels that tells colour or height of the two sides apart; where they are alike, one through
+  // an inward corner that leaves better rectangles. None: as far as can be told it is one thing that shows both.
   [[nodiscard]] std::optional<Line> between(const TopView& view, const std::vector<cv::Point>& cells,
                                             const Labels& labels);
   // A line through an inward corner of the outline that leaves two better rectangles, none of them narrower than
@@ -57,11 +57,11 @@ class Splitter {
   struct Told {
     Line line;
     double explained = 0;  // share of the variance
+    double step_m = 0;     // between the mean heights of both sides
   };
   [[nodiscard]] std::optional<Told> between_colours(const TopView& view, const std::vector<cv::Point>& cells,
                                                     const Labels& labels);
   [[nodiscard]] static std::optional<Line> between_corners(const std::vector<cv::Point>& cells, const Labels& labels);
-  [[nodiscard]] static std::optional<Line> halfway(const std::vector<cv::Point>& cells, const Labels& labels);
 
   cv::Mat1b texture_, grey_, brightest_, darkest_;
   std::vector<Sample> samples_;

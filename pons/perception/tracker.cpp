@@ -22,7 +22,6 @@ constexpr double kMoved_m = 0.009;  // over the motion memory: more than noise
 constexpr int kDoubts = 4;
 constexpr int kPieces = 3;  // frames in a row that show them until what was whole is two
 constexpr double kBesideLabel_m = 0.005;
-constexpr int kReads = 2;            // of one code until it is sure
 constexpr int kEnoughAttempts = 10;  // whose label shows none of them will show none
 constexpr double kDoubtful = 0.3;    // confidence of what is partly hidden
 constexpr Duration kSwallow = std::chrono::milliseconds(500);
@@ -240,19 +239,16 @@ bool Tracker::perhaps_a_piece(const Sighting& sighting, Time stamp, double trave
 void Tracker::take_in(Track& track, const Sighting& sighting, Time stamp, double travel_m) {
   const Estimate before = track.estimate;
   const bool same = observed(track, sighting, stamp, travel_m);
-  if (track.code.empty()) return;
+  TrackLabel& label = track.label;
+  if (label.code().empty()) return;
   // The label moves with its parcel. What was taken for one and is two may have shown the other's.
-  track.label_m += before.velocity * to_s(stamp - track.label_stamp);
-  track.label_stamp = stamp;
+  Eigen::Vector2d middle_m = label.middle_m() + before.velocity * to_s(stamp - label.stamp());
   if (same) {
     const Eigen::Rotation2Dd turned(turn(before.yaw_rad, track.estimate.yaw_rad));
-    track.label_m = track.estimate.at(stamp) + turned * (track.label_m - before.at(stamp));
+    middle_m = track.estimate.at(stamp) + turned * (middle_m - before.at(stamp));
   }
-  const Eigen::Vector2d label_m = track.label_m + Eigen::Vector2d(travel_m, 0);
-  if (!expected(track, stamp, travel_m).covers(label_m.x(), label_m.y(), kBesideLabel_m)) {
-    track.code.clear();
-    track.reads = track.label_attempts = 0;
-  }
+  label.move(middle_m, stamp);
+  if (!expected(track, stamp, travel_m).covers(middle_m.x() + travel_m, middle_m.y(), kBesideLabel_m)) label.drop();
 }
 
 // False when what was seen is not what it was taken for so far: of another size.
@@ -287,11 +283,10 @@ bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, doubl
   if (resized) track.odd_size_m = o.size_m;
   if (resized && !now_whole && ++track.odd_sizes < enough) return true;
   track.last = sighting;
-  if (resized && !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m) {
-    // Another object lies here now, on this one or in its place: whose label it was is no longer known.
-    track.code.clear();
-    track.reads = track.label_attempts = 0;
-  }
+  const bool another = !o.doubtful && !was_doubtful && size_difference(o.size_m, track.estimate.size_m) > kOtherSize_m;
+  // Another object lies here now, on this one or in its place: whose label it was is no longer known. Or what showed
+  // two codes was two.
+  if (resized && (another || !track.label.disputed().empty())) track.label.drop();
   if (now_whole || (o.doubtful && !was_doubtful) || resized || moved > kDisturbed_m || turned) {
     // What is seen of it changed: that its middle moved says nothing of its speed.
     const bool same_whole = !resized && !o.doubtful && !was_doubtful;
@@ -379,8 +374,8 @@ std::vector<std::uint32_t> Tracker::update(const TopView& view, const Segments& 
   return ids;
 }
 
-void Tracker::label_attempt(std::uint32_t track) {
-  if (Track* const found = find(track)) ++found->label_attempts;
+void Tracker::label_shown(std::uint32_t track, bool searched) {
+  if (Track* const found = find(track)) found->label.shown(searched);
 }
 
 bool Tracker::wants_label(std::uint32_t track) const {
@@ -389,39 +384,38 @@ bool Tracker::wants_label(std::uint32_t track) const {
 }
 
 bool Tracker::wants_label(const Track& track) const {
-  return track.reads < kReads || rules_.too_large(track.estimate.size_m);
+  return !track.label.settled() || rules_.too_large(track.estimate.size_m);
 }
 
 bool Tracker::wants_labels() const {
   return std::ranges::any_of(tracks_, [this](const Track& track) {
     return !track.forgotten && track.whole && !track.covered && track.last_seen == passages_.back().stamp &&
-           track.label_attempts < kEnoughAttempts && wants_label(track);
+           track.label.attempts() < kEnoughAttempts && wants_label(track);
   });
+}
+
+bool Tracker::shows(const Track& track, const Eigen::Vector2d& label_m) const {
+  const auto& [stamp, travel_m] = passages_.back();
+  return expected(track, stamp, travel_m).covers(label_m.x() + travel_m, label_m.y(), kBesideLabel_m);
 }
 
 void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m) {
   Track* const found = find(track);
-  if (found == nullptr || code.empty()) return;
-  const auto& [stamp, travel_m] = passages_.back();
-  if (!expected(*found, stamp, travel_m).covers(middle_m.x() + travel_m, middle_m.y(), kBesideLabel_m)) return;
-  if (found->code.empty() || found->code == code) {
-    found->code = code;
-    found->label_m = middle_m, found->label_stamp = stamp;
-    ++found->reads;
-    found->other_reads = 0;
-  } else {
-    found->other_reads = found->other_code == code ? found->other_reads + 1 : 1;
-    found->other_code = code;
-    if (found->other_reads < 2) return;
-    std::swap(found->code, found->other_code);
-    found->label_m = middle_m, found->label_stamp = stamp;
-    found->reads = found->other_reads;
-    found->other_reads = 0;
-  }
+  if (found == nullptr || code.empty() || !shows(*found, middle_m)) return;
+  found->label.read(code, middle_m, passages_.back().stamp);
+  if (found->label.code() != code) return;
   // One code is on one parcel: whoever else has it got it from a bad cut or was this parcel before.
   for (Track& other : tracks_) {
-    if (other.id != track && other.code == found->code) other.code.clear(), other.reads = 0;
+    if (other.id != track) other.label.lose(code);
   }
+}
+
+void Tracker::labels_read(std::uint32_t track, const Label& one, const Label& other) {
+  Track* const found = find(track);
+  if (found == nullptr) return;
+  // What was cut badly shows a neighbour's, too.
+  if (!shows(*found, one.middle_m) || !shows(*found, other.middle_m)) return;
+  found->label.read_two(one.code, other.code);
 }
 
 void Tracker::forget(std::uint32_t track) {
@@ -465,8 +459,10 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.frames_seen = track.frames_seen;
   belief.last_seen = track.last_seen;
   belief.crowded = track.crowded;
-  belief.code = track.code;
-  belief.label_attempts = track.label_attempts;
+  belief.code = track.label.code();
+  belief.disputed = track.label.disputed();
+  belief.settled = track.label.settled();
+  belief.label_attempts = track.label.attempts();
   return belief;
 }
 

@@ -10,6 +10,7 @@
 #include "pons/core/belief.hpp"
 #include "pons/perception/segmentation.hpp"
 #include "pons/perception/top_face.hpp"
+#include "pons/perception/track_label.hpp"
 #include "pons/world/world.hpp"
 
 namespace pons::perception {
@@ -23,13 +24,18 @@ class Tracker {
   std::vector<std::uint32_t> update(const TopView& view, const Segments& segments,
                                     const std::vector<Sighting>& sightings, Time stamp, double belt_travel_m);
 
-  // A frame good enough to read this one's label.
-  void label_attempt(std::uint32_t track);
-  // A code was read on it in the newest frame, with the label's middle there, relative to the belt. The first sticks;
-  // another one replaces it when read twice. No two tracks keep one code, and none keeps the code of a label that turns
-  // out to lie beside it.
+  // The newest frame shows all of it, good enough to read its label, and was searched for one or not.
+  void label_shown(std::uint32_t track, bool searched);
+  // A code was read on it in the newest frame, with the label's middle there, relative to the belt: see TrackLabel. No
+  // two tracks keep one code, and none keeps the code of a label that turns out to lie beside it.
   void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
-  // False once its code has been read twice; what seems too long for one object may show another's.
+  struct Label {
+    std::string_view code;
+    Eigen::Vector2d middle_m;
+  };
+  // Two codes were read on it in the newest frame.
+  void labels_read(std::uint32_t track, const Label& one, const Label& other);
+  // False once its label is settled; what seems too long for one object may show another's.
   [[nodiscard]] bool wants_label(std::uint32_t track) const;
   // Whether the newest frame showed one whole and bare that wants it, after fewer than enough attempts.
   [[nodiscard]] bool wants_labels() const;
@@ -66,10 +72,7 @@ class Tracker {
     Vector3 odd_size_m = Vector3::Zero();
     bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
-    std::string code, other_code;
-    Eigen::Vector2d label_m = Eigen::Vector2d::Zero();  // its middle at `label_stamp`, relative to the belt
-    Time label_stamp;
-    int reads = 0, other_reads = 0, label_attempts = 0;
+    TrackLabel label;
     // Seen whole for a while: a bad cut does not come this often.
     [[nodiscard]] bool well_known() const { return observations.size() >= 4 && !observations.back().doubtful; }
     bool forgotten = false;  // only kept to swallow frames from before it was taken
@@ -101,6 +104,7 @@ class Tracker {
   [[nodiscard]] const Track* find(std::uint32_t track) const;
 
   [[nodiscard]] bool wants_label(const Track& track) const;
+  [[nodiscard]] bool shows(const Track& track, const Eigen::Vector2d& label_m) const;
 
   world::Belt belt_;
   world::Rules rules_;

@@ -193,10 +193,34 @@ TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "A");
   bench.read(ids[0], "B");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "B");
-  EXPECT_FALSE(bench.tracker.wants_label(ids[0]));
   bench.read(ids[1], "B");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(1).code, "B");
+}
+
+TEST(TrackerTest, OneThatShowsTwoCodesHasNoneOfThem) {
+  Bench bench;
+  const auto code = [&] { return bench.tracker.beliefs(bench.now, 0).at(0).code; };
+  const auto disputed = [&] { return bench.tracker.beliefs(bench.now, 0).at(0).disputed; };
+  const auto seen = [&](double length_m) {
+    return bench.update({Bench::sighting(-0.8, 0, 0, {length_m, 0.15, 0.1})}).at(0);
+  };
+  const std::uint32_t id = seen(0.2);
+  bench.read(id, "A", {-0.06, 0});
+  EXPECT_EQ(code(), "A");
+  bench.read(id, "B", {0.06, 0});
+  EXPECT_EQ(code(), "") << "one after the other";
+  EXPECT_EQ(disputed(), (std::vector<std::string>{"A", "B"}));
+  bench.read(id, "B", {0.06, 0});
+  EXPECT_EQ(code(), "") << "that one was read more often says nothing";
+  for (int i = 0; i < 4; ++i) seen(0.12);
+  EXPECT_TRUE(disputed().empty()) << "it was two";
+  bench.read(id, "A");
+  EXPECT_EQ(code(), "A");
+  bench.tracker.labels_read(id, {"A", {-0.8, 0}}, {"C", {-0.6, 0}});
+  EXPECT_EQ(code(), "A") << "the other lies beside it";
+  bench.tracker.labels_read(id, {"A", {-0.83, 0}}, {"C", {-0.77, 0}});
+  EXPECT_EQ(disputed(), (std::vector<std::string>{"A", "C"}));
 }
 
 TEST(TrackerTest, WantsLabelsOfWhatCouldBeReadAndIsNotSure) {
@@ -212,18 +236,22 @@ TEST(TrackerTest, WantsLabelsOfWhatCouldBeReadAndIsNotSure) {
   EXPECT_FALSE(bench.tracker.wants_labels());
   seen(Bench::sighting(-0.5, 0));
   bench.read(id, "A");
+  EXPECT_TRUE(bench.tracker.wants_labels()) << "what was hidden may show another";
+  for (int i = 0; i < 2; ++i) bench.tracker.label_shown(id, true);
   EXPECT_FALSE(bench.tracker.wants_labels());
   bench.tracker.forget(id);
 
   const std::uint32_t blank = seen(Bench::sighting(0.2, 0));
   EXPECT_TRUE(bench.tracker.wants_labels());
-  for (int i = 0; i < 10; ++i) bench.tracker.label_attempt(blank);
+  for (int i = 0; i < 10; ++i) bench.tracker.label_shown(blank, true);
   EXPECT_FALSE(bench.tracker.wants_labels()) << "it lies with its label down";
   bench.tracker.forget(blank);
 
   const std::uint32_t two = seen(Bench::sighting(-0.3, 0, 0, {0.6, 0.15, 0.1}));
-  bench.read(two, "B");
-  bench.read(two, "B");
+  for (int i = 0; i < 2; ++i) {
+    bench.read(two, "B");
+    bench.tracker.label_shown(two, true);
+  }
   EXPECT_TRUE(bench.tracker.wants_labels()) << "no parcel is that long";
 }
 

@@ -268,9 +268,11 @@ void BridgeSide::let_ride(const ObjectBelief& object, Time now) {
   if (rode(object)) return;
   rode_tracks_.push_back(object.track);
   if (rode_tracks_.size() > kGoneRemembered) rode_tracks_.erase(rode_tracks_.begin());
-  rode_.push_back(object.code);
   const char* const reason = vitals_.lacks_room().empty() ? "the brain was silent" : "no room for tasks";
-  bridge_.note("ride", {{"track", object.track}, {"code", object.code}, {"reason", reason}}, now, object.code);
+  for (const std::string& code : object.disputed.empty() ? std::vector{object.code} : object.disputed) {
+    rode_.push_back(code);
+    bridge_.note("ride", {{"track", object.track}, {"code", code}, {"reason", reason}}, now, code);
+  }
 }
 
 // What the brain decided on.

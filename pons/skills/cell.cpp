@@ -225,6 +225,11 @@ const ObjectBelief* Cell::find(std::string_view code) const {
   return found == objects_.end() ? nullptr : &*found;
 }
 
+bool Cell::disputed(std::string_view code) const {
+  return std::ranges::any_of(
+      objects_, [&](const ObjectBelief& o) { return std::ranges::find(o.disputed, code) != o.disputed.end(); });
+}
+
 // By how much farther the belt gets within that time than at its present speed. It starts and stops along a ramp, which
 // ends at the speed that it may have at most, or at none.
 double Cell::gain_m(double ahead_s) const {

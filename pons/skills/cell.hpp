@@ -60,6 +60,8 @@ class Cell {
 
   // The belief with this label, or nullptr.
   [[nodiscard]] const ObjectBelief* find(std::string_view code) const;
+  // Whether something that shows two codes has this one among them.
+  [[nodiscard]] bool disputed(std::string_view code) const;
   [[nodiscard]] const std::vector<ObjectBelief>& objects() const { return objects_; }
   // Where that belief will be at `time`, carried on by the belt as it runs and changes speed now.
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;

@@ -179,6 +179,7 @@ class Pick final : public ArmSkill {
   }
 
   [[nodiscard]] Progress absent() const {
+    if (cell_.disputed(code_)) return {Status::kFailed, "it shows two codes", {}};
     const std::string* const place = cell_.strays->place_of(code_);
     if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
     return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
@@ -285,6 +286,8 @@ class Pick final : public ArmSkill {
       } else if (now - planned_ >= kReplanEvery) {
         replan(now, *object, moved_m);
       }
+    } else if (cell_.disputed(code_)) {
+      return give_up(now, "it shows two codes");
     }
     // On its last way down it may meet the parcel sooner than it seemed: that is no collision.
     if (now >= grasp_.hover) cell_.arm.expect_contact(kHandling_n);

@@ -1,14 +1,14 @@
 #include "pons/world/faults.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <ranges>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "pons/world/csv.hpp"
 #include "pons/world/yaml.hpp"
@@ -80,27 +80,33 @@ void multiply(FaultPlan& plan, double times, const YamlValue& where) {
   }
 }
 
-FaultPlan read_plan(const fs::path& file);
+using Plans = std::map<std::string, fs::path>;
 
-// The plan that another one multiplies lies beside it, and stands for itself.
-FaultPlan read_base(const YamlMap& map, const fs::path& file) {
+FaultPlan read_plan(const fs::path& file, const Plans& known);
+
+// The plan that another one multiplies lies beside it or is known by its name, and stands for itself.
+FaultPlan read_base(const YamlMap& map, const fs::path& file, const Plans& known) {
   const std::string base = map["base"].name();
-  const fs::path beside = file.parent_path() / (base + ".yaml");
+  fs::path found = file.parent_path() / (base + ".yaml");
   std::error_code code;
-  if (!fs::is_regular_file(beside, code))
-    map["base"].refuse(fmt::format("there is no plan '{}' beside this one", base), "name a file here, without .yaml");
-  if (read_yaml(beside).node()["base"].IsDefined())
+  if (!fs::is_regular_file(found, code)) {
+    const auto named = known.find(base);
+    if (named == known.end())
+      map["base"].refuse(fmt::format("there is no plan '{}'", base), "name a file beside this one, without .yaml");
+    found = named->second;
+  }
+  if (read_yaml(found).node()["base"].IsDefined())
     map["base"].refuse(fmt::format("'{}' has a base of its own", base), "name that one");
-  return read_plan(beside);
+  return read_plan(found, known);
 }
 
-FaultPlan read_plan(const fs::path& file) {
+FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlValue value = read_yaml(file);
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
                      kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name});
   FaultPlan plan;
-  if (map.has("base")) plan = read_base(map, file);
+  if (map.has("base")) plan = read_base(map, file, known);
   if (map.has("times")) {
     if (!map.has("base")) map["times"].refuse("multiplies nothing", "name a base, too");
     multiply(plan, map["times"].positive(kMostTimes), map["times"]);
@@ -112,14 +118,16 @@ FaultPlan read_plan(const fs::path& file) {
   return plan;
 }
 
-std::vector<std::string> plans_in(const fs::path& folder) {
-  std::vector<std::string> names{"none"};
-  std::error_code code;
-  for (fs::directory_iterator entry(folder, code), end; !code && entry != end; entry.increment(code)) {
-    if (entry->path().extension() == ".yaml") names.push_back(entry->path().stem().string());
+// By name: those that all worlds share, and the world's own, which go first.
+Plans plans_of(const World& world) {
+  Plans plans;
+  for (const fs::path& folder : {world.folder / "faults", world.folder.parent_path() / "faults"}) {
+    std::error_code code;
+    for (fs::directory_iterator entry(folder, code), end; !code && entry != end; entry.increment(code)) {
+      if (entry->path().extension() == ".yaml") plans.emplace(entry->path().stem().string(), entry->path());
+    }
   }
-  std::ranges::sort(names.begin() + 1, names.end());
-  return names;
+  return plans;
 }
 
 }  // namespace
@@ -132,17 +140,18 @@ bool FaultPlan::any() const {
 
 Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
   if (named == "none") return FaultPlan{};
-  const fs::path folder = world.folder / "faults";
-  const std::vector<std::string> names = plans_in(folder);
-  const bool known = std::ranges::find(names, named) != names.end();
-  const fs::path file = known ? folder / (named + ".yaml") : fs::path(named);
+  const Plans plans = plans_of(world);
+  const auto known = plans.find(named);
+  const fs::path file = known != plans.end() ? known->second : fs::path(named);
   std::error_code code;
   if (!fs::is_regular_file(file, code)) {
-    return fail(fmt::format("there is no plan '{}'", printable(named)), folder.string(),
-                fmt::format("the plans are {}; or name a file", fmt::join(names, ", ")));
+    std::string names = "none";
+    for (const std::string& other : std::views::keys(plans)) names += ", " + other;
+    return fail(fmt::format("there is no plan '{}'", printable(named)), (world.folder / "faults").string(),
+                fmt::format("the plans are {}; or name a file", names));
   }
   try {
-    return read_plan(file);
+    return read_plan(file, plans);
   } catch (LoadError& refused) {
     return std::unexpected(std::move(refused.error));
   }

@@ -1,5 +1,5 @@
 // What goes wrong on purpose in a simulated run: shares of picks, parcels and tasks, events an hour. Data like the
-// world, in worlds/NAME/faults/; docs/worlds.md has the keys.
+// world, in worlds/faults/ and worlds/NAME/faults/; docs/worlds.md has the keys.
 #pragma once
 
 #include <array>
@@ -54,8 +54,8 @@ struct FaultCounts {
   std::int64_t& operator[](Fault fault) { return of[static_cast<std::size_t>(fault)]; }
 };
 
-// `named` is "none", a plan of the world's folder faults/ by its name, or a file's path. Errors name file, line and key
-// as those of world.yaml; no such plan, with the names that exist.
+// `named` is "none", a plan by its name, of the world's folder faults/ or else of the one beside the worlds, or a
+// file's path. Errors name file, line and key as those of world.yaml; no such plan, with the names that exist.
 [[nodiscard]] Expected<FaultPlan> load_faults(const World& world, const std::string& named);
 
 // A stream of random numbers for one fault, so that none reshuffles another, nor anything else that the run draws.

@@ -101,6 +101,22 @@ TEST_F(FaultsTest, AnUnknownNameIsAnsweredWithThoseThereAre) {
   expect_says(plan.error().line(), {"hurricane", "none, robin, storm"});
 }
 
+TEST_F(FaultsTest, WorldsShareThePlansBesideThemAndAPlanOfTheirOwnGoesFirst) {
+  World world = world_;
+  world.folder = folder_.path() / "yard";
+  folder_.write("faults/rain.yaml", "drop: {a_pick: 0.1}\n");
+  folder_.write("faults/snow.yaml", "drop: {a_pick: 0.2}\n");
+  folder_.write("yard/faults/snow.yaml", "base: rain\ntimes: 5\n");
+  const auto shared = load_faults(world, "rain"), own = load_faults(world, "snow");
+  ASSERT_TRUE(shared) << shared.error().line();
+  EXPECT_DOUBLE_EQ((*shared)[Fault::kDrop].often, 0.1);
+  ASSERT_TRUE(own) << own.error().line();
+  EXPECT_DOUBLE_EQ((*own)[Fault::kDrop].often, 0.5);
+  const auto unknown = load_faults(world, "hail");
+  ASSERT_FALSE(unknown);
+  expect_says(unknown.error().line(), {"none, rain, snow"});
+}
+
 TEST(Spells, ComeAsOftenAndLastAsLongAsTheySay) {
   const FaultRate rate{.often = 60, .shortest_s = 2, .longest_s = 6};
   Spells spells(rate, Random(5));

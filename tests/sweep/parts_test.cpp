@@ -176,12 +176,12 @@ TEST(Plan, KnowsWhenWhatARunIsMadeOfHasChanged) {
   const std::string none = digest("none"), robin = digest("robin");
   EXPECT_NE(none, robin);
   EXPECT_EQ(digest("none"), none);
-  append("worlds/parcel_cell/faults/robin.yaml");
+  append("worlds/faults/robin.yaml");
   append("worlds/small_cell/world.yaml");
   EXPECT_EQ(digest("none"), none) << "nothing of its own has changed";
   EXPECT_EQ(digest("robin"), robin) << "a remark changes no fault";
-  const std::string text = read_text(folder / "worlds/parcel_cell/faults/robin.yaml");
-  write_text(folder / "worlds/parcel_cell/faults/robin.yaml",
+  const std::string text = read_text(folder / "worlds/faults/robin.yaml");
+  write_text(folder / "worlds/faults/robin.yaml",
              std::string(text).replace(text.find("a_pick: 0.0"), 11, "a_pick: 0.1"));
   EXPECT_EQ(digest("none"), none);
   EXPECT_NE(digest("robin"), robin);
