@@ -116,8 +116,6 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
 
   const auto order = orders_.find(belief.code);
   if (order == orders_.end()) return ride(belief, kRideUnknown, decisions);
-  // It may yet show another.
-  if (in_reach && !belief.settled && x_m < label_view_end_m_) return;
   Known& known = known_[belief.code];
   if (known.tries > 0 && !known.failed) {
     const bool live = std::ranges::find(all, known.track, &ObjectBelief::track) != all.end();

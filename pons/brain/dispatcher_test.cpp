@@ -43,7 +43,6 @@ ObjectBelief parcel(std::uint32_t track, double x_m, const std::string& code = "
   belief.frames_seen = 5;
   belief.confidence = 0.97;
   belief.code = code;
-  belief.settled = true;
   return belief;
 }
 
@@ -187,17 +186,6 @@ TEST_F(DispatcherTest, TwoParcelsWithOneCodeAreSortedOnce) {
   ASSERT_EQ(decisions.rides.size(), 1u);
   EXPECT_EQ(decisions.rides[0].track, 2u);
   EXPECT_EQ(decisions.rides[0].reason, kRideTwice);
-}
-
-TEST_F(DispatcherTest, IsAskedForOnceNoOtherCodeIsToBeExpectedOnIt) {
-  ObjectBelief one = parcel(1, 0, "P1");
-  one.settled = false;
-  EXPECT_TRUE(dispatcher_.observe({one}, at(0)).tasks.empty());
-  one.settled = true;
-  EXPECT_EQ(dispatcher_.observe({one}, at(1)).tasks.size(), 1u);
-  ObjectBelief passed = parcel(2, 0.6, "P3");
-  passed.settled = false;
-  EXPECT_EQ(dispatcher_.observe({passed}, at(1)).tasks.size(), 1u) << "no camera looks any more";
 }
 
 TEST_F(DispatcherTest, WhatShowsTwoCodesRidesUnderBothOfThem) {

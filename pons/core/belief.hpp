@@ -29,7 +29,6 @@ struct ObjectBelief {
   bool crowded = false;                    // touches, overlaps or leans on a neighbour
   std::string code;                        // label text, empty until read
   std::vector<std::string> disputed = {};  // both, of one that shows two; then `code` is empty
-  bool settled = false;                    // no other code is to be expected on it
   int label_attempts = 0;                  // frames good enough to read a label on it, readable or not
 };
 

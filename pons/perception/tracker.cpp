@@ -461,7 +461,6 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.crowded = track.crowded;
   belief.code = track.label.code();
   belief.disputed = track.label.disputed();
-  belief.settled = track.label.settled();
   belief.label_attempts = track.label.attempts();
   return belief;
 }

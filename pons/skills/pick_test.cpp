@@ -217,6 +217,30 @@ TEST_F(PickTest, WhatTurnsOutToBeTwoOnTheWayIsLetGoOf) {
   EXPECT_THAT(progress.reason, HasSubstr("P2"));
 }
 
+// Only one of its labels had been read when it was asked for.
+TEST_F(PickTest, WhatTurnsOutToShowTwoCodesIsLeftToTheBrain) {
+  ObjectBelief object = parcel(1, 0.1, 0, {0.2, 0.11, 0.11});
+  tick_with({object});
+  const auto skill = start("P1");
+  ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  object.code.clear();
+  object.disputed = {"P7", "P1"};
+  Progress progress;
+  for (int i = 0; i < 200 && progress.status == Status::kRunning; ++i) {
+    tick_with({object});
+    progress = skill->tick(now_);
+  }
+  EXPECT_EQ(progress.status, Status::kRetry);
+  EXPECT_THAT(progress.reason, HasSubstr("two codes"));
+  const auto again = start("P1");
+  for (progress = {}; progress.status == Status::kRunning;) {
+    tick_with({object});
+    progress = again->tick(now_);
+  }
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, HasSubstr("two codes"));
+}
+
 // Known to lie elsewhere only when it is too late for another way there.
 TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
   tick_with({parcel(1, 0.1, 0, {0.2, 0.11, 0.11})});
