@@ -22,10 +22,10 @@ constexpr double kCornerDepth = 4;   // cells
 constexpr double kGain = 0.045;
 constexpr double kLengthCost = 0.05;  // of a cut as long as the patch is wide
 constexpr double kPrintCost = 0.5;    // likewise, of one through print
-constexpr double kTold = 0.2;         // of the variance; what explains less may be shade along an edge,
-constexpr double kHinted = 0.03;      // and still less, noise,
-constexpr double kStep_m = 0.003;     // unless one side is higher
-constexpr double kLeastGain = 0.02;   // where it is known that there are two
+constexpr double kTold = 0.2;      // of the variance; what explains less may be shade along an edge or a label's paper,
+constexpr double kHinted = 0.03;   // and still less, noise,
+constexpr double kStep_m = 0.003;  // unless one side is higher
+constexpr double kLeastGain = 0.02;  // where it is known that there are two
 
 double squared(const cv::Vec3d& v) { return v.dot(v); }
 
@@ -194,7 +194,7 @@ std::optional<Line> Splitter::by_colour(const TopView& view, const std::vector<c
 
 std::optional<Line> Splitter::between(const TopView& view, const std::vector<cv::Point>& cells, const Labels& labels) {
   const auto told = between_colours(view, cells, labels);
-  if (told && told->explained >= kTold) return told->line;
+  if (told && told->explained >= kTold && told->sharp) return told->line;
   if (auto line = between_corners(cells, labels)) return line;
   if (told && told->explained >= kHinted && told->step_m >= kStep_m) return told->line;
   return std::nullopt;
@@ -226,7 +226,8 @@ std::optional<Splitter::Told> Splitter::between_colours(const TopView& view, con
     sum[side] += static_cast<double>(sample.colour[2]) / kGreyPerMillimetre;
     count[side] += 1;
   }
-  return Told{line, best.explained, 1e-3 * std::abs(sum[0] / count[0] - sum[1] / count[1])};
+  return Told{line, best.explained, best.contrast >= kContrast && sharp(best),
+              1e-3 * std::abs(sum[0] / count[0] - sum[1] / count[1])};
 }
 
 std::optional<Line> Splitter::between_corners(const std::vector<cv::Point>& cells, const Labels& labels) {

@@ -57,6 +57,7 @@ class Splitter {
   struct Told {
     Line line;
     double explained = 0;  // share of the variance
+    bool sharp = false;    // it jumps right at the line
     double step_m = 0;     // between the mean heights of both sides
   };
   [[nodiscard]] std::optional<Told> between_colours(const TopView& view, const std::vector<cv::Point>& cells,

@@ -86,6 +86,18 @@ TEST(SplitterTest, CutsBetweenTheLabelsOfTwoAlikeWhereTheirCornersAre) {
   EXPECT_EQ(line->beyond({52, 52}), line->beyond({145, 97}));
 }
 
+// Their paper differs much, and explains what varies; but nothing changes where one thing would end.
+TEST(SplitterTest, LeavesOneWholeWhoseLabelsDifferInPaper) {
+  Patch patch;
+  patch.fill({50, 50, 100, 50}, {150, 120, 90});
+  for (int row = 60; row < 84; ++row) {
+    for (int column = 54; column < 75; ++column) patch.view.colour(row, column) = {205, 175, 145};
+  }
+  Splitter splitter;
+  splitter.prepare(patch.view);
+  EXPECT_FALSE(splitter.between(patch.view, patch.cells, {{64, 72}, {138, 74}, 21}));
+}
+
 // Speckled, so that the little that one is higher explains little of the variance.
 TEST(SplitterTest, CutsFlushOnesWhereOneIsALittleHigher) {
   Patch patch;

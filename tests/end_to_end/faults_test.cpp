@@ -75,6 +75,15 @@ TEST(Faults, WhatNobodyAsksForIsNamedWhereItFell) {
   EXPECT_NE(run.said.find("of which the journal says that an unread one did"), std::string::npos) << run.said;
 }
 
+// In this run, one that is sorted by its neighbour's code leaves that one lost.
+TEST(Faults, WhatShowsTwoCodesIsSortedByNeither) {
+  const Faulty run = run_with("double_label: {a_parcel: 0.3}\n", 30, 6);
+  EXPECT_GE(run.injected("double_label"), 5);
+  const json reasons = run.report["parcels"]["exceptions"]["reasons"];
+  EXPECT_GE(reasons.value("shows two codes", json::object()).value("deserved", 0), 2) << run.said;
+  EXPECT_EQ(run.report["parcels"]["exceptions"].value("undeserved", 99), 0) << run.said;
+}
+
 TEST(Faults, ABeltThatJamsCostsTimeOnly) {
   const Faulty run = run_with("belt_jam: {an_hour: 300, lasts_s: [2, 6]}\n", 20, 1);
   EXPECT_GE(run.injected("belt_jam"), 1);
