@@ -161,9 +161,10 @@ void Perception::Impl::read_labels(const RgbdFrame& frame, const TopView& view, 
       continue;
     }
     // One object that shows two codes, or two objects taken for one, that the next frames may tell apart.
+    shared[read.code] = middle_m;
+    if (&*other < &read) continue;  // that pair has been told of
     const Vector3 other_m = other->middle_m - Vector3(belt_travel_m, 0, 0);
     tracker.labels_read(tracks[read.sighting], {read.code, middle_m.head<2>()}, {other->code, other_m.head<2>()});
-    shared[read.code] = middle_m;
   }
 }
 

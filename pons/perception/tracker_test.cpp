@@ -193,6 +193,8 @@ TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "A");
   bench.read(ids[0], "B");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "B");
+  for (int i = 0; i < 2; ++i) bench.tracker.label_shown(ids[0], true);
+  EXPECT_FALSE(bench.tracker.wants_label(ids[0]));
   bench.read(ids[1], "B");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(0).code, "");
   EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).at(1).code, "B");

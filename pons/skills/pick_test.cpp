@@ -233,7 +233,8 @@ TEST_F(PickTest, WhatTurnsOutToShowTwoCodesIsLeftToTheBrain) {
   EXPECT_EQ(progress.status, Status::kRetry);
   EXPECT_THAT(progress.reason, HasSubstr("two codes"));
   const auto again = start("P1");
-  for (progress = {}; progress.status == Status::kRunning;) {
+  progress = {};
+  for (int i = 0; i < 200 && progress.status == Status::kRunning; ++i) {
     tick_with({object});
     progress = again->tick(now_);
   }

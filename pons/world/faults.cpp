@@ -147,7 +147,8 @@ Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
   if (!fs::is_regular_file(file, code)) {
     std::string names = "none";
     for (const std::string& other : std::views::keys(plans)) names += ", " + other;
-    return fail(fmt::format("there is no plan '{}'", printable(named)), (world.folder / "faults").string(),
+    return fail(fmt::format("there is no plan '{}'", printable(named)),
+                (world.folder.parent_path() / "faults").string(),
                 fmt::format("the plans are {}; or name a file", names));
   }
   try {
