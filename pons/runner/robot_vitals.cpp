@@ -39,9 +39,7 @@ RobotVitals::RobotVitals(const world::Robot& robot, std::string name, OneOf one_
       health_(health) {}
 
 void RobotVitals::arm(const link::State& state, Resumes resumes, Time now) {
-  const auto tell = [&](Condition condition, const std::string& why) {
-    health_.tell(name_, condition, why, now);
-  };
+  const auto tell = [&](Condition condition, const std::string& why) { health_.tell(name_, condition, why, now); };
   if (resumes == Resumes::kByPerson) return tell(Condition::kBad, stopped(state) + "; a person resets and arms it");
   if (state.safety == SafetyState::kDisarmed) return tell(Condition::kGood, "");  // about to be armed
   if (state.safety != SafetyState::kOperational) return tell(Condition::kPoor, stopped(state));
@@ -59,13 +57,13 @@ void RobotVitals::measure_attempt(const link::State& state, Time now) {
   const double kpa = *std::ranges::max_element(state.cup_vacuum_kpa);
   if (!attempt_) attempt_ = Attempt{.began = now};
   attempt_->most_kpa = std::max(attempt_->most_kpa, kpa);
+  // Too few to lift by say something of the parcel; one is enough to show that the pump seals.
+  if (state.vacuum.sealed_cups > 0) attempt_->sealed = true, too_weak_ = 0;
   if (state.vacuum.phase != link::VacuumPhase::kSealed) {
     attempt_->sealed_since.reset();
     return;
   }
   if (!attempt_->sealed_since) attempt_->sealed_since = now;
-  attempt_->sealed = true;
-  too_weak_ = 0;
   if (now - *attempt_->sealed_since < kEvacuated) return;
   best_kpa_ = std::max(best_kpa_, kpa);
   grip_share_ = kpa >= kFullShare * best_kpa_ ? 1 : std::max(kpa / best_kpa_, kLeastShare);

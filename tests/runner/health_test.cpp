@@ -195,6 +195,23 @@ TEST_F(VitalsTest, ABeltThatStandsThoughItShallRunIsBadAfterAWhile) {
   EXPECT_EQ(fares("belt"), "good") << "it was told to wait";
 }
 
+// A parcel that only some of the cups lie on says nothing of the pump, however often it is tried.
+TEST_F(VitalsTest, AVacuumIsBadThatSealsNoCupAtAll) {
+  Time now;
+  const auto attempt = [&](int sealed_cups) {
+    state_.vacuum_on = 1;
+    state_.vacuum = {.phase = link::VacuumPhase::kBuilding, .sealed_cups = static_cast<std::uint8_t>(sealed_cups)};
+    state_.cup_vacuum_kpa[0] = (sealed_cups > 0 ? 1.1 : 0.7) * world_.robot.tool.sealed_kpa;
+    for (int i = 0; i < 30; ++i) (void)robot_.vacuum(state_, now += ms(10) - Time());
+    state_.vacuum_on = 0;
+    return robot_.vacuum(state_, now += ms(10) - Time()).lifts;
+  };
+  for (int i = 0; i < 8; ++i) EXPECT_TRUE(attempt(2));
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(attempt(0)) << "single ones leak";
+  EXPECT_FALSE(attempt(0));
+  EXPECT_EQ(fares("vacuum"), "bad: too weak to seal, 4 times in a row");
+}
+
 TEST_F(VitalsTest, ALoopIsHeldAgainstItsTicks) {
   robot_.loop(state_, ms(0));
   state_.tick = 995;
