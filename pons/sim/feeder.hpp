@@ -24,8 +24,6 @@ class BeltDrive {
   void stop() { wanted_ = 0; }
   // Sets the surface's speed for the coming step and counts the travel.
   void step(mjModel* model, int geom, Time now, double step_s);
-  // From rest, with the coming step.
-  [[nodiscard]] bool starts() const { return wanted_ > 0 && share_ == 0; }
   [[nodiscard]] double speed_m_s() const { return speed_m_s_; }
   [[nodiscard]] double travel_m() const { return travel_m_; }
 

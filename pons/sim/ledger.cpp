@@ -78,6 +78,11 @@ struct Ledger::Impl {
   void keep_apart(const Composed& cell, mjData* data, std::span<const ArmStep> arms);
 };
 
+bool is_over(const world::Belt& belt, const Vector3& at) {
+  return at.x() > belt.x_start_m && at.x() < belt.x_end_m && std::abs(at.y() - belt.y_center_m) < 0.5 * belt.width_m &&
+         at.z() > belt.surface_z_m;
+}
+
 Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const std::vector<Arrival>& arrivals)
     : impl_(std::make_unique<Impl>()) {
   impl_->world = world;
@@ -225,9 +230,7 @@ void Ledger::Impl::locate(Track& track, ParcelTruth& parcel, const Vector3& at, 
     if (around->kind == world::PlaceKind::kException) return set(Whereabouts::kException, around->name);
     return set(Whereabouts::kTray, around->name);
   }
-  const world::Belt& belt = world.belt;
-  const bool over_belt = at.x() > belt.x_start_m && at.x() < belt.x_end_m &&
-                         std::abs(at.y() - belt.y_center_m) < 0.5 * belt.width_m && at.z() > belt.surface_z_m;
+  const bool over_belt = is_over(world.belt, at);
   if (over_belt && belt_stands) track.moved = now;  // where it belongs, on a belt that does not move
   const bool stray = now - track.moved >= kStrayCleared || at.z() < 0.0;
   if (over_belt && !track.sinking && !stray) return set(Whereabouts::kBelt, name(Whereabouts::kBelt));

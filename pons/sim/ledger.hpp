@@ -27,6 +27,9 @@ struct ArmStep {
   const AxisVector& torque_nm;  // asked of the drives
 };
 
+// Whether the middle of something there is over the belt, however high.
+[[nodiscard]] bool is_over(const world::Belt& belt, const Vector3& at);
+
 class Ledger {
  public:
   Ledger(const world::World& world, const world::Manifest& manifest, const std::vector<Arrival>& arrivals);

@@ -169,6 +169,10 @@ void wake(mjData* data, const Slot& slot) {
   if (speed == 0) speed = kWake_m_s;
 }
 
+bool sleeps(const mjModel& model, const mjData& data, const Slot& slot) {
+  return data.tree_asleep[model.body_treeid[slot.body]] >= 0;
+}
+
 void park(mjModel* model, mjData* data, const Slot& slot, int index) {
   for (const int geom : {slot.main, slot.rim, slot.label, slot.second_label}) {
     if (geom < 0) continue;

@@ -19,6 +19,7 @@ void activate(mjModel* model, mjData* data, const Slot& slot, const world::Manif
 [[nodiscard]] bool room_for_two_labels(const world::ManifestRow& row, double label_m);
 // So that it feels what moves below it: the surface of a belt wakes nothing that sleeps on it.
 void wake(mjData* data, const Slot& slot);
+[[nodiscard]] bool sleeps(const mjModel& model, const mjData& data, const Slot& slot);
 
 // Far away, weightless, touching nothing; `index` is the slot's number.
 void park(mjModel* model, mjData* data, const Slot& slot, int index);

@@ -104,12 +104,13 @@ bool Cell::belt_may_run() const {
 
 void Cell::drive_belt() {
   belt_may_run() && !faults.belt_jams(stepped) ? belt.let_run() : belt.stop();
-  if (belt.starts()) {
-    for (int i = 0; i < kSlots; ++i) {
-      if (ledger.on_belt(i)) wake(data.get(), composed.slots[static_cast<std::size_t>(i)]);
-    }
-  }
   belt.step(composed.model.get(), composed.belt_geom, stepped, world.physics_step_s);
+  if (belt.speed_m_s() == 0) return;
+  for (int i = 0; i < kSlots; ++i) {
+    const Slot& slot = composed.slots[static_cast<std::size_t>(i)];
+    if (ledger.parcel_in(i) < 0 || !sleeps(*composed.model, *data, slot)) continue;
+    if (is_over(world.belt, Vector3::Map(data->qpos + slot.qpos))) wake(data.get(), slot);
+  }
 }
 
 void SimArm::hear(const body::SetPoints& told, Time at) PONS_NONBLOCKING {

@@ -75,6 +75,7 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
       model(robot.copy()),
       router(cell_world, robot.copy()),
       reach(cell_world, robot),
+      mouths(cell_world),
       view_end_m_(view_end_m(cell_world, 0)) {}
 
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen) {
@@ -106,10 +107,21 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   now_ = now;
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
-  strays->look(objects_, view_end_m_.value_or(world.belt.x_end_m));
+  watch_strays();
   recognise_left();
   take_in_cut();
   add_unseen();
+}
+
+void Cell::watch_strays() {
+  const double travel_m = arm.state().belt_travel_m;
+  for (const world::Place* const place : mouths.unexpected(falls(), now_)) {
+    if (place->kind == world::PlaceKind::kChute)
+      strays->fell(load_, place->name, now_);
+    else
+      strays->rode_off(travel_m);
+  }
+  strays->look(objects_, {travel_m, view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m});
 }
 
 // What the view's downstream border cuts: its track knows more, unless it was never in view as a whole.
@@ -169,12 +181,14 @@ void Cell::left_on_belt(const Pose& world_from_tip) {
   object.track = kFirstLeft + lefts_++;
   object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
+  strays->put_back(held->code);
   left_.push_back(object);
   objects_.push_back(object);
 }
 
 void Cell::lifted(const ObjectBelief& object) {
   forgotten_.push_back(object.track);
+  load_ = object.code;
   strays->taken(object.track);
   std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
 }

@@ -17,8 +17,10 @@
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
 #include "pons/skills/company.hpp"
+#include "pons/skills/mouths.hpp"
 #include "pons/skills/reach.hpp"
 #include "pons/skills/route.hpp"
+#include "pons/skills/strays.hpp"
 #include "pons/task/policy.hpp"
 #include "pons/task/skill.hpp"
 #include "pons/world/world.hpp"
@@ -27,9 +29,6 @@ namespace pons::skills {
 
 // What the tip may meet while cups press on a parcel, lift one whose mass is not known yet, or let go of one.
 inline constexpr double kHandling_n = 100;
-
-// How often something fell into each of the world's places, as their light curtains count it.
-using Falls = std::array<std::uint16_t, kMaxPlaces>;
 
 // The parcel on the cups.
 struct Held {
@@ -166,6 +165,7 @@ class Cell {
   model::RobotModel model;
   Router router;
   Reach reach;
+  Mouths mouths;
   std::optional<Held> held;
   std::optional<Miss> missed;
   std::optional<std::string> hooked;                            // the last code on which another was found to hang
@@ -181,6 +181,7 @@ class Cell {
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
   void recognise_left();
   void take_in_cut();
+  void watch_strays();
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
 
@@ -207,6 +208,7 @@ class Cell {
   };
   std::optional<Unseen> unseen_;
   std::vector<std::uint32_t> forgotten_;
+  std::string load_;  // that the cups took up last
   std::vector<task::Note> notes_;
 };
 

@@ -59,54 +59,5 @@ TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItBefore) {
   EXPECT_TRUE(hangs_beside(load_, beyond, Uneven::kUsual)) << "no parcel is";
 }
 
-TEST(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
-  Strays strays;
-  const auto at = [](double s) { return Time(from_s(s)); };
-  strays.let_go({{2, "B", {0.2, 0}}, {3, "C", {0, 0.2}}, {4, "", {0.2, 0.2}}}, "chute_1", at(10));
-  ObjectBelief coasting = box(2, "B", 0, 0), seen = box(3, "C", 0, 0);
-  coasting.last_seen = at(9.9);
-  seen.last_seen = at(10.1);
-  strays.look({coasting, seen}, 1);
-  ASSERT_NE(strays.place_of("B"), nullptr) << "seen last before it was lifted";
-  EXPECT_EQ(*strays.place_of("B"), "chute_1");
-  EXPECT_EQ(strays.place_of("C"), nullptr) << "it has stayed";
-  EXPECT_FALSE(strays.missed_twice("B")) << "a grasp may fail";
-  EXPECT_TRUE(strays.missed_twice("B"));
-  EXPECT_FALSE(strays.missed_twice("C") || strays.missed_twice("C"));
-  EXPECT_EQ(strays.place_of("D"), nullptr);
-  EXPECT_EQ(strays.place_of(""), nullptr);
-}
-
-// A track may be lost and found again under another number.
-TEST(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
-  Strays strays;
-  strays.let_go({{2, "B", {0, 0}}}, "chute_1", Time(from_s(10)));
-  strays.let_go({{7, "B", {0, 0}}}, "chute_2", Time(from_s(20)));
-  ASSERT_NE(strays.place_of("B"), nullptr);
-  EXPECT_EQ(*strays.place_of("B"), "chute_2");
-}
-
-// Whether anybody still asks for it or not.
-TEST(StraysTest, WhoIsBelievedNowhereAnyMoreHasGone) {
-  Strays strays;
-  const auto let_go = Time(from_s(10));
-  strays.let_go({{2, "B", {0, 0}}, {3, "", {0, 0}}, {4, "leaves", {0, 0}}, {5, "taken", {0, 0}}}, "chute_1", let_go);
-  const ObjectBelief b = box(2, "B", 0.5, 0), unread = box(3, "", 0.5, 0.3);
-  const ObjectBelief leaves = box(4, "leaves", 1.1, 0), taken = box(5, "taken", 0.5, -0.3);
-  strays.look({b, unread, leaves, taken}, 1);
-  EXPECT_TRUE(strays.take_found_gone().empty()) << "a camera may have been hidden from them";
-  strays.taken(5);
-  strays.look({unread}, 1);
-  const std::vector<Stray> first = strays.take_found_gone();
-  ASSERT_EQ(first.size(), 1U) << "one is beyond the view, one was picked by itself";
-  EXPECT_EQ(first[0].code, "B");
-  EXPECT_EQ(first[0].place, "chute_1");
-  strays.look({}, 1);
-  const std::vector<Stray> second = strays.take_found_gone();
-  ASSERT_EQ(second.size(), 1U) << "each once";
-  EXPECT_EQ(second[0].code, "");
-  ASSERT_NE(strays.place_of("B"), nullptr) << "its own task, if it comes, says so, too";
-}
-
 }  // namespace
 }  // namespace pons::skills

@@ -143,6 +143,8 @@ class Pick final : public ArmSkill {
     }
     seen_ = now;
     keep_in_reach(*object, now);
+    // What was put back with another on it is taken again from where it lies.
+    if (cell_.hooked == code_) cell_.hold_belt(now);
     const world::Belt& belt = cell_.world.belt;
     if (auto never = never_taken(cell_.world, *object)) return *std::move(never);
     if (must_look_again(*object, now)) {
@@ -275,6 +277,7 @@ class Pick final : public ArmSkill {
   }
 
   Progress approach(Time now) {
+    if (cell_.hooked == code_) cell_.hold_belt(now);
     if (const ObjectBelief* object = cell_.find(code_)) {
       keep_in_reach(*object, now);
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
@@ -365,6 +368,7 @@ class Pick final : public ArmSkill {
                       .load = load_of(target_, grasp_.orientation),
                       .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
                       .falls = cell_.falls()};
+    cell_.strays->lifted(code_, cell_.held->company, lift_end_);
     cell_.lost.reset();
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
@@ -378,6 +382,7 @@ class Pick final : public ArmSkill {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.holds_nothing();
+      cell_.strays->put_back(code_);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }

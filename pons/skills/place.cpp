@@ -224,7 +224,8 @@ class Place final : public ArmSkill {
     if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
     let_go_ = cell_.held->code;
-    cell_.strays->let_go(cell_.held->company, name_, now);
+    cell_.strays->let_go(cell_.held->code, name_, now);
+    cell_.mouths.expect_at(name_, now);
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
@@ -235,6 +236,7 @@ class Place final : public ArmSkill {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
     cell_.holds_nothing();
+    cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
     phase_ = Phase::kFall;
     return fall(now);
@@ -245,7 +247,7 @@ class Place final : public ArmSkill {
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
     if (const world::Place* const chute = cell_.fallen_since(fallen_.falls)) {
-      cell_.strays->let_go(fallen_.company, chute->name, now);
+      cell_.strays->let_go(fallen_.code, chute->name, now);
       if (chute->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
       detail["fell_into"] = chute->name;
       return {Status::kException, "fell into " + chute->name, std::move(detail)};

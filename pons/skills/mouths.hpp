@@ -1,0 +1,40 @@
+// What falls into the mouths of one arm's chutes, as their light curtains count it, and what of that nobody let go of.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/axes.hpp"
+#include "pons/core/time.hpp"
+#include "pons/world/world.hpp"
+
+namespace pons::skills {
+
+// How often something fell into each of the world's places.
+using Falls = std::array<std::uint16_t, kMaxPlaces>;
+
+// One thread.
+class Mouths {
+ public:
+  // `world` must outlive it.
+  explicit Mouths(const world::World& world) : world_(world) {}
+
+  // A load is let go of over that place, or has been lost on its way and may fall anywhere.
+  void expect_at(std::string_view place, Time now);
+  void expect_anywhere(Time now) { anywhere_ = now; }
+  // Each tick: the places into which something fell since the last one that was not expected, or rode.
+  [[nodiscard]] std::vector<const world::Place*> unexpected(const Falls& falls, Time now);
+
+ private:
+  [[nodiscard]] bool was_expected(std::size_t place, Time now);
+
+  const world::World& world_;
+  std::optional<Falls> last_;
+  std::array<std::optional<Time>, kMaxPlaces> expected_{};  // since when
+  std::optional<Time> anywhere_;
+};
+
+}  // namespace pons::skills

@@ -1,0 +1,55 @@
+#include "pons/skills/mouths.hpp"
+
+#include <gtest/gtest.h>
+
+namespace pons::skills {
+namespace {
+
+Time at(double s) { return Time(from_s(s)); }
+
+class MouthsTest : public testing::Test {
+ protected:
+  MouthsTest() {
+    world_.places = {{.name = "chute_1", .kind = world::PlaceKind::kChute},
+                     {.name = "chute_2", .kind = world::PlaceKind::kChute},
+                     {.name = "exception", .kind = world::PlaceKind::kException}};
+    EXPECT_TRUE(fallen(0).empty()) << "what fell before nobody asks";
+  }
+  std::vector<std::string> fallen(double s) {
+    std::vector<std::string> names;
+    for (const world::Place* const place : mouths_.unexpected(falls_, at(s))) names.push_back(place->name);
+    return names;
+  }
+  world::World world_;
+  Falls falls_{5, 65535, 2};
+  Mouths mouths_{world_};
+};
+
+using Names = std::vector<std::string>;
+
+TEST_F(MouthsTest, WhatWasLetGoOfIsExpectedOnce) {
+  mouths_.expect_at("chute_1", at(1));
+  ++falls_[0];
+  EXPECT_EQ(fallen(1.2), Names{});
+  ++falls_[0];
+  EXPECT_EQ(fallen(1.3), Names{"chute_1"}) << "another came along";
+  mouths_.expect_at("chute_1", at(2));
+  ++falls_[1];  // its count begins anew
+  EXPECT_EQ(fallen(2.2), Names{"chute_2"}) << "not where it was let go of";
+  falls_[0] += 2;
+  EXPECT_EQ(fallen(2.3), Names{"chute_1"}) << "one of the two";
+}
+
+TEST_F(MouthsTest, WhatIsLostOnItsWayMayFallAnywhereForAWhile) {
+  mouths_.expect_anywhere(at(1));
+  ++falls_[2];
+  EXPECT_EQ(fallen(1.1), Names{"exception"}) << "that rode there";
+  ++falls_[1];
+  EXPECT_EQ(fallen(1.2), Names{});
+  mouths_.expect_anywhere(at(3));
+  ++falls_[0];
+  EXPECT_EQ(fallen(5), Names{"chute_1"}) << "too late for it";
+}
+
+}  // namespace
+}  // namespace pons::skills

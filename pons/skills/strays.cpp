@@ -1,0 +1,122 @@
+#include "pons/skills/strays.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace pons::skills {
+namespace {
+
+constexpr std::size_t kRemembered = 64;  // of those who are gone
+constexpr Duration kTornOff = std::chrono::milliseconds(1200);  // it falls no later after the load was let go of
+// Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
+constexpr double kSooner_m = 0.05, kLater_m = 0.30;
+
+void forget_oldest(auto& list) {
+  if (list.size() > kRemembered) list.erase(list.begin(), list.end() - static_cast<std::ptrdiff_t>(kRemembered));
+}
+
+}  // namespace
+
+void Strays::lifted(const std::string& load, const Company& company, Time hangs) {
+  put_back(load);  // as somebody else may have, of whom nobody told
+  for (const Companion& companion : company) {
+    Doubted one;
+    one.track = companion.track;
+    one.load = load;
+    one.stray.code = companion.code;
+    one.since = hangs;
+    doubted_.push_back(std::move(one));
+  }
+  forget_oldest(doubted_);
+}
+
+void Strays::put_back(const std::string& load) {
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go; });
+}
+
+void Strays::let_go(const std::string& load, const std::string& place, Time now) {
+  std::vector<Doubted> own;
+  for (const Doubted& one : doubted_)
+    if (one.load == load && !one.let_go) own.push_back(one);
+  put_back(load);
+  for (Doubted& one : own) {
+    // Who may have gone with an earlier one has gone with the last.
+    std::erase_if(doubted_, [&](const Doubted& earlier) {
+      return earlier.track == one.track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
+    });
+    one.let_go = now;
+    if (!one.torn_off) one.stray.place = place;
+    if (one.gone) found_gone_.push_back(one.stray);
+    doubted_.push_back(std::move(one));
+  }
+}
+
+void Strays::fell(const std::string& load, const std::string& place, Time now) {
+  for (Doubted& one : doubted_) {
+    if (one.load != load) continue;
+    if (one.gone && one.let_go) continue;  // that has been told
+    if (one.let_go && now > *one.let_go + kTornOff) continue;
+    one.stray.place = place;
+    one.torn_off = true;
+  }
+}
+
+void Strays::rode_off(double travel_m) {
+  rode_off_.push_back(travel_m);
+  forget_oldest(rode_off_);
+}
+
+void Strays::taken(std::uint32_t track) {
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.track == track; });
+}
+
+void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) {
+  if (doubted_.empty()) return;
+  for (const ObjectBelief& object : objects) {
+    std::erase_if(doubted_, [&](const Doubted& one) {
+      const bool same = one.track == object.track || (!one.stray.code.empty() && one.stray.code == object.code);
+      return same && object.last_seen > one.since;
+    });
+  }
+  for (Doubted& one : doubted_) {
+    const auto object = std::ranges::find(objects, one.track, &ObjectBelief::track);
+    const bool believed = object != objects.end();
+    if (believed) {
+      one.at_m = object->world_from_top.translation().x();
+      one.half_m = 0.5 * object->size_m.head<2>().norm();
+      one.ends_m = belt.travel_m + belt.end_m - *one.at_m;
+      if (one.stray.code.empty()) one.stray.code = object->code;
+    }
+    if (one.gone || !has_gone(one, believed, belt)) continue;
+    one.gone = true;
+    if (one.let_go) found_gone_.push_back(one.stray);
+  }
+}
+
+bool Strays::has_gone(const Doubted& one, bool believed, const BeltAt& belt) const {
+  if (!one.at_m) return false;
+  if (!believed && *one.at_m < belt.view_end_m) return true;
+  if (belt.travel_m < one.ends_m + kLater_m) return false;
+  return std::ranges::none_of(rode_off_, [&](double travel_m) {
+    return travel_m > one.ends_m - one.half_m - kSooner_m && travel_m < one.ends_m + kLater_m;
+  });
+}
+
+const Strays::Doubted* Strays::of(const std::string& code) const {
+  if (code.empty()) return nullptr;
+  const auto found = std::ranges::find_if(
+      doubted_, [&](const Doubted& one) { return one.let_go && one.stray.code == code; });
+  return found == doubted_.end() ? nullptr : &*found;
+}
+
+bool Strays::missed_twice(const std::string& code) {
+  const Doubted* const found = of(code);
+  return found != nullptr && std::exchange(doubted_[static_cast<std::size_t>(found - doubted_.data())].missed, true);
+}
+
+const std::string* Strays::place_of(const std::string& code) const {
+  const Doubted* const found = of(code);
+  return found == nullptr ? nullptr : &found->stray.place;
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,73 @@
+// Who may lie in a chute that was not theirs, because it came along with another unfelt: as far as cameras, the light
+// curtains in the mouths and the belt's encoder tell.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/core/time.hpp"
+#include "pons/skills/company.hpp"
+
+namespace pons::skills {
+
+struct Stray {
+  std::string code;  // empty: nobody has read it
+  std::string place;
+};
+
+// How far the belt has come, and where along it, world frame, it is seen and ends.
+struct BeltAt {
+  double travel_m = 0, view_end_m = 0, end_m = 0;
+};
+
+// Of all arms of a belt. Loads are told apart by their codes. One thread.
+class Strays {
+ public:
+  // A load with that company hangs free on the cups from then on.
+  void lifted(const std::string& load, const Company& company, Time hangs);
+  // It lies on the belt again, and who came along, too.
+  void put_back(const std::string& load);
+  // It was let go of, or fell, into that place.
+  void let_go(const std::string& load, const std::string& place, Time now);
+  // Something fell into that place over which nothing was let go of: that load was on the cups last, and it was torn off.
+  void fell(const std::string& load, const std::string& place, Time now);
+  // Something rode off the belt's end.
+  void rode_off(double travel_m);
+  // Each tick's beliefs: whoever is seen has stayed. Who is believed to lie nowhere any more, and was to be seen, or
+  // should have ridden off the belt's end and did not, has gone.
+  void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt);
+  // It was taken off the belt by itself.
+  void taken(std::uint32_t track);
+  // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
+  [[nodiscard]] const std::string* place_of(const std::string& code) const;
+  // The cups met nothing where it should lie. True once they have before, with no camera's having seen it meanwhile.
+  [[nodiscard]] bool missed_twice(const std::string& code);
+  // Those found gone since the last call.
+  [[nodiscard]] std::vector<Stray> take_found_gone() { return std::exchange(found_gone_, {}); }
+
+ private:
+  struct Doubted {
+    std::uint32_t track = 0;
+    std::string load;            // with which it may have come along
+    Stray stray;                 // the place is empty as long as that hangs on the cups
+    Time since;                  // it hangs
+    std::optional<Time> let_go;  // of the load
+    bool torn_off = false;       // where it fell a light curtain has told
+    // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
+    std::optional<double> at_m = {};
+    double half_m = 0, ends_m = 0;
+    bool missed = false, gone = false;
+  };
+  [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
+  [[nodiscard]] bool has_gone(const Doubted& one, bool believed, const BeltAt& belt) const;
+
+  std::vector<Doubted> doubted_;
+  std::vector<Stray> found_gone_;
+  std::vector<double> rode_off_;  // the belt's travel each time
+};
+
+}  // namespace pons::skills

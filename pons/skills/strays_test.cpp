@@ -1,0 +1,136 @@
+#include "pons/skills/strays.hpp"
+
+#include <gtest/gtest.h>
+
+namespace pons::skills {
+namespace {
+
+constexpr double kViewEnd_m = 0.2, kEnd_m = 1.0;
+
+Time at(double s) { return Time(from_s(s)); }
+
+class StraysTest : public testing::Test {
+ protected:
+  // At `x_m` along the belt, seen last at `seen_s`.
+  static ObjectBelief box(std::uint32_t track, const char* code, double x_m, double seen_s = 9) {
+    ObjectBelief object;
+    object.track = track;
+    object.code = code;
+    object.size_m = {0.2, 0.1, 0.1};
+    object.world_from_top.translation() = Vector3(x_m, 0, 1.0);
+    object.last_seen = at(seen_s);
+    return object;
+  }
+  void look(const std::vector<ObjectBelief>& objects, double travel_m = 0) {
+    strays_.look(objects, {travel_m, kViewEnd_m, kEnd_m});
+  }
+  // Takes up a load with B beside it at 10 s, and lets go of it over chute_1 at 11 s.
+  void carry(const Company& company = {{2, "B", {0.2, 0}}}) {
+    strays_.lifted("A", company, at(10));
+    strays_.let_go("A", "chute_1", at(11));
+  }
+  [[nodiscard]] std::string place_of(const char* code) const {
+    const std::string* const place = strays_.place_of(code);
+    return place == nullptr ? "" : *place;
+  }
+  Strays strays_;
+};
+
+TEST_F(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
+  carry({{2, "B", {0.2, 0}}, {3, "C", {0, 0.2}}, {4, "", {0.2, 0.2}}});
+  look({box(2, "B", 0, 9.9), box(3, "C", 0, 10.1)});
+  EXPECT_EQ(place_of("B"), "chute_1") << "seen last before the load hung free";
+  EXPECT_EQ(place_of("C"), "") << "it has stayed";
+  EXPECT_FALSE(strays_.missed_twice("B")) << "a grasp may fail";
+  EXPECT_TRUE(strays_.missed_twice("B"));
+  EXPECT_FALSE(strays_.missed_twice("C") || strays_.missed_twice("C"));
+  EXPECT_EQ(place_of("D"), "");
+  EXPECT_EQ(place_of(""), "");
+}
+
+// A track may be lost and found again under another number.
+TEST_F(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
+  carry();
+  strays_.lifted("X", {{7, "B", {0, 0}}}, at(20));
+  EXPECT_EQ(place_of("B"), "chute_1");
+  strays_.let_go("X", "chute_2", at(21));
+  EXPECT_EQ(place_of("B"), "chute_2");
+}
+
+TEST_F(StraysTest, WhatIsPutBackTookNobodyAnywhere) {
+  strays_.lifted("A", {{2, "B", {0.2, 0}}}, at(10));
+  look({box(2, "B", 0)});
+  strays_.put_back("A");
+  look({});
+  strays_.let_go("A", "chute_1", at(11));
+  EXPECT_EQ(place_of("B"), "");
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+}
+
+// Whether anybody still asks for it or not.
+TEST_F(StraysTest, WhoIsBelievedNowhereAnyMoreHasGone) {
+  carry({{2, "B", {0, 0}}, {3, "", {0, 0}}, {4, "rides", {0, 0}}, {5, "taken", {0, 0}}});
+  look({box(2, "B", 0.1), box(3, "", 0.1), box(4, "rides", 0.3), box(5, "taken", 0.1)});
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "a camera may have been hidden from them";
+  strays_.taken(5);
+  look({box(3, "", 0.1)});
+  const std::vector<Stray> first = strays_.take_found_gone();
+  ASSERT_EQ(first.size(), 1U) << "one is beyond the view, one was picked by itself";
+  EXPECT_EQ(first[0].code, "B");
+  EXPECT_EQ(first[0].place, "chute_1");
+  look({});
+  const std::vector<Stray> second = strays_.take_found_gone();
+  ASSERT_EQ(second.size(), 1U) << "each once";
+  EXPECT_EQ(second[0].code, "");
+  EXPECT_EQ(place_of("B"), "chute_1") << "its own task, if it comes, says so, too";
+}
+
+// A camera may show the bare belt, and a label be read, before the load is let go of.
+TEST_F(StraysTest, WhoIsFoundGoneWhileTheLoadIsCarriedIsNamedWhenItIsLetGoOf) {
+  strays_.lifted("A", {{2, "", {0.2, 0}}}, at(10));
+  look({box(2, "B", 0)});
+  look({});
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "nobody knows where to yet";
+  EXPECT_EQ(place_of("B"), "");
+  strays_.let_go("A", "chute_1", at(11));
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "B");
+  EXPECT_EQ(gone[0].place, "chute_1");
+}
+
+// Torn off, it falls where it may; the light curtain there tells.
+TEST_F(StraysTest, WhoIsTornOffFellWhereACurtainTells) {
+  strays_.lifted("A", {{2, "B", {0.2, 0}}}, at(10));
+  look({box(2, "B", 0)});
+  strays_.fell("A", "chute_7", at(10.5));
+  strays_.let_go("A", "chute_1", at(11));
+  EXPECT_EQ(place_of("B"), "chute_7");
+  look({});
+  ASSERT_EQ(strays_.take_found_gone().size(), 1U);
+
+  strays_.lifted("X", {{3, "C", {0.2, 0}}}, at(20));
+  strays_.let_go("X", "chute_2", at(21));
+  strays_.fell("another arm's", "chute_5", at(21.2));
+  EXPECT_EQ(place_of("C"), "chute_2");
+  strays_.fell("X", "chute_3", at(21.5));
+  EXPECT_EQ(place_of("C"), "chute_3") << "off the rim";
+  strays_.fell("X", "chute_4", at(23));
+  EXPECT_EQ(place_of("C"), "chute_3") << "too late for it";
+}
+
+// Out of the cameras' view what should have ridden off and did not is not on the belt any more.
+TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
+  carry({{2, "B", {0, 0}}, {3, "C", {0, 0}}});
+  look({box(2, "B", 0.4), box(3, "C", 0.7)}, 5.0);  // at the end at a travel of 5.6 and 5.3 m
+  strays_.rode_off(5.35);
+  look({}, 5.85);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "one rode off, one may be late";
+  look({}, 5.95);
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "B");
+}
+
+}  // namespace
+}  // namespace pons::skills
