@@ -208,9 +208,10 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   const auto earlier = body_in(**opened);
   if (!earlier) return std::unexpected(earlier.error());
   const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
-  const bool taken_up = options.body && *earlier == body;
+  const bool taken_up = options.comes != BridgeOptions::Comes::kFirst && options.body && *earlier == body;
   if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
-    return fail(options.body ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
+    const bool may_follow = options.body && options.comes != BridgeOptions::Comes::kFirst;
+    return fail(may_follow ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
                 "name another file for --journal, or move this one away");
   }
   journal = std::move(*opened);
@@ -218,6 +219,8 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   if (auto noted = journal->note(Time{}, kAttached, {{"body", body}}); !noted) return noted;
   return journal->commit();
 }
+
+void BridgeHalf::kill(std::unique_ptr<BridgeHalf> half) { half->journal->abandon(); }
 
 std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
   std::vector<runner::SkillPort> ports;
@@ -260,30 +263,73 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
 
 // ---- both ----
 
+Meeting Assembly::meeting() {
+  std::vector<link::Link*> ends;
+  for (const auto& link : links) ends.push_back(link.get());
+  return {std::move(ends), darkroom.frames, darkroom.pages, darkroom.memory(), options_.pace};
+}
+
 Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
                                                     const AssemblyOptions& options) {
-  std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
-  std::vector<link::Link*> links;
-  for (std::size_t i = 0; i < self->world.arms().size(); ++i)
-    links.push_back(self->links.emplace_back(std::make_unique<link::Link>()).get());
-  const Meeting meeting{std::move(links), self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(),
-                        options.pace};
-  auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
+  std::unique_ptr<Assembly> self(new Assembly(std::move(world), manifest, options));
+  for (std::size_t i = 0; i < self->world.arms().size(); ++i) self->links.push_back(std::make_unique<link::Link>());
+  auto body = BodyHalf::build(self->world, manifest, options.body, self->meeting());
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above =
-      BridgeHalf::build(self->world, manifest,
-                        {options.journal, options.socket, std::nullopt, options.recovery, options.keep_free}, meeting);
-  if (!above) return std::unexpected(above.error());
-  self->above = std::move(*above);
-  const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];
-  if (stalls.often > 0)
-    self->above->bridge_side->stall_brain({stalls, world::fault_stream(options.body.seed, world::Fault::kBrainStall)});
+  const auto spells = [&](world::Fault fault) {
+    return world::Spells(options.body.faults[fault], world::fault_stream(options.body.seed, fault));
+  };
+  if (options.body.faults[world::Fault::kBrainStall].often > 0) self->stalls_ = spells(world::Fault::kBrainStall);
+  // By the clock, who wants that has two processes and kills one.
+  if (options.pace == runner::Pace::kLockstep && options.body.faults[world::Fault::kBridgeCrash].often > 0) {
+    if (options.journal == ":memory:")
+      return fail("a journal in memory dies with its bridge", "bridge_crash", "name a file for the journal");
+    self->crashes_.emplace(
+        spells(world::Fault::kBridgeCrash), [cell = self.get()] { cell->kill_above(); },
+        [cell = self.get()](Time now) { return cell->replace_above(now); });
+  }
+  if (auto built = self->build_above(BridgeOptions::Comes::kFirst); !built) return std::unexpected(built.error());
   return self;
 }
 
+Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
+  BridgeOptions bridge{.journal = options_.journal,
+                       .socket = options_.socket,
+                       .recovery = options_.recovery,
+                       .keep_free = options_.keep_free,
+                       .comes = comes};
+  // Equal runs write equal journals.
+  if (crashes_) bridge.body = options_.body.seed;
+  auto built = BridgeHalf::build(world, manifest_, bridge, meeting());
+  if (!built) return std::unexpected(built.error());
+  above = std::move(*built);
+  if (stalls_) above->bridge_side->stall_brain(*stalls_);
+  return {};
+}
+
+void Assembly::kill_above() {
+  account_ = above->bridge_side->account();
+  BridgeHalf::kill(std::move(above));
+}
+
+// As `pons bridge` does it.
+Expected<runner::Crashes::Above> Assembly::replace_above(Time now) {
+  if (auto built = build_above(BridgeOptions::Comes::kFirstOrLater); !built) return std::unexpected(built.error());
+  above->bridge_side->begin_with(account_, now);
+  if (auto taken = above->bridge_side->take_over(*above->journal, now); !taken) return std::unexpected(taken.error());
+  return runner::Crashes::Above{above->bridge_side.get(), above->observer.get()};
+}
+
+void Assembly::count_injected(world::FaultCounts& counts) const {
+  if (stalls_) counts[world::Fault::kBrainStall] = stalls_->begun();
+  if (crashes_) counts[world::Fault::kBridgeCrash] = crashes_->count();
+}
+
 runner::Parts Assembly::parts() {
-  return {.body = body->parts(), .bridge_side = above->bridge_side.get(), .observer = above->observer.get()};
+  return {.body = body->parts(),
+          .bridge_side = above->bridge_side.get(),
+          .observer = above->observer.get(),
+          .crashes = crashes_ ? &*crashes_ : nullptr};
 }
 
 }  // namespace pons::apps

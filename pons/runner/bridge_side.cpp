@@ -38,6 +38,7 @@ BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
+  decided_ = brain_heard_ = now;  // nobody was there to hear it
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
@@ -61,7 +62,9 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
     robot->arming.take_over(now, armed_before);
     robot->skills.restore(robot->carried);
   }
-  return bridge_.recover(first().resume, now);
+  std::vector<bridge::Resume> resumes;
+  for (const auto& robot : robots_) resumes.push_back(robot->skills.resume);
+  return bridge_.recover(resumes, now);
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {
@@ -160,6 +163,20 @@ std::int64_t BridgeSide::interventions() const {
   std::int64_t interventions = 0;
   for (const auto& robot : robots_) interventions += robot->arming.interventions();
   return interventions;
+}
+
+BridgeSide::Account BridgeSide::account() const {
+  Account account{.retries = retries()};
+  for (const auto& robot : robots_)
+    account.interventions.push_back({robot->arming.interventions(), robot->arming.needs_person()});
+  for (const auto& [part, health] : health_.parts()) account.alerts[part] = health.alerts;
+  return account;
+}
+
+void BridgeSide::begin_with(const Account& before, Time now) {
+  retries_before_ = before.retries;
+  for (std::size_t i = 0; i < robots_.size(); ++i) robots_[i]->arming.begin_with(before.interventions[i]);
+  health_.begin_with(before.alerts, now);
 }
 
 void BridgeSide::look_after_parts(Time now) {

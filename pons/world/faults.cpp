@@ -35,7 +35,8 @@ constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick},
                                             {"blackout", Unit::kHour},
                                             {"shifted_view", Unit::kHour},
                                             {"brain_stall", Unit::kHour},
-                                            {"vacuum_weak", Unit::kHour}}};
+                                            {"vacuum_weak", Unit::kHour},
+                                            {"bridge_crash", Unit::kHour}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;
@@ -102,9 +103,10 @@ FaultPlan read_base(const YamlMap& map, const fs::path& file, const Plans& known
 
 FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlValue value = read_yaml(file);
-  const YamlMap map(value, {},
-                    {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
-                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name});
+  const YamlMap map(
+      value, {},
+      {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name, kKinds[5].name,
+       kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name, kKinds[11].name});
   FaultPlan plan;
   if (map.has("base")) plan = read_base(map, file, known);
   if (map.has("times")) {

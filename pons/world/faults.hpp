@@ -27,8 +27,9 @@ enum class Fault : std::uint8_t {
   kShiftedView,  // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
   kBrainStall,   // an hour: the brain is silent
   kVacuumWeak,   // an hour: the pump gives only a share of its vacuum, to all cups
+  kBridgeCrash,  // an hour: the bridge is killed; lasts until the next one is there
 };
-inline constexpr std::size_t kFaults = 11;
+inline constexpr std::size_t kFaults = 12;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 

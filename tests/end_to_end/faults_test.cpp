@@ -115,6 +115,16 @@ TEST(Faults, NothingRidesByWhileTheBrainIsSilent) {
   EXPECT_EQ(run.report["parcels"]["exceptions"]["undeserved"], 0) << run.said;
 }
 
+// As `kill -9` would: each next bridge goes on from the journal, with what hangs on the cups.
+TEST(Faults, ABridgeThatIsKilledCostsTimeOnly) {
+  const Faulty run = run_with("bridge_crash: {an_hour: 240, lasts_s: [0.3, 3]}\n", 30, 2);
+  EXPECT_GE(run.injected("bridge_crash"), 4);
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 3) << run.said;
+  EXPECT_GE(run.report["parcels"]["sorted"], 24) << run.said;
+}
+
 // All of them at once, and the same again by the same seed.
 TEST(Faults, AStormOfOneSeedIsOneResult) {
   const Folder folder;
