@@ -144,7 +144,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   for (std::size_t i = 1; i < self->arms.size(); ++i) self->bridge->add_robot(self->arms[i]->registry);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
-  self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
+  brain::Brain& brain = self->add_brain(world, manifest, options);
 
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
                                                       meeting.pixels, meeting.pace);
@@ -159,7 +159,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     half->policies->attend(half->cell().stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_ports(), world,
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
   if (socket) {
@@ -194,6 +194,21 @@ Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& me
     }
   }
   return {};
+}
+
+brain::Brain& BridgeHalf::add_brain(const world::World& world, const world::Manifest& manifest,
+                                    const BridgeOptions& options) {
+  dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
+  brain::Brain* brain = dispatcher.get();
+  if (options.network != nullptr) {
+    far_brain = std::make_unique<brain::FarBrain>(*brain, *options.network);
+    brain = far_brain.get();
+  }
+  if (options.lies != nullptr) {
+    liar = std::make_unique<brain::Liar>(*brain, *options.lies, world);
+    brain = liar.get();
+  }
+  return *brain;
 }
 
 bool BridgeHalf::holds_something() const {
@@ -279,9 +294,15 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   const auto spells = [&](world::Fault fault) {
     return world::Spells(options.body.faults[fault], world::fault_stream(options.body.seed, fault));
   };
-  if (options.body.faults[world::Fault::kBrainStall].often > 0) self->stalls_ = spells(world::Fault::kBrainStall);
+  const world::FaultPlan& plan = options.body.faults;
+  const auto stream = [&](world::Fault fault) { return world::fault_stream(options.body.seed, fault).fork(1); };
+  if (plan[world::Fault::kBrainStall].often > 0) self->stalls_ = spells(world::Fault::kBrainStall);
+  if (plan[world::Fault::kBrainLie].often > 0)
+    self->lies_.emplace(plan[world::Fault::kBrainLie], stream(world::Fault::kBrainLie));
+  if (plan[world::Fault::kNetworkLoss].often > 0)
+    self->network_.emplace(spells(world::Fault::kNetworkLoss), stream(world::Fault::kNetworkLoss));
   // By the clock, who wants that has two processes and kills one.
-  if (options.pace == runner::Pace::kLockstep && options.body.faults[world::Fault::kBridgeCrash].often > 0) {
+  if (options.pace == runner::Pace::kLockstep && plan[world::Fault::kBridgeCrash].often > 0) {
     if (options.journal == ":memory:")
       return fail("a journal in memory dies with its bridge", "bridge_crash", "name a file for the journal");
     self->crashes_.emplace(
@@ -297,7 +318,9 @@ Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
                        .socket = options_.socket,
                        .recovery = options_.recovery,
                        .keep_free = options_.keep_free,
-                       .comes = comes};
+                       .comes = comes,
+                       .lies = lies_ ? &*lies_ : nullptr,
+                       .network = network_ ? &*network_ : nullptr};
   // Equal runs write equal journals.
   if (crashes_) bridge.body = options_.body.seed;
   auto built = BridgeHalf::build(world, manifest_, bridge, meeting());
@@ -313,15 +336,17 @@ void Assembly::kill_above() {
 }
 
 // As `pons bridge` does it.
-Expected<runner::Crashes::Above> Assembly::replace_above(Time now) {
+Expected<runner::Above> Assembly::replace_above(Time now) {
   if (auto built = build_above(BridgeOptions::Comes::kFirstOrLater); !built) return std::unexpected(built.error());
   above->bridge_side->begin_with(account_, now);
   if (auto taken = above->bridge_side->take_over(*above->journal, now); !taken) return std::unexpected(taken.error());
-  return runner::Crashes::Above{above->bridge_side.get(), above->observer.get()};
+  return runner::Above{above->bridge_side.get(), above->observer.get()};
 }
 
 void Assembly::count_injected(world::FaultCounts& counts) const {
   if (stalls_) counts[world::Fault::kBrainStall] = stalls_->begun();
+  if (lies_) counts[world::Fault::kBrainLie] = lies_->count();
+  if (network_) counts[world::Fault::kNetworkLoss] = network_->spells();
   if (crashes_) counts[world::Fault::kBridgeCrash] = crashes_->count();
 }
 

@@ -13,6 +13,8 @@
 
 #include "apps/desk.hpp"
 #include "pons/brain/dispatcher.hpp"
+#include "pons/brain/far_brain.hpp"
+#include "pons/brain/liar.hpp"
 #include "pons/brain/policy_runner.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/cerebellum/cerebellum.hpp"
@@ -89,6 +91,8 @@ struct BridgeOptions {
   std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
   enum class Comes : std::uint8_t { kFirst, kFirstOrLater };
   Comes comes = Comes::kFirstOrLater;  // to its body; the first takes up no journal
+  brain::Lies* lies = nullptr;         // a fault of the brain's; it outlives bridge and brain
+  brain::Network* network = nullptr;   // likewise, between the two
 };
 
 class BridgeHalf {
@@ -122,6 +126,8 @@ class BridgeHalf {
   std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
+  std::unique_ptr<brain::FarBrain> far_brain;  // only where the network between them fails
+  std::unique_ptr<brain::Liar> liar;           // only where it lies
   std::unique_ptr<brain::Inference> inference;
   std::unique_ptr<brain::PolicyRunner> policies;
   std::unique_ptr<runner::Observer> observer;
@@ -132,6 +138,9 @@ class BridgeHalf {
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
+  // As the bridge hears it.
+  [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,
+                                        const BridgeOptions& options);
 };
 
 struct AssemblyOptions {
@@ -166,11 +175,13 @@ class Assembly {
   [[nodiscard]] Meeting meeting();
   [[nodiscard]] Expected<void> build_above(BridgeOptions::Comes comes);
   void kill_above();
-  [[nodiscard]] Expected<runner::Crashes::Above> replace_above(Time now);
+  [[nodiscard]] Expected<runner::Above> replace_above(Time now);
 
   const world::Manifest manifest_;
   const AssemblyOptions options_;
   std::optional<world::Spells> stalls_;  // of the brain
+  std::optional<brain::Lies> lies_;
+  std::optional<brain::Network> network_;
   std::optional<runner::Crashes> crashes_;
   runner::BridgeSide::Account account_;  // of the bridges that were killed
 };

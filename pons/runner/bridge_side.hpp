@@ -76,6 +76,8 @@ class BridgeSide {
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  [[nodiscard]] brain::Decisions hear_brain(const std::vector<ObjectBelief>& objects, Time now);
+  void submit_all(const brain::Decisions& decisions, const std::vector<ObjectBelief>& objects, Time now);
   // Likewise, while nothing is decided.
   bool fall_back(const std::vector<ObjectBelief>& objects, Time now);
   void let_ride(const ObjectBelief& object, Time now);

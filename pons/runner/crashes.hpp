@@ -16,12 +16,14 @@
 
 namespace pons::runner {
 
+// What of a new bridge the run calls.
+struct Above {
+  BridgeSide* bridge_side = nullptr;
+  Observer* observer = nullptr;
+};
+
 class Crashes {
  public:
-  struct Above {
-    BridgeSide* bridge_side = nullptr;
-    Observer* observer = nullptr;
-  };
   // `kill`: nothing above the link exists any more, and nothing of it said goodbye. `replace`: a new bridge stands on
   // the same journal and link, and has taken over.
   Crashes(const world::Spells& spells, std::function<void()> kill, std::function<Expected<Above>(Time)> replace)

@@ -28,8 +28,10 @@ enum class Fault : std::uint8_t {
   kBrainStall,   // an hour: the brain is silent
   kVacuumWeak,   // an hour: the pump gives only a share of its vacuum, to all cups
   kBridgeCrash,  // an hour: the bridge is killed; lasts until the next one is there
+  kBrainLie,     // an hour, a moment each: the brain asks for something wrong beside its work
+  kNetworkLoss,  // an hour: between brain and bridge messages are lost, late, and come twice
 };
-inline constexpr std::size_t kFaults = 12;
+inline constexpr std::size_t kFaults = 14;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 
