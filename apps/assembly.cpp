@@ -144,7 +144,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   for (std::size_t i = 1; i < self->arms.size(); ++i) self->bridge->add_robot(self->arms[i]->registry);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
-  self->dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
+  brain::Brain& brain = self->add_brain(world, manifest, options);
 
   self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
                                                       meeting.pixels, meeting.pace);
@@ -159,7 +159,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     half->policies->attend(half->cell().stream, now);
     if (half->desk) half->desk->attend(now);
   };
-  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, *self->dispatcher, self->skill_ports(), world,
+  self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
   if (socket) {
@@ -196,6 +196,21 @@ Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& me
   return {};
 }
 
+brain::Brain& BridgeHalf::add_brain(const world::World& world, const world::Manifest& manifest,
+                                    const BridgeOptions& options) {
+  dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
+  brain::Brain* brain = dispatcher.get();
+  if (options.network != nullptr) {
+    far_brain = std::make_unique<brain::FarBrain>(*brain, *options.network);
+    brain = far_brain.get();
+  }
+  if (options.lies != nullptr) {
+    liar = std::make_unique<brain::Liar>(*brain, *options.lies, world);
+    brain = liar.get();
+  }
+  return *brain;
+}
+
 bool BridgeHalf::holds_something() const {
   return std::ranges::any_of(arms, [](const auto& arm) { return arm->cell.held.has_value(); });
 }
@@ -208,9 +223,10 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   const auto earlier = body_in(**opened);
   if (!earlier) return std::unexpected(earlier.error());
   const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
-  const bool taken_up = options.body && *earlier == body;
+  const bool taken_up = options.comes != BridgeOptions::Comes::kFirst && options.body && *earlier == body;
   if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
-    return fail(options.body ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
+    const bool may_follow = options.body && options.comes != BridgeOptions::Comes::kFirst;
+    return fail(may_follow ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
                 "name another file for --journal, or move this one away");
   }
   journal = std::move(*opened);
@@ -218,6 +234,8 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   if (auto noted = journal->note(Time{}, kAttached, {{"body", body}}); !noted) return noted;
   return journal->commit();
 }
+
+void BridgeHalf::kill(std::unique_ptr<BridgeHalf> half) { half->journal->abandon(); }
 
 std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
   std::vector<runner::SkillPort> ports;
@@ -260,30 +278,83 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
 
 // ---- both ----
 
+Meeting Assembly::meeting() {
+  std::vector<link::Link*> ends;
+  for (const auto& link : links) ends.push_back(link.get());
+  return {std::move(ends), darkroom.frames, darkroom.pages, darkroom.memory(), options_.pace};
+}
+
 Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const world::Manifest& manifest,
                                                     const AssemblyOptions& options) {
-  std::unique_ptr<Assembly> self(new Assembly(std::move(world)));
-  std::vector<link::Link*> links;
-  for (std::size_t i = 0; i < self->world.arms().size(); ++i)
-    links.push_back(self->links.emplace_back(std::make_unique<link::Link>()).get());
-  const Meeting meeting{std::move(links), self->darkroom.frames, self->darkroom.pages, self->darkroom.memory(),
-                        options.pace};
-  auto body = BodyHalf::build(self->world, manifest, options.body, meeting);
+  std::unique_ptr<Assembly> self(new Assembly(std::move(world), manifest, options));
+  for (std::size_t i = 0; i < self->world.arms().size(); ++i) self->links.push_back(std::make_unique<link::Link>());
+  auto body = BodyHalf::build(self->world, manifest, options.body, self->meeting());
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  auto above =
-      BridgeHalf::build(self->world, manifest,
-                        {options.journal, options.socket, std::nullopt, options.recovery, options.keep_free}, meeting);
-  if (!above) return std::unexpected(above.error());
-  self->above = std::move(*above);
-  const world::FaultRate& stalls = options.body.faults[world::Fault::kBrainStall];
-  if (stalls.often > 0)
-    self->above->bridge_side->stall_brain({stalls, world::fault_stream(options.body.seed, world::Fault::kBrainStall)});
+  const auto spells = [&](world::Fault fault) {
+    return world::Spells(options.body.faults[fault], world::fault_stream(options.body.seed, fault));
+  };
+  const world::FaultPlan& plan = options.body.faults;
+  const auto stream = [&](world::Fault fault) { return world::fault_stream(options.body.seed, fault).fork(1); };
+  if (plan[world::Fault::kBrainStall].often > 0) self->stalls_ = spells(world::Fault::kBrainStall);
+  if (plan[world::Fault::kBrainLie].often > 0)
+    self->lies_.emplace(plan[world::Fault::kBrainLie], stream(world::Fault::kBrainLie));
+  if (plan[world::Fault::kNetworkLoss].often > 0)
+    self->network_.emplace(spells(world::Fault::kNetworkLoss), stream(world::Fault::kNetworkLoss));
+  // By the clock, who wants that has two processes and kills one.
+  if (options.pace == runner::Pace::kLockstep && plan[world::Fault::kBridgeCrash].often > 0) {
+    if (options.journal == ":memory:")
+      return fail("a journal in memory dies with its bridge", "bridge_crash", "name a file for the journal");
+    self->crashes_.emplace(
+        spells(world::Fault::kBridgeCrash), [cell = self.get()] { cell->kill_above(); },
+        [cell = self.get()](Time now) { return cell->replace_above(now); });
+  }
+  if (auto built = self->build_above(BridgeOptions::Comes::kFirst); !built) return std::unexpected(built.error());
   return self;
 }
 
+Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
+  BridgeOptions bridge{.journal = options_.journal,
+                       .socket = options_.socket,
+                       .recovery = options_.recovery,
+                       .keep_free = options_.keep_free,
+                       .comes = comes,
+                       .lies = lies_ ? &*lies_ : nullptr,
+                       .network = network_ ? &*network_ : nullptr};
+  // Equal runs write equal journals.
+  if (crashes_) bridge.body = options_.body.seed;
+  auto built = BridgeHalf::build(world, manifest_, bridge, meeting());
+  if (!built) return std::unexpected(built.error());
+  above = std::move(*built);
+  if (stalls_) above->bridge_side->stall_brain(*stalls_);
+  return {};
+}
+
+void Assembly::kill_above() {
+  account_ = above->bridge_side->account();
+  BridgeHalf::kill(std::move(above));
+}
+
+// As `pons bridge` does it.
+Expected<runner::Above> Assembly::replace_above(Time now) {
+  if (auto built = build_above(BridgeOptions::Comes::kFirstOrLater); !built) return std::unexpected(built.error());
+  above->bridge_side->begin_with(account_, now);
+  if (auto taken = above->bridge_side->take_over(*above->journal, now); !taken) return std::unexpected(taken.error());
+  return runner::Above{above->bridge_side.get(), above->observer.get()};
+}
+
+void Assembly::count_injected(world::FaultCounts& counts) const {
+  if (stalls_) counts[world::Fault::kBrainStall] = stalls_->begun();
+  if (lies_) counts[world::Fault::kBrainLie] = lies_->count();
+  if (network_) counts[world::Fault::kNetworkLoss] = network_->spells();
+  if (crashes_) counts[world::Fault::kBridgeCrash] = crashes_->count();
+}
+
 runner::Parts Assembly::parts() {
-  return {.body = body->parts(), .bridge_side = above->bridge_side.get(), .observer = above->observer.get()};
+  return {.body = body->parts(),
+          .bridge_side = above->bridge_side.get(),
+          .observer = above->observer.get(),
+          .crashes = crashes_ ? &*crashes_ : nullptr};
 }
 
 }  // namespace pons::apps

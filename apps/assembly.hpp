@@ -13,6 +13,8 @@
 
 #include "apps/desk.hpp"
 #include "pons/brain/dispatcher.hpp"
+#include "pons/brain/far_brain.hpp"
+#include "pons/brain/liar.hpp"
 #include "pons/brain/policy_runner.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/cerebellum/cerebellum.hpp"
@@ -21,6 +23,7 @@
 #include "pons/link/link.hpp"
 #include "pons/perception/perception.hpp"
 #include "pons/runner/bridge_side.hpp"
+#include "pons/runner/crashes.hpp"
 #include "pons/runner/darkroom.hpp"
 #include "pons/runner/helper.hpp"
 #include "pons/runner/lockstep.hpp"
@@ -86,6 +89,10 @@ struct BridgeOptions {
   std::optional<std::uint64_t> body;
   runner::Recovery recovery = runner::Recovery::kRefused;
   std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
+  enum class Comes : std::uint8_t { kFirst, kFirstOrLater };
+  Comes comes = Comes::kFirstOrLater;  // to its body; the first takes up no journal
+  brain::Lies* lies = nullptr;         // a fault of the brain's; it outlives bridge and brain
+  brain::Network* network = nullptr;   // likewise, between the two
 };
 
 class BridgeHalf {
@@ -110,6 +117,8 @@ class BridgeHalf {
   [[nodiscard]] skills::Cell& cell() { return arms.front()->cell; }
   // Whether any arm has something on its cups.
   [[nodiscard]] bool holds_something() const;
+  // Goes as a killed process does: what its journal has not made durable is lost.
+  static void kill(std::unique_ptr<BridgeHalf> half);
 
   std::unique_ptr<bridge::Journal> journal;
   runner::Helper helper;  // perception's
@@ -117,6 +126,8 @@ class BridgeHalf {
   std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
+  std::unique_ptr<brain::FarBrain> far_brain;  // only where the network between them fails
+  std::unique_ptr<brain::Liar> liar;           // only where it lies
   std::unique_ptr<brain::Inference> inference;
   std::unique_ptr<brain::PolicyRunner> policies;
   std::unique_ptr<runner::Observer> observer;
@@ -127,6 +138,9 @@ class BridgeHalf {
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
+  // As the bridge hears it.
+  [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,
+                                        const BridgeOptions& options);
 };
 
 struct AssemblyOptions {
@@ -141,20 +155,35 @@ struct AssemblyOptions {
 // Both halves in this process.
 class Assembly {
  public:
-  // Errors: those of the halves.
+  // Errors: those of the halves; a bridge that is to be killed with a journal in memory.
   [[nodiscard]] static Expected<std::unique_ptr<Assembly>> build(world::World world, const world::Manifest& manifest,
                                                                  const AssemblyOptions& options);
 
   [[nodiscard]] runner::Parts parts();
+  // Of those faults that strike above the link, how often each was injected; the body's simulation counts the others.
+  void count_injected(world::FaultCounts& counts) const;
 
   world::World world;
   std::vector<std::unique_ptr<link::Link>> links;
   runner::Darkroom darkroom{world};
   std::unique_ptr<BodyHalf> body;
-  std::unique_ptr<BridgeHalf> above;
+  std::unique_ptr<BridgeHalf> above;  // another one after each crash
 
  private:
-  explicit Assembly(world::World w) : world(std::move(w)) {}
+  Assembly(world::World w, world::Manifest manifest, AssemblyOptions options)
+      : world(std::move(w)), manifest_(std::move(manifest)), options_(std::move(options)) {}
+  [[nodiscard]] Meeting meeting();
+  [[nodiscard]] Expected<void> build_above(BridgeOptions::Comes comes);
+  void kill_above();
+  [[nodiscard]] Expected<runner::Above> replace_above(Time now);
+
+  const world::Manifest manifest_;
+  const AssemblyOptions options_;
+  std::optional<world::Spells> stalls_;  // of the brain
+  std::optional<brain::Lies> lies_;
+  std::optional<brain::Network> network_;
+  std::optional<runner::Crashes> crashes_;
+  runner::BridgeSide::Account account_;  // of the bridges that were killed
 };
 
 // What becomes of a task that a bridge which is no more had begun, of whose steps so many were done.

@@ -92,10 +92,12 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
   progress.finish();
   if (!result) return bad_run(result.error());
 
+  runner::BridgeSide& bridge_side = *cell.above->bridge_side;
+  world::FaultCounts injected;
+  cell.count_injected(injected);
   const auto reckoning = reckon(cell.world, *cell.body, *cell.above->journal,
-                                {options.parcels.seed, *result, cell.above->bridge_side->last_outcome(),
-                                 cell.above->bridge->retries(), wall_s, cell.above->bridge_side->brain_stalls(),
-                                 cell.above->bridge_side->interventions(), &cell.above->bridge_side->health()});
+                                {options.parcels.seed, *result, bridge_side.last_outcome(), bridge_side.retries(),
+                                 wall_s, injected, bridge_side.interventions(), &bridge_side.health()});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());

@@ -58,8 +58,8 @@ std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) 
 std::vector<std::pair<std::string, std::int64_t>> injected(const BodyHalf& body, const RunFigures& figures) {
   std::vector<std::pair<std::string, std::int64_t>> faults;
   world::FaultCounts counts = body.simulation->faults();
-  counts[world::Fault::kBrainStall] = figures.brain_stalls;
   for (std::size_t i = 0; i < world::kFaults; ++i) {
+    counts.of[i] += figures.injected.of[i];
     if (body.faults.rates[i].often > 0) faults.emplace_back(world::name(static_cast<world::Fault>(i)), counts.of[i]);
   }
   return faults;

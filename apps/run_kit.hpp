@@ -117,7 +117,7 @@ struct RunFigures {
   Time last_outcome;  // of a task that the brain asked for
   std::int64_t retries = 0;
   double wall_s = 0;
-  std::int64_t brain_stalls = 0;
+  world::FaultCounts injected = {};  // above the link
   std::optional<std::int64_t> interventions = std::nullopt;
   const runner::Health* health = nullptr;
 };

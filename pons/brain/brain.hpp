@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "pons/core/belief.hpp"
+#include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
+#include "pons/task/json_value.hpp"
 #include "pons/task/task.hpp"
 
 namespace pons::brain {
@@ -25,10 +27,17 @@ struct Ride {
 };
 
 struct Decisions {
-  std::vector<Json> tasks;  // to submit, in this order; an id comes once in a brain's life
+  std::vector<Json> tasks;  // to submit, in this order; from an honest brain an id comes once in its life
   std::vector<Ride> rides;
   bool belt_waits = false;  // what is asked for would ride past the pick zone
+  bool silent = false;      // nothing came from it in this period; what is here was on its way for longer
 };
+
+// What a task is part of, or else its id.
+[[nodiscard]] inline std::string code_of(const Json& task) {
+  std::string order = task::text_of(task, "order");
+  return order.empty() ? task::text_of(task, "id") : order;
+}
 
 class Brain {
  public:
@@ -39,8 +48,14 @@ class Brain {
                                           const std::set<std::string>& set_aside) = 0;
   // Before observe(): what rides past there, along the belt, no robot that works takes any more.
   virtual void taken_until(double /*x_m*/) {}
-  // The outcome of a task that it asked for; kFailed also for one that was refused. False: another's, ignored.
+  // The outcome of a task that it asked for. False: another's, ignored.
   virtual bool heard(std::string_view id, task::Outcome outcome) = 0;
+  // The bridge has taken a task of its decisions; also one that it has had already.
+  virtual void taken(const Json& /*task*/) {}
+  // Or it has not, and what it is about rides by unless it is asked for again. False: that means nothing to the brain.
+  virtual bool refused(const Json& task, const Error& /*why*/) {
+    return heard(task::text_of(task, "id"), task::Outcome::kFailed);
+  }
   // What an earlier one asked for in this run, and what became of it, in that order, before the first observe():
   // nothing when it is still open. Tasks that no brain asked for are passed over.
   virtual void recall(const task::Task& task, std::optional<task::Outcome> outcome) = 0;

@@ -72,7 +72,7 @@ void Bridge::enqueue(const Open& open) {
 
 // ---- after another bridge ----
 
-Expected<void> Bridge::recover(const Resume& resume, Time now) {
+Expected<void> Bridge::recover(std::span<const Resume> resumes, Time now) {
   const auto tasks = journal_.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const TaskRecord& record : *tasks) {
@@ -85,7 +85,7 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
     }
     // What was taken before the world had these rules was taken.
     (void)review_.contradictions().claim(record.task, Review::uses(record.task, program->get()));
-    if (auto taken = take_up(record, *std::move(program), resume, now); !taken) {
+    if (auto taken = take_up(record, *std::move(program), resumes, now); !taken) {
       return taken;
     }
   }
@@ -93,7 +93,7 @@ Expected<void> Bridge::recover(const Resume& resume, Time now) {
 }
 
 Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
-                               const Resume& resume, Time now) {
+                               std::span<const Resume> resumes, Time now) {
   const auto events = journal_.history(record.task.id);
   if (!events) return std::unexpected(events.error());
   Story story;
@@ -120,11 +120,14 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
     asked = *std::move(judged);
     std::erase_if(asked, [&](const Leave& leave) { return story.allowed().contains(Open::key(leave)); });
   }
+  const std::size_t robot = robot_named(story.robot());
+  const Resume& resume = resumes[std::min(robot, resumes.size() - 1)];
   if (begun && program) return go_on_in_tree(record, std::move(program), story, resume, now);
   if (begun && !story.handed_over()) return go_on(record, story, resume, now);
   if (begun) keep(journal_.event(record.task.id, now, kResumedEvent, {{"step", story.done()}}));
   Open& open = add_open(record.task, std::move(program), record.accepted, record.sequence);
   open.begun = begun;
+  if (begun) keep_to(open, robot);
   open.done = story.done();
   open.allowed = story.allowed();
   open.paused = story.paused();
@@ -155,6 +158,7 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
   }
   keep(journal_.event(task.id, now, kResumedEvent, {{"step", what.done}}));
   Open& open = add_open(task, nullptr, record.accepted, record.sequence);
+  keep_to(open, robot_named(story.robot()));
   open.done = what.done;
   open.begun = true;
   open.allowed = story.allowed();

@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -87,8 +88,10 @@ class Bridge {
   [[nodiscard]] Expected<std::vector<Admission>> submit_all(std::string_view json, Time now);
   // Takes up what the journal's last owner left open, before the first tick. Tasks not begun wait again; of those
   // begun, `resume` says which go on, with the first step that is not known to have succeeded and before all others,
-  // and which end, and how. Error: the journal cannot be read or written.
-  [[nodiscard]] Expected<void> recover(const Resume& resume, Time now);
+  // and which end, and how. A task that was begun stays with its robot. Error: the journal cannot be read or written.
+  [[nodiscard]] Expected<void> recover(const Resume& resume, Time now) { return recover(std::span(&resume, 1), now); }
+  // Likewise; of each robot, in their order, how it looks at the world.
+  [[nodiscard]] Expected<void> recover(std::span<const Resume> resumes, Time now);
   void tick(Time now);
 
   // The verbs that a sender has. What comes of them the task's events and its outcome say, with what was measured:
@@ -188,6 +191,8 @@ class Bridge {
                                                     std::shared_ptr<const tree::Program> program);
   void enqueue(const Open& open);
   // robots.cpp
+  [[nodiscard]] std::size_t robot_named(std::string_view name) const;  // the first, where there is none of that name
+  void keep_to(Open& open, std::size_t robot) const;
   [[nodiscard]] std::vector<std::size_t> robots_for(const task::Task& task, const tree::Program* program) const;
   [[nodiscard]] std::vector<std::string> resources_for(const task::Task& task, const tree::Program* program,
                                                        std::size_t robot) const;
@@ -201,7 +206,7 @@ class Bridge {
   void unpark(Open& open, Time now);
   [[nodiscard]] Expected<Open*> find_open(std::string_view id);
   [[nodiscard]] Expected<void> take_up(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
-                                       const Resume& resume, Time now);
+                                       std::span<const Resume> resumes, Time now);
   [[nodiscard]] Expected<void> go_on(const TaskRecord& record, const Story& story, const Resume& resume, Time now);
   [[nodiscard]] Expected<void> go_on_in_tree(const TaskRecord& record, std::shared_ptr<const tree::Program> program,
                                              const Story& story, const Resume& resume, Time now);

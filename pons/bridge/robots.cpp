@@ -71,6 +71,19 @@ std::vector<std::string> Bridge::resources_for(const task::Task& task, const tre
   return resources;
 }
 
+std::size_t Bridge::robot_named(std::string_view name) const {
+  const auto robot = std::ranges::find(robots_, name, &Robot::name);
+  return robot == robots_.end() ? 0 : static_cast<std::size_t>(robot - robots_.begin());
+}
+
+// Of one that an earlier bridge has begun: what it has begun with hangs there, or lies before that one.
+void Bridge::keep_to(Open& open, std::size_t robot) const {
+  if (std::ranges::find(open.robots, robot) == open.robots.end()) return;  // the world has changed
+  open.robots = {robot};
+  open.robot = robot;
+  open.resources = resources_for(open.task, open.program.get(), robot);
+}
+
 // The first one's the review has seen to be there.
 std::vector<std::size_t> Bridge::robots_for(const task::Task& task, const tree::Program* program) const {
   std::vector<std::size_t> robots{0};

@@ -25,6 +25,9 @@ class Robots : public testing::Test {
       type.chance = [this, robot](const Json&) { return chance_[robot]; };
       skills_[robot].add(type);
     }
+    open();
+  }
+  void open() {
     bridge_.emplace(*journal_, skills_[0], world_);
     bridge_->add_robot(skills_[1]);
   }
@@ -134,6 +137,34 @@ TEST_F(Robots, ABegunTaskStaysWhereItIsAndItsTimeStands) {
   EXPECT_GT(actors_[0].log.ticks, before);
   EXPECT_TRUE(actors_[1].log.started.empty());
   EXPECT_EQ(actors_[0].log.cancels, 0);
+}
+
+// What it has begun with may hang on that one's cups.
+TEST_F(Robots, ABegunTaskStaysWhereItIsAlsoForTheNextBridge) {
+  submit("a");
+  submit("b");
+  tick(5);
+  ASSERT_EQ(robot_of("b"), "arm_2");
+  open();
+  std::array<std::vector<std::string>, 2> asked;
+  const auto look = [&](std::size_t robot) -> Resume {
+    return [&, robot](const task::Task& task, std::size_t done) {
+      asked[robot].push_back(task.id);
+      return Resumption{.done = done};
+    };
+  };
+  const std::array resumes{look(0), look(1)};
+  ASSERT_TRUE(bridge_->recover(resumes, now_));
+  EXPECT_EQ(asked[0], std::vector<std::string>{"a"});
+  EXPECT_EQ(asked[1], std::vector<std::string>{"b"});
+  bridge_->hold(Bridge::Hold::kOn, 1);
+  tick(2);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"a"}) << "b waits for the second, free as the first may be";
+  tick(60);
+  EXPECT_FALSE(recorded("b"));
+  bridge_->hold(Bridge::Hold::kOff, 1);
+  tick(60);
+  EXPECT_EQ(recorded("b")->outcome, task::Outcome::kSucceeded);
 }
 
 TEST_F(Robots, WhatWaitsForTheZoneOfOneThatIsGoneKeepsNothingFromOthers) {

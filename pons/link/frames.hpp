@@ -36,6 +36,8 @@ class Frames {
   // ---- the body's side: one thread opens, one hands over ----
 
   [[nodiscard]] bool is_free(std::size_t camera) const { return holder(camera) == Holder::kNobody; }
+  // Its frame is not developed yet.
+  [[nodiscard]] bool in_the_dark(std::size_t camera) const { return holder(camera) == Holder::kBody; }
   // The place must be free.
   void open(std::size_t camera, const Shot& shot);
   // Its frame is developed.

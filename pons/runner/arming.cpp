@@ -123,7 +123,7 @@ Expected<void> Arming::bring_in(Time now) {
 }
 
 void Arming::need_person() {
-  if (!std::exchange(needs_person_, true)) ++interventions_;
+  if (!std::exchange(needs_person_, true) && !std::exchange(counted_, false)) ++interventions_;
 }
 
 // From a stop at rest.
@@ -207,7 +207,7 @@ Expected<void> Arming::arm(Time now) {
                 is_stopped(state) ? "reset it first: pons robot reset" : "only a disarmed arm is armed");
   }
   note_person(kArm, now);
-  needs_person_ = false;
+  needs_person_ = counted_ = false;
   return {};
 }
 

@@ -51,6 +51,12 @@ class Arming {
   [[nodiscard]] std::int64_t stops() const { return stops_; }
   // Times the arm came to need a person: by a cause that only one may reset, or by one's own word.
   [[nodiscard]] std::int64_t interventions() const { return interventions_; }
+  // For the report, before take_over(): so many there were before this bridge came, and whether the last one lasts.
+  struct Interventions {
+    std::int64_t count = 0;
+    bool lasts = false;
+  };
+  void begin_with(const Interventions& before) { interventions_ = before.count, counted_ = before.lasts; }
 
  private:
   void need_person();
@@ -77,6 +83,7 @@ class Arming {
   std::uint32_t zones_occupied_ = 0, zones_entered_ = 0;
   std::int64_t stops_ = 0, interventions_ = 0;
   bool needs_person_ = false;  // to reset and to arm
+  bool counted_ = false;       // that it does, by a bridge that is no more
   bool was_operational_ = false;
   bool took_over_ = false;  // and the arm has not settled since
   bool yielding_ = false;   // it still moves as it was told before

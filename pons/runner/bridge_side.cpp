@@ -38,6 +38,7 @@ BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
+  decided_ = brain_heard_ = now;  // nobody was there to hear it
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
@@ -61,7 +62,9 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
     robot->arming.take_over(now, armed_before);
     robot->skills.restore(robot->carried);
   }
-  return bridge_.recover(first().resume, now);
+  std::vector<bridge::Resume> resumes;
+  for (const auto& robot : robots_) resumes.push_back(robot->skills.resume);
+  return bridge_.recover(resumes, now);
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {
@@ -162,6 +165,20 @@ std::int64_t BridgeSide::interventions() const {
   return interventions;
 }
 
+BridgeSide::Account BridgeSide::account() const {
+  Account account{.retries = retries()};
+  for (const auto& robot : robots_)
+    account.interventions.push_back({robot->arming.interventions(), robot->arming.needs_person()});
+  for (const auto& [part, health] : health_.parts()) account.alerts[part] = health.alerts;
+  return account;
+}
+
+void BridgeSide::begin_with(const Account& before, Time now) {
+  retries_before_ = before.retries;
+  for (std::size_t i = 0; i < robots_.size(); ++i) robots_[i]->arming.begin_with(before.interventions[i]);
+  health_.begin_with(before.alerts, now);
+}
+
 void BridgeSide::look_after_parts(Time now) {
   vitals_.eyes(seen_, seen_behind_, now);
   for (const auto& robot : robots_) {
@@ -210,35 +227,48 @@ std::optional<double> BridgeSide::taken_until_m() const {
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
-  const bool silent = stalls_ && stalls_->on(now);
-  if (!silent) brain_heard_ = now;
-  vitals_.brain(brain_heard_, now);
+  const bool stalled = stalls_ != nullptr && stalls_->on(now);
   // A brain that says nothing asks for nothing, nor is it asked for what there is no room for.
-  if (silent || !vitals_.lacks_room().empty()) return fall_back(objects, now);
+  std::optional<brain::Decisions> decisions;
+  if (!stalled && vitals_.lacks_room().empty()) decisions = hear_brain(objects, now);
+  if (!stalled && !(decisions && decisions->silent)) brain_heard_ = now;
+  vitals_.brain(brain_heard_, now);
+  if (!decisions) return fall_back(objects, now);
+  submit_all(*decisions, objects, now);
+  if (decisions->silent) return fall_back(objects, now);
   decided_ = now;
   if (std::exchange(falls_back_, false)) bridge_.note("fallback", {{"decides", "brain"}}, now);
+  brain_holds_belt_ = decisions->belt_waits;
+  return decisions->belt_waits;
+}
+
+brain::Decisions BridgeSide::hear_brain(const std::vector<ObjectBelief>& objects, Time now) {
   tell_brain_what_rode();
   if (const auto until_m = taken_until_m()) brain_.taken_until(*until_m);
   std::vector<ObjectBelief> undecided = objects;
   std::erase_if(undecided, [&](const ObjectBelief& object) { return rode(object); });
-  const brain::Decisions decisions = brain_.observe(undecided, now, bridge_.set_aside());
+  return brain_.observe(undecided, now, bridge_.set_aside());
+}
+
+// A brain may send anything: not even that it is a task is sure.
+void BridgeSide::submit_all(const brain::Decisions& decisions, const std::vector<ObjectBelief>& objects, Time now) {
   for (const Json& task : decisions.tasks) {
-    note_seen(task.value("order", std::string{}), objects, now);
-    if (auto admitted = bridge_.submit(task.dump(), now); !admitted) {
-      const auto id = task.at("id").get<std::string>();
-      const std::string code = task.value("order", id);
-      bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
-      brain_.heard(id, task::Outcome::kFailed);  // asked for again under another id, if it comes by
+    note_seen(task::text_of(task, "order"), objects, now);
+    const std::string text = task.dump(-1, ' ', false, Json::error_handler_t::replace);
+    if (auto admitted = bridge_.submit(text, now); !admitted) {
+      const std::string code = brain::code_of(task);
+      // Asked for again under another id, if it comes by.
+      if (brain_.refused(task, admitted.error()))
+        bridge_.note("ride", {{"code", code}, {"reason", "refused: " + admitted.error().line()}}, now, code);
     } else {
-      asked_.emplace(task.at("id").get<std::string>(), task.value("order", std::string{}));
+      if (admitted->accepted == bridge::Accepted::kNew) asked_.emplace(admitted->id, task::text_of(task, "order"));
+      brain_.taken(task);
     }
   }
   for (const brain::Ride& ride : decisions.rides) {
     if (ride.code.empty()) ++unlabelled_;
     bridge_.note("ride", {{"track", ride.track}, {"code", ride.code}, {"reason", ride.reason}}, now, ride.code);
   }
-  brain_holds_belt_ = decisions.belt_waits;
-  return decisions.belt_waits;
 }
 
 // What is not decided on must not ride by meanwhile; or, by the world's rules, it does, and only what was asked for
@@ -278,7 +308,7 @@ void BridgeSide::let_ride(const ObjectBelief& object, Time now) {
 // What the brain decided on.
 void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBelief>& objects, Time now) {
   const auto object = std::ranges::find(objects, code, &ObjectBelief::code);
-  if (object == objects.end()) return;
+  if (code.empty() || object == objects.end()) return;
   const auto x_axis = object->world_from_top.linear().col(0);
   bridge_.note("seen",
                {{"track", object->track},

@@ -37,6 +37,15 @@ class BridgeSide {
   // Instead of a bridge that is no more, on its journal and before the first tick: stops an arm that still moves as
   // that one told it to, and takes up what is open; nothing starts before the arm was armed anew. Error: the journal.
   [[nodiscard]] Expected<void> take_over(const bridge::Journal& journal, Time now);
+  // What the report of a run tells of all its bridges together. Where one is killed within a run, the next begins with
+  // what it had come to, before take_over(); nothing is decided by it.
+  struct Account {
+    std::int64_t retries = 0;
+    std::vector<Arming::Interventions> interventions;         // of each robot
+    std::map<std::string, std::int64_t, std::less<>> alerts;  // of each part
+  };
+  [[nodiscard]] Account account() const;
+  void begin_with(const Account& before, Time now);
   // One period. Error: the journal failed, or the arm stands where it may not be armed; the run cannot go on.
   [[nodiscard]] Expected<void> tick(Time now, Observer& observer);
   // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
@@ -45,14 +54,13 @@ class BridgeSide {
   // Writes what became of orders that were never identified. Once, at the end of a run.
   void close(Time now);
 
-  // From now on the brain is silent in these spells.
-  void stall_brain(const world::Spells& stalls) { stalls_ = stalls; }
+  // From now on the brain is silent in these spells, which outlive this.
+  void stall_brain(world::Spells& stalls) { stalls_ = &stalls; }
   // See Vitals.
   void keep_free(std::uint64_t bytes) { vitals_.keep_free(bytes); }
-  [[nodiscard]] std::int64_t brain_stalls() const { return stalls_ ? stalls_->begun() : 0; }
 
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
-  [[nodiscard]] std::int64_t retries() const { return bridge_.retries(); }
+  [[nodiscard]] std::int64_t retries() const { return retries_before_ + bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const;
   [[nodiscard]] std::int64_t interventions() const;
   // For a person's words; of a robot there is.
@@ -68,6 +76,8 @@ class BridgeSide {
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
   bool ask_brain(const std::vector<ObjectBelief>& objects, Time now);
+  [[nodiscard]] brain::Decisions hear_brain(const std::vector<ObjectBelief>& objects, Time now);
+  void submit_all(const brain::Decisions& decisions, const std::vector<ObjectBelief>& objects, Time now);
   // Likewise, while nothing is decided.
   bool fall_back(const std::vector<ObjectBelief>& objects, Time now);
   void let_ride(const ObjectBelief& object, Time now);
@@ -110,8 +120,8 @@ class BridgeSide {
   std::vector<std::string> rode_;                          // codes, by those rules: to tell the brain
   std::vector<std::uint32_t> rode_tracks_;                 // likewise; nothing is left for it to decide
   bool brain_holds_belt_ = false;                          // as it last said
-  std::optional<world::Spells> stalls_;
-  std::int64_t unlabelled_ = 0;
+  world::Spells* stalls_ = nullptr;
+  std::int64_t unlabelled_ = 0, retries_before_ = 0;
   bool stopping_ = false;
 };
 

@@ -12,7 +12,10 @@ namespace pons::runner {
 class Ending {
  public:
   // Both must outlive it.
-  Ending(const Watch& watch, BridgeSide& bridge_side) : watch_(watch), bridge_side_(bridge_side) {}
+  Ending(const Watch& watch, BridgeSide& bridge_side) : watch_(watch), bridge_side_(&bridge_side) {}
+
+  // From now on that one, which has taken over; a run that was broken off stays so.
+  void follow(BridgeSide& bridge_side, Time now);
 
   // Once a bridge period; `finished`: nothing more will come from the body. True when the run is over.
   [[nodiscard]] bool check(Time now, bool finished);
@@ -22,7 +25,7 @@ class Ending {
   void break_off(Time now, std::string_view why);
 
   const Watch& watch_;
-  BridgeSide& bridge_side_;
+  BridgeSide* bridge_side_;
   std::optional<Time> quiet_since_;
   std::string broken_off_;
 };

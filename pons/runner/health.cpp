@@ -23,6 +23,13 @@ std::string_view name(Condition condition) {
   return "";
 }
 
+void Health::begin_with(const std::map<std::string, std::int64_t, std::less<>>& alerts, Time now) {
+  for (const auto& [part, count] : alerts) {
+    parts_[part] = PartHealth{.since = now, .alerts = count};
+    alerts_ += count;
+  }
+}
+
 void Health::tell(std::string_view part, Condition measured, std::string_view why, Time now) {
   auto entry = parts_.find(part);
   if (entry == parts_.end()) entry = parts_.emplace(std::string(part), PartHealth{.since = now}).first;

@@ -38,6 +38,9 @@ class Health {
   using Told = std::function<void(std::string_view part, const PartHealth& health, Time now)>;
   explicit Health(Told told) : told_(std::move(told)) {}
 
+  // For the report, before the first tell(): so often each part had come to be worse before there was this table.
+  void begin_with(const std::map<std::string, std::int64_t, std::less<>>& alerts, Time now);
+
   // How it is measured to fare now. Called once a period for each part that there is; `why` is for people.
   void tell(std::string_view part, Condition measured, std::string_view why, Time now);
 

@@ -5,6 +5,34 @@
 #include "pons/runner/ending.hpp"
 
 namespace pons::runner {
+namespace {
+
+// Whether there is a bridge in this period. Error: none follows the one that was killed.
+Expected<bool> bridge_lives(Parts& parts, Ending& ending, const Watch& watch, Time now) {
+  if (parts.crashes == nullptr) return true;
+  const auto look = parts.crashes->look(now);
+  if (!look) return std::unexpected(look.error());
+  switch (*look) {
+    case Crashes::Now::kLives:
+      return true;
+    case Crashes::Now::kDies:
+      parts.body.photographer->nobody_looks();
+      if (watch.said) watch.said(now, "the bridge is killed");
+      return false;
+    case Crashes::Now::kDead:
+      return false;
+    case Crashes::Now::kFollows:
+      break;
+  }
+  parts.bridge_side = parts.crashes->follower().bridge_side;
+  parts.observer = parts.crashes->follower().observer;
+  ending.follow(*parts.bridge_side, now);
+  parts.body.photographer->somebody_looks();
+  if (watch.said) watch.said(now, "another bridge has taken over");
+  return true;
+}
+
+}  // namespace
 
 Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
   const rt::MonotonicClock clock;  // measures the step; nothing depends on it
@@ -27,10 +55,15 @@ Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
     ++result.loop.ticks;
 
     if (now.ns() % kBridgePeriod.count() != 0) continue;
-    if (auto ticked = parts.bridge_side->tick(now, *parts.observer); !ticked) return std::unexpected(ticked.error());
+    const auto lives = bridge_lives(parts, ending, watch, now);
+    if (!lives) return std::unexpected(lives.error());
+    if (*lives) {
+      if (auto ticked = parts.bridge_side->tick(now, *parts.observer); !ticked) return std::unexpected(ticked.error());
+    }
     pass_on_events(parts.body, watch);
     if (auto healthy = parts.body.plant.health(); !healthy) return std::unexpected(healthy.error());
     if (auto healthy = parts.body.photographer->health(); !healthy) return std::unexpected(healthy.error());
+    if (!*lives) continue;
     if (!ending.check(now, parts.body.plant.finished())) continue;
     parts.bridge_side->close(now);
     result.end = now;

@@ -30,6 +30,7 @@ void Photographer::open_shutters(Time now, std::span<const body::Sensors> sensor
   for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
     if (now < next_shutter_[camera]) continue;
     next_shutter_[camera] += from_s(world_.cameras[camera].period_s);
+    if (!looked_at_) continue;
     if (finds_ && world_.cameras[camera].reads_labels && !places_.wants_labels()) continue;
     if (pace_ == Pace::kRealTime && !places_.is_free(camera)) continue;
     if (!wait_for_place(camera)) return;
@@ -41,6 +42,17 @@ void Photographer::open_shutters(Time now, std::span<const body::Sensors> sensor
     const std::lock_guard lock(mutex_);
     exposed_.push_back(camera);
     changed_.notify_all();
+  }
+}
+
+void Photographer::nobody_looks() {
+  looked_at_ = false;
+  for (;;) {
+    const std::uint32_t seen = places_.handed_over().value();
+    bool dark = false;
+    for (std::size_t camera = 0; camera < cameras_.size(); ++camera) dark = dark || places_.in_the_dark(camera);
+    if (!dark || places_.failed()) return;
+    (void)places_.handed_over().wait(seen, kNever);
   }
 }
 

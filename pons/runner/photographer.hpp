@@ -34,6 +34,11 @@ class Photographer {
   // `sensors` are those of each robot, at least one.
   void open_shutters(Time now, std::span<const body::Sensors> sensors);
 
+  // In lockstep, on that thread: who looked at the frames is no more, and the cameras skip their turns until another
+  // does. What is exposed is developed first, so that whoever comes finds the same, however fast the developer is.
+  void nobody_looks();
+  void somebody_looks() { looked_at_ = true; }
+
   // Error: a camera failed; no frame comes any more. Any thread.
   [[nodiscard]] Expected<void> health() const;
 
@@ -47,6 +52,7 @@ class Photographer {
   link::Frames& places_;
   Pace pace_;
   bool finds_ = false;              // what lies on the belt, some camera that reads no labels
+  bool looked_at_ = true;           // the body's thread only
   std::vector<Time> next_shutter_;  // a camera; the body's thread only
   std::vector<RgbdFrame> frames_;   // a camera; the developer's only
 

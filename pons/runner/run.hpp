@@ -13,6 +13,7 @@
 #include "pons/core/time.hpp"
 #include "pons/link/link.hpp"
 #include "pons/runner/bridge_side.hpp"
+#include "pons/runner/crashes.hpp"
 #include "pons/runner/observer.hpp"
 #include "pons/runner/photographer.hpp"
 #include "pons/runner/plant.hpp"
@@ -40,6 +41,7 @@ struct Parts {
   BodyParts body;
   BridgeSide* bridge_side = nullptr;
   Observer* observer = nullptr;
+  Crashes* crashes = nullptr;  // in lockstep only: these kill and replace the two above
 };
 
 // How the run is broken off and watched. All are called in every bridge period, on the bridge's thread; may be empty.

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum class Unit : std::uint8_t { kPick, kParcel, kHour };
+enum class Unit : std::uint8_t { kPick, kParcel, kHour, kMoment };  // kMoment: an hour, and over at once
 
 struct Kind {
   std::string_view name;
@@ -35,7 +35,10 @@ constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick},
                                             {"blackout", Unit::kHour},
                                             {"shifted_view", Unit::kHour},
                                             {"brain_stall", Unit::kHour},
-                                            {"vacuum_weak", Unit::kHour}}};
+                                            {"vacuum_weak", Unit::kHour},
+                                            {"bridge_crash", Unit::kHour},
+                                            {"brain_lie", Unit::kMoment},
+                                            {"network_loss", Unit::kHour}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;
@@ -51,6 +54,9 @@ FaultRate read_rate(const YamlValue& value, std::size_t fault) {
       return rate;
     case Unit::kParcel:
       rate.often = YamlMap(value, {"a_parcel"})["a_parcel"].number(0, 1);
+      return rate;
+    case Unit::kMoment:
+      rate.often = YamlMap(value, {"an_hour"})["an_hour"].number(0, kMostAnHour);
       return rate;
     case Unit::kHour:
       break;
@@ -74,7 +80,8 @@ void multiply(FaultPlan& plan, double times, const YamlValue& where) {
   for (std::size_t fault = 0; fault < kFaults; ++fault) {
     double& often = plan.rates[fault].often;
     often *= times;
-    const double most = kKinds[fault].unit == Unit::kHour ? kMostAnHour : 1;
+    const bool a_share = kKinds[fault].unit == Unit::kPick || kKinds[fault].unit == Unit::kParcel;
+    const double most = a_share ? 1 : kMostAnHour;
     if (often > most)
       where.refuse(fmt::format("makes {} {}, more than {}", kKinds[fault].name, often, most), "write a smaller number");
   }
@@ -104,7 +111,8 @@ FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlValue value = read_yaml(file);
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
-                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name});
+                     kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name,
+                     kKinds[11].name, kKinds[12].name, kKinds[13].name});
   FaultPlan plan;
   if (map.has("base")) plan = read_base(map, file, known);
   if (map.has("times")) {

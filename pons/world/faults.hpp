@@ -27,8 +27,11 @@ enum class Fault : std::uint8_t {
   kShiftedView,  // an hour: the belt's cameras stand elsewhere than they are believed to, by by_m
   kBrainStall,   // an hour: the brain is silent
   kVacuumWeak,   // an hour: the pump gives only a share of its vacuum, to all cups
+  kBridgeCrash,  // an hour: the bridge is killed; lasts until the next one is there
+  kBrainLie,     // an hour, a moment each: the brain asks for something wrong beside its work
+  kNetworkLoss,  // an hour: between brain and bridge messages are lost, late, and come twice
 };
-inline constexpr std::size_t kFaults = 11;
+inline constexpr std::size_t kFaults = 14;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 

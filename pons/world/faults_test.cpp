@@ -65,6 +65,24 @@ TEST_F(FaultsTest, AWeakPumpHasAShare) {
   expect_says(refusal("brain_stall: {an_hour: 6, lasts_s: [5, 9], share: 0.6}\n"), {"share"});
 }
 
+TEST_F(FaultsTest, ALieIsAMomentAndACrashLasts) {
+  const auto plan =
+      load_faults(world_, folder_
+                              .write("far.yaml",
+                                     "brain_lie: {an_hour: 60}\nbridge_crash: {an_hour: 2, lasts_s: [1, 5]}\n"
+                                     "network_loss: {an_hour: 3, lasts_s: [2, 4]}\n")
+                              .string());
+  ASSERT_TRUE(plan) << plan.error().line();
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kBrainLie].often, 60);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kBridgeCrash].longest_s, 5);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kNetworkLoss].shortest_s, 2);
+  expect_says(refusal("brain_lie: {an_hour: 6, lasts_s: [5, 9]}\n"), {"brain_lie", "lasts_s"});
+  expect_says(refusal("brain_lie: {an_hour: 4000}\n"), {"brain_lie.an_hour", "0 to 3600"});
+  expect_says(refusal("bridge_crash: {an_hour: 2}\n"), {"bridge_crash", "lasts_s", "missing"});
+  folder_.write("liar.yaml", "brain_lie: {an_hour: 60}\n");
+  expect_says(refusal("base: liar\ntimes: 100\n"), {"brain_lie", "6000", "3600"});
+}
+
 TEST_F(FaultsTest, AFileOfOnesOwnStandsForItselfOrChangesItsBase) {
   folder_.write("calm.yaml", "missed_grasp: {a_pick: 0.01}\nbelt_jam: {an_hour: 2, lasts_s: [1, 3]}\n");
   const auto plan = load_faults(

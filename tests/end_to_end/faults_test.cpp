@@ -115,6 +115,35 @@ TEST(Faults, NothingRidesByWhileTheBrainIsSilent) {
   EXPECT_EQ(run.report["parcels"]["exceptions"]["undeserved"], 0) << run.said;
 }
 
+// As `kill -9` would: each next bridge goes on from the journal, with what hangs on the cups.
+TEST(Faults, ABridgeThatIsKilledCostsTimeOnly) {
+  const Faulty run = run_with("bridge_crash: {an_hour: 240, lasts_s: [0.3, 3]}\n", 30, 2);
+  EXPECT_GE(run.injected("bridge_crash"), 4);
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 3) << run.said;
+  EXPECT_GE(run.report["parcels"]["sorted"], 24) << run.said;
+}
+
+// Beside its work it asks for what is wrong in twenty ways: what is refused is refused by name, and what is not costs
+// time.
+TEST(Faults, ABrainThatLiesChangesNothingOfWhatIsSorted) {
+  const Faulty run = run_with("brain_lie: {an_hour: 1200}\n", 30, 3);
+  EXPECT_GE(run.injected("brain_lie"), 20) << "each kind at least once";
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 2) << run.said;
+}
+
+TEST(Faults, OverANetworkThatLosesAndRepeatsNothingIsLostAndNothingDoneTwice) {
+  const Faulty run = run_with("network_loss: {an_hour: 400, lasts_s: [2, 8]}\n", 30, 3);
+  EXPECT_GE(run.injected("network_loss"), 4);
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 2) << run.said;
+  EXPECT_GE(run.report["health"]["parts"]["brain"]["alerts"], 1) << "for a while nothing comes";
+}
+
 // All of them at once, and the same again by the same seed.
 TEST(Faults, AStormOfOneSeedIsOneResult) {
   const Folder folder;
@@ -127,7 +156,7 @@ TEST(Faults, AStormOfOneSeedIsOneResult) {
   const json one = storm("one.json"), two = storm("two.json");
   EXPECT_EQ(one["state_hash"], two["state_hash"]);
   EXPECT_EQ(one["faults"], two["faults"]);
-  EXPECT_EQ(one["faults"].size(), 10U) << "all but a weak pump";
+  EXPECT_EQ(one["faults"].size(), 13U) << "all but a weak pump";
 }
 
 TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {

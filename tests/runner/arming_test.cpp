@@ -160,6 +160,19 @@ TEST_F(ArmingTest, OfEachCauseThatNeedsAPersonNobodyElseLeadsOut) {
   EXPECT_EQ(persons, 5);
 }
 
+// Which the report counts once, however many bridges live to see it.
+TEST_F(ArmingTest, AnInterventionThatLastsIsNotCountedAgain) {
+  for (const bool lasts : {true, false}) {
+    Arming arming(bridge_, port_, world_.zones, Recovery::kRefused);
+    arming.begin_with({.count = 2, .lasts = lasts});
+    stand(link::StopCause::kStopInput);
+    arming.take_over(now_, true);
+    tick(arming);
+    EXPECT_TRUE(arming.needs_person());
+    EXPECT_EQ(arming.interventions(), lasts ? 2 : 3);
+  }
+}
+
 TEST_F(ArmingTest, ALittleOutsideItsLimitsTheArmIsBroughtInUnasked) {
   for (const double outside_rad : {1e-5, 0.009, 0.011}) {
     for (const Recovery allowed : {Recovery::kRefused, Recovery::kAllowed}) {

@@ -41,6 +41,15 @@ TEST_F(HealthTest, WhatIsGoodFromItsBeginningIsNoChange) {
   EXPECT_EQ(pump().since, Time(from_s(1)));
 }
 
+TEST_F(HealthTest, ATableThatFollowsAnotherCountsOn) {
+  health_.begin_with({{"pump", 3}, {"belt", 0}}, Time(from_s(1)));
+  EXPECT_EQ(pump().condition, Condition::kGood);
+  tell(2, Condition::kPoor, "leaks");
+  EXPECT_EQ(pump().alerts, 4);
+  EXPECT_EQ(health_.alerts(), 4);
+  EXPECT_THAT(told_, ElementsAre("pump poor 2000000000")) << "what it began with is no change";
+}
+
 TEST_F(HealthTest, WhatIsWorseCountsAtOnce) {
   tell(1, Condition::kPoor, "leaks");
   tell(2, Condition::kPoor, "leaks more");

@@ -185,6 +185,10 @@ Journal::~Journal() {
   if (impl_->run != 0) (void)impl_->make_durable();
 }
 
+void Journal::abandon() {
+  if (!impl_->failed) impl_->give_up({"the journal was abandoned", impl_->file, "open it anew"});
+}
+
 // ---- writing ----
 
 Expected<void> Journal::Impl::ensure_transaction() {

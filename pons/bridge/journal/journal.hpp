@@ -100,6 +100,8 @@ class Journal {
   [[nodiscard]] static Expected<void> upgrade(const std::string& place);
   // Commits what is pending.
   ~Journal();
+  // As if the process were killed now: what is pending is lost, and nothing is written any more.
+  void abandon();
 
   // Error: another task has this id, or the file cannot be written.
   [[nodiscard]] Expected<Accepted> accept(const task::Task& task, Time now);

@@ -63,6 +63,20 @@ TEST_F(JournalTest, WorksInMemory) {
   EXPECT_EQ((*journal)->tasks().value().size(), 1u);
 }
 
+TEST_F(JournalTest, OneThatIsAbandonedLosesWhatWasPending) {
+  for (const bool abandoned : {true, false}) {
+    auto journal = open();
+    const std::int64_t before = journal->counts().value().accepted;
+    ASSERT_TRUE(journal->accept(sample(abandoned ? "a" : "c"), at(1)));
+    ASSERT_TRUE(journal->commit());
+    ASSERT_TRUE(journal->accept(sample(abandoned ? "b" : "d"), at(2)));
+    if (abandoned) journal->abandon();
+    EXPECT_EQ(journal->commit().has_value(), !abandoned);
+    journal.reset();
+    EXPECT_EQ(open()->counts().value().accepted, before + (abandoned ? 1 : 2));
+  }
+}
+
 TEST_F(JournalTest, CompactingGivesTheDiskBackWhatItFrees) {
   {
     const auto journal = open();

@@ -47,7 +47,7 @@ Expected<void> Story::take(const Event& event) {
 
   Expected<void> taken;
   if (event.kind == kAcceptedEvent) taken = take_acceptance(event);
-  if (event.kind == kStartedEvent) started_ = true;
+  if (event.kind == kStartedEvent) started_ = true, robot_ = task::text_of(event.detail, "robot");
   if (event.kind == kAttemptEvent) taken = take_attempt(event);
   if (event.kind == kAttemptEndedEvent) taken = take_attempt_end(event);
   if (event.kind == kFoundDoneEvent) taken = take_found_done(event);

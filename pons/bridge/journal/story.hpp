@@ -45,6 +45,7 @@ class Story {
   [[nodiscard]] Expected<void> take(const Event& event);
 
   [[nodiscard]] bool started() const { return started_; }
+  [[nodiscard]] const std::string& robot() const { return robot_; }  // that it runs on; empty where that was not told
   [[nodiscard]] bool ended() const { return ended_; }
   [[nodiscard]] bool paused() const { return paused_ > 0; }  // as far as it was asked for
   // Why it was told to end, if it was.
@@ -77,6 +78,7 @@ class Story {
 
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
+  std::string robot_;
   std::map<std::size_t, Trying> trying_;
   Json checkpoint_;
   std::set<std::string> allowed_;
