@@ -150,7 +150,7 @@ class Cell(Run):
     NAME = "bridge"
     VISITS_S = 1.0
     REPEATS = 1
-    START_S = 0.8
+    START_S = 0.3  # until it answers, on a computer that does nothing else
 
     def __init__(self, pons, folder, chance, kills, *, world: str, parcels: int, seed: int, link: str, ends: str):
         super().__init__(pons, folder, chance, kills)
@@ -181,7 +181,7 @@ class Cell(Run):
         if not self.until(self.hears, HANGS_S, "a bridge has not answered"):
             return
         if when == "taking over":
-            self.pause(1.5)
+            self.pause(2.0)
         elif when == "asked for something":
             self.pause(1.0)
             self.kill_while_asking()
