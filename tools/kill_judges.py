@@ -56,10 +56,15 @@ class Sender:
         """One more, or one that it has asked for before; whether it was answered."""
         again = self.asked and (len(self.asked) >= self.most or self.chance.random() < 0.4)
         task = self.chance.choice(self.asked[-8:]) if again else f"kill-{len(self.asked) + 1}"
-        if task not in self.asked:
-            self.asked.append(task)
+
+        def sent():
+            if task not in self.asked:
+                self.asked.append(task)
+            if before_answer:
+                before_answer()
+
         request = {"op": "submit", "task": {"id": task, "priority": sum(task.encode()) % 101 // 2, "steps": self.steps(task)}}
-        answer = ask(self.path, request, before_answer)
+        answer = ask(self.path, request, sent)
         if answer is None:
             return False
         if not answer.get("ok"):
@@ -136,7 +141,7 @@ def ground(file: Path) -> tuple[collections.Counter, collections.Counter]:
     parts = {"begun": collections.Counter(), "done": collections.Counter()}
     for line in lines:
         what, step = line.split(" ", 1)
-        parts[what][step] += 1
+        parts[what][step.rstrip()] += 1
     return parts["begun"], parts["done"]
 
 

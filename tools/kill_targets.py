@@ -45,14 +45,15 @@ class Run:
     WHEN: dict[str, float] = {}  # moments, and how often they are chosen
     NAME = ""  # of what is killed
     VISITS_S = 0.0  # between two words of the sender
-    REPEATS = 4  # tasks of the sender a kill
+    TASKS = 4  # of the sender, a kill
+    ANSWERS_S = 0.004  # about, when it is asked for something
 
     def __init__(self, pons: Path, folder: Path, chance: random.Random, kills: int):
         self.pons, self.folder, self.chance, self.planned, self.found = pons, folder, chance, kills, Found()
         self.journal, self.socket, self.said = folder / "j.db", folder / "s", folder / "processes.log"
         self.process: subprocess.Popen | None = None
         self.visited = 0.0
-        self.sender = Sender(self.socket, chance, self.steps, max(4, self.REPEATS * kills))
+        self.sender = Sender(self.socket, chance, self.steps, max(4, self.TASKS * kills))
 
     def steps(self, task: str) -> list[dict]:
         raise NotImplementedError
@@ -106,7 +107,7 @@ class Run:
 
     def kill_while_asking(self):
         def die():
-            time.sleep(self.chance.uniform(0.0, 0.012))
+            time.sleep(self.chance.uniform(0.0, self.ANSWERS_S))
             self.kill()
 
         if not self.sender.submit(before_answer=die):
@@ -158,7 +159,8 @@ class Cell(Run):
     WHEN = {"starting": 0.3, "taking over": 0.25, "asked for something": 0.15, "at work": 0.3}
     NAME = "bridge"
     VISITS_S = 1.0
-    REPEATS = 1
+    TASKS = 1
+    ANSWERS_S = 0.012
     START_S = 0.3  # until it answers, on a computer that does nothing else
 
     def __init__(self, pons, folder, chance, kills, *, world: str, parcels: int, seed: int, link: str, ends: str):

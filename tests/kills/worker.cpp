@@ -1,6 +1,6 @@
 // A bridge with its journal and its socket and no robot: what tools/kill_processes kills by the thousand. Bridge, desk,
-// socket and journal are the product's, on a real disk; a skill's work is a line in a file, the ground, which tells what
-// was really begun and done, whatever any process remembers.
+// socket and journal are the product's, on a real disk; a skill's work is a line in a file, the ground, which tells
+// what was really begun and done, whatever any process remembers.
 //
 // usage: kill_worker JOURNAL SOCKET GROUND     ends with Ctrl-C only
 #include <fcntl.h>
@@ -28,6 +28,7 @@ using task::Json;
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);  // ten times as dense as a real bridge's
 constexpr int kTicks = 3;                                   // that a step takes
+constexpr std::size_t kLine = 64;                           // bytes of a line on the ground: pages are multiples of it
 
 volatile std::sig_atomic_t asked_to_end = 0;
 
@@ -35,15 +36,17 @@ class Ground {
  public:
   explicit Ground(std::string file)
       : file_(std::move(file)), opened_(::open(file_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600)) {}
-  // One write, so that a kill leaves a whole line or none.
+  // One write within one page of the file, so that a kill leaves a whole line or none: the kernel ends a longer one
+  // between two pages.
   void add(const char* what, const std::string& step) const {
-    const std::string line = fmt::format("{} {}\n", what, step);
+    const std::string line = fmt::format("{:<{}}\n", fmt::format("{} {}", what, step), kLine - 1);
+    if (line.size() != kLine) ::_exit(4);
     if (::write(opened_, line.data(), line.size()) != static_cast<ssize_t>(line.size())) ::_exit(3);
   }
   [[nodiscard]] std::set<std::string> lines() const {
     std::set<std::string> found;
     std::ifstream in(file_);
-    for (std::string line; std::getline(in, line);) found.insert(line);
+    for (std::string line; std::getline(in, line);) found.insert(line.substr(0, line.find_last_not_of(' ') + 1));
     return found;
   }
 
@@ -57,7 +60,9 @@ std::string step_of(const std::string& task, std::size_t step) { return fmt::for
 // It does not look whether it was done before: that it is not begun then is the bridge's part.
 class Work final : public task::Skill {
  public:
-  Work(const Ground& ground, std::string step) : ground_(ground), step_(std::move(step)) { ground_.add("begun", step_); }
+  Work(const Ground& ground, std::string step) : ground_(ground), step_(std::move(step)) {
+    ground_.add("begun", step_);
+  }
   task::Progress tick(Time) override {
     if (++ticks_ < kTicks) return {};
     ground_.add("done", step_);
@@ -91,8 +96,8 @@ int work(const std::string& place, const std::string& socket, const Ground& grou
               .resources = {"arm"},
               .timeout = std::chrono::seconds(10),
               .start = [&](const Json& arguments, Time) {
-                return std::make_unique<Work>(ground, step_of(arguments.at("task").get<std::string>(),
-                                                              arguments.at("step").get<std::size_t>()));
+                return std::make_unique<Work>(
+                    ground, step_of(arguments.at("task").get<std::string>(), arguments.at("step").get<std::size_t>()));
               }});
   bridge::Bridge bridge(**journal, skills, world);
   const auto look = [lines = ground.lines()](const task::Task& task, std::size_t done) -> bridge::Resumption {
