@@ -193,7 +193,7 @@ def of_report(file: Path, said: str, sums: collections.Counter) -> list[str]:
     sums["limit violations"] += report["limits"]["violations"]
     for what in ("lost", "missorted", "duplicated"):
         if parcels[what]:
-            problems.append(f"{what} {parcels[what]}: {said}")
+            problems.append("; ".join([f"{what} {parcels[what]}", *report["findings"]]))
     if report["limits"]["violations"]:
         problems.append(f"{report['limits']['violations']} limit violations, {report['limits']['worst_ratio']:.3f} of a limit")
     return problems

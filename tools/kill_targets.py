@@ -66,7 +66,7 @@ class Run:
             return subprocess.Popen([str(word) for word in words], stdin=subprocess.DEVNULL, stdout=said, stderr=said)
 
     def wrong(self, *what: str):
-        self.found.problems += what
+        self.found.problems += [each for each in what if each not in self.found.problems]
 
     def alive(self) -> bool:
         return self.process.poll() is None
