@@ -212,6 +212,7 @@ void Ledger::Impl::locate(Track& track, ParcelTruth& parcel, const Vector3& at, 
   };
   if (track.lifted) {
     track.inside = nullptr;
+    track.moved = now;  // it belongs there, however long it hangs still: what is let go of is no stray
     return set(Whereabouts::kHeld, name(Whereabouts::kHeld));
   }
   const world::Place* around = place_around(at);

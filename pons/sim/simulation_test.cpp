@@ -273,6 +273,21 @@ TEST(Truth, AParcelLostUnderVacuumIsADrop) {
   EXPECT_NEAR(bench.truth().max_drop_m, 0.20, 0.02);
 }
 
+// As long as an arm holds it that waits for its next bridge, or for a person.
+TEST(Truth, WhatHangsStillForLongAndIsThenLetGoOfIsNoStray) {
+  Bench bench(1.0);
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.05), 1.0, 0.1);
+  bench.puppet.set_vacuum(0xf);
+  bench.puppet.move_tip(bench.top - Vector3(0, 0, 0.004), 0.6, 0.3);
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.20), 0.8, 0.2);
+  bench.puppet.move_tip(bench.world.place("chute_2")->center_m + Vector3(0, 0, 0.22), 1.5, 12.0);
+  ASSERT_EQ(bench.truth().where, Whereabouts::kHeld);
+  bench.puppet.set_vacuum(0);
+  bench.puppet.hold(1.0);
+  EXPECT_EQ(bench.truth().where, Whereabouts::kChute);
+  EXPECT_EQ(bench.truth().place, "chute_2");
+}
+
 TEST(Truth, WhatFallsBesideLiesInTheTrayForTheCameraAndIsCleared) {
   Bench bench(1.0);
   double* at = bench.cell.data->qpos + bench.cell.composed.slots[0].qpos;
