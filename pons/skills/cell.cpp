@@ -117,7 +117,7 @@ void Cell::watch_strays() {
   const double travel_m = arm.state().belt_travel_m;
   for (const world::Place* const place : mouths.unexpected(falls(), now_)) {
     if (place->kind == world::PlaceKind::kChute)
-      strays->fell(load_, place->name, now_);
+      strays->fell(world.arm, place->name, now_);
     else
       strays->rode_off(travel_m);
   }
@@ -188,7 +188,6 @@ void Cell::left_on_belt(const Pose& world_from_tip) {
 
 void Cell::lifted(const ObjectBelief& object) {
   forgotten_.push_back(object.track);
-  load_ = object.code;
   strays->taken(object.track);
   std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
 }

@@ -208,7 +208,6 @@ class Cell {
   };
   std::optional<Unseen> unseen_;
   std::vector<std::uint32_t> forgotten_;
-  std::string load_;  // that the cups took up last
   std::vector<task::Note> notes_;
 };
 

@@ -164,6 +164,14 @@ std::optional<task::Progress> never_taken(const world::World& world, const Objec
   return Progress{Status::kFailed, "rode past the pick zone of " + world.arm, {}};  // another arm may take it
 }
 
+task::Progress not_there(const Cell& cell, const std::string& code) {
+  using task::Progress, task::Status;
+  if (cell.disputed(code)) return {Status::kFailed, "it shows two codes", {}};
+  const std::string* const place = cell.strays->place_of(code);
+  if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
+  return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
+}
+
 std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {
   for (const ObjectBelief& other : cell.objects()) {
     if (other.track == 0) continue;  // only an obstacle

@@ -56,6 +56,8 @@ struct GraspSearch {
 // How the pick of one ends that this arm can take no more, or never could; nothing if it can.
 [[nodiscard]] std::optional<task::Progress> never_taken(const world::World& world, const ObjectBelief& object);
 
+// How a pick ends whose parcel is not where it should be, or nowhere.
+[[nodiscard]] task::Progress not_there(const Cell& cell, const std::string& code);
 // What would come along with that object, and why; nothing if it lies by itself.
 [[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);
 

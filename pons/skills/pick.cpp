@@ -43,10 +43,15 @@ constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
 constexpr double kUnweighable = 2.0;   // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
+constexpr Duration kUntangles = std::chrono::milliseconds(2000);
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
 constexpr double kNearEnd_m = 0.25;    // of the pick zone: what is lifted there has to be put back soon
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
+
+Progress overweight(double mass_kg) {
+  return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
+}
 
 class Pick final : public ArmSkill {
  public:
@@ -139,19 +144,17 @@ class Pick final : public ArmSkill {
     if (object == nullptr) {
       step_aside(now);
       if (now - seen_ < kUnseenFor) return {};
-      return absent();
+      return not_there(cell_, code_);
     }
     seen_ = now;
     keep_in_reach(*object, now);
-    // What was put back with another on it is taken again from where it lies.
-    if (cell_.hooked == code_) cell_.hold_belt(now);
     const world::Belt& belt = cell_.world.belt;
     if (auto never = never_taken(cell_.world, *object)) return *std::move(never);
-    if (must_look_again(*object, now)) {
-      step_aside(now);
-      return {};
+    if (must_look_again(*object, now)) return step_aside(now), Progress{};
+    if (const auto other = tied_to(cell_, *object)) {
+      if (!untangles(now)) return {Status::kFailed, *other, {}};
+      return step_aside(now), Progress{};
     }
-    if (const auto other = tied_to(cell_, *object)) return {Status::kFailed, *other, {}};
     if (tried_ && now - *tried_ < kTryEvery) return {};
     tried_ = now;
     const Time from = cell_.arm.splice_time(now);
@@ -180,17 +183,11 @@ class Pick final : public ArmSkill {
     return start(*grasp, *object, now);
   }
 
-  [[nodiscard]] Progress absent() const {
-    if (cell_.disputed(code_)) return {Status::kFailed, "it shows two codes", {}};
-    const std::string* const place = cell_.strays->place_of(code_);
-    if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
-    return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
-  }
-
-  // The brain has the belt wait for what it sees; what was put back, nobody may see.
+  // The brain has the belt wait for what it sees; what was put back, nobody may see. With another on it, it is taken
+  // again from where it lies.
   void keep_in_reach(const ObjectBelief& object, Time now) {
     const double x_m = object.world_from_top.translation().x();
-    if (cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
+    if (cell_.hooked == code_ || cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
   }
 
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
@@ -207,6 +204,12 @@ class Pick final : public ArmSkill {
     if (!seen && !pointless && now - cell_.missed->time < kLookAgain) return true;
     cell_.missed.reset();
     return false;
+  }
+
+  // What was put back lies as it lay: it only seems tied to its neighbour until arm and shadow have left the view.
+  bool untangles(Time now) {
+    if (!tangled_) tangled_ = now;
+    return cell_.hooked == code_ && now < *tangled_ + kUntangles;
   }
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
@@ -277,7 +280,6 @@ class Pick final : public ArmSkill {
   }
 
   Progress approach(Time now) {
-    if (cell_.hooked == code_) cell_.hold_belt(now);
     if (const ObjectBelief* object = cell_.find(code_)) {
       keep_in_reach(*object, now);
       const Vector3 off = cell_.predict(*object, grasp_.contact) - grasp_.contact_point;
@@ -328,7 +330,8 @@ class Pick final : public ArmSkill {
     if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       // It was not there, and no camera has seen it since another was taken from beside it.
-      if (cups.sealed_cups == 0 && cell_.strays->missed_twice(code_)) return begin_retreat(now, absent()), Progress{};
+      if (cups.sealed_cups == 0 && cell_.strays->missed_twice(code_))
+        return begin_retreat(now, not_there(cell_, code_)), Progress{};
       return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};
@@ -358,9 +361,8 @@ class Pick final : public ArmSkill {
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
     lift_travel_m_ = belt_travel_m(from);
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_), kLifted_m_s2);
-    if (!up || !cell_.arm.stream(up->trajectory)) {
+    if (!up || !cell_.arm.stream(up->trajectory))
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
-    }
     lift_end_ = up->top;
     rides_until_ = up->rides_until;
     const ObjectBelief* const seen = cell_.find(code_);
@@ -368,7 +370,7 @@ class Pick final : public ArmSkill {
                       .load = load_of(target_, grasp_.orientation),
                       .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
                       .falls = cell_.falls()};
-    cell_.strays->lifted(code_, cell_.held->company, lift_end_);
+    cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company, lift_end_);
     cell_.lost.reset();
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
@@ -407,9 +409,7 @@ class Pick final : public ArmSkill {
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(0.0, mass));
     cell_.arm.expect_contact(0);
-    if (mass > limit) {
-      return begin_put_back(now, kPutAside, overweight(mass));
-    }
+    if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
     if (lopsided) {
       cell_.hooked = code_;
       const std::string name = other != nullptr && !other->code.empty() ? other->code : "another";
@@ -447,10 +447,6 @@ class Pick final : public ArmSkill {
     return verdict_;
   }
 
-  static Progress overweight(double mass_kg) {
-    return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
-  }
-
   Progress success(Time now) {
     const int sealed = cell_.arm.cups().sealed_cups;
     return {Status::kSucceeded,
@@ -472,7 +468,7 @@ class Pick final : public ArmSkill {
   Delay delay_;
   Duration behind_{0};  // of the belt, since the cups set out for the contact
   Progress verdict_;
-  std::optional<Time> tried_, blocked_since_;
+  std::optional<Time> tried_, blocked_since_, tangled_;
   GraspSearch search_;
   int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;

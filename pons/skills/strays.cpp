@@ -6,8 +6,8 @@
 namespace pons::skills {
 namespace {
 
-constexpr std::size_t kRemembered = 64;  // of those who are gone
-constexpr Duration kTornOff = std::chrono::milliseconds(1200);  // it falls no later after the load was let go of
+constexpr std::size_t kRemembered = 64;                         // of those who are gone
+constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
 constexpr double kSooner_m = 0.05, kLater_m = 0.30;
 
@@ -17,11 +17,12 @@ void forget_oldest(auto& list) {
 
 }  // namespace
 
-void Strays::lifted(const std::string& load, const Company& company, Time hangs) {
+void Strays::lifted(const std::string& arm, const std::string& load, const Company& company, Time hangs) {
   put_back(load);  // as somebody else may have, of whom nobody told
   for (const Companion& companion : company) {
     Doubted one;
     one.track = companion.track;
+    one.arm = arm;
     one.load = load;
     one.stray.code = companion.code;
     one.since = hangs;
@@ -51,9 +52,9 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   }
 }
 
-void Strays::fell(const std::string& load, const std::string& place, Time now) {
+void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   for (Doubted& one : doubted_) {
-    if (one.load != load) continue;
+    if (one.arm != arm) continue;
     if (one.gone && one.let_go) continue;  // that has been told
     if (one.let_go && now > *one.let_go + kTornOff) continue;
     one.stray.place = place;
@@ -104,8 +105,8 @@ bool Strays::has_gone(const Doubted& one, bool believed, const BeltAt& belt) con
 
 const Strays::Doubted* Strays::of(const std::string& code) const {
   if (code.empty()) return nullptr;
-  const auto found = std::ranges::find_if(
-      doubted_, [&](const Doubted& one) { return one.let_go && one.stray.code == code; });
+  const auto found =
+      std::ranges::find_if(doubted_, [&](const Doubted& one) { return one.let_go && one.stray.code == code; });
   return found == doubted_.end() ? nullptr : &*found;
 }
 

@@ -24,17 +24,18 @@ struct BeltAt {
   double travel_m = 0, view_end_m = 0, end_m = 0;
 };
 
-// Of all arms of a belt. Loads are told apart by their codes. One thread.
+// Of all arms of a belt, which are told apart by their names, as loads are by their codes. One thread.
 class Strays {
  public:
-  // A load with that company hangs free on the cups from then on.
-  void lifted(const std::string& load, const Company& company, Time hangs);
+  // A load with that company hangs free on the arm's cups from then on.
+  void lifted(const std::string& arm, const std::string& load, const Company& company, Time hangs);
   // It lies on the belt again, and who came along, too.
   void put_back(const std::string& load);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
-  // Something fell into that place over which nothing was let go of: that load was on the cups last, and it was torn off.
-  void fell(const std::string& load, const std::string& place, Time now);
+  // Something fell into that place of the arm's, over which nothing was let go of: it was torn off a load of this
+  // moment.
+  void fell(const std::string& arm, const std::string& place, Time now);
   // Something rode off the belt's end.
   void rode_off(double travel_m);
   // Each tick's beliefs: whoever is seen has stayed. Who is believed to lie nowhere any more, and was to be seen, or
@@ -52,7 +53,7 @@ class Strays {
  private:
   struct Doubted {
     std::uint32_t track = 0;
-    std::string load;            // with which it may have come along
+    std::string arm, load;       // with which it may have come along
     Stray stray;                 // the place is empty as long as that hangs on the cups
     Time since;                  // it hangs
     std::optional<Time> let_go;  // of the load

@@ -26,7 +26,7 @@ class StraysTest : public testing::Test {
   }
   // Takes up a load with B beside it at 10 s, and lets go of it over chute_1 at 11 s.
   void carry(const Company& company = {{2, "B", {0.2, 0}}}) {
-    strays_.lifted("A", company, at(10));
+    strays_.lifted("arm", "A", company, at(10));
     strays_.let_go("A", "chute_1", at(11));
   }
   [[nodiscard]] std::string place_of(const char* code) const {
@@ -51,14 +51,14 @@ TEST_F(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
 // A track may be lost and found again under another number.
 TEST_F(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
   carry();
-  strays_.lifted("X", {{7, "B", {0, 0}}}, at(20));
+  strays_.lifted("arm", "X", {{7, "B", {0, 0}}}, at(20));
   EXPECT_EQ(place_of("B"), "chute_1");
   strays_.let_go("X", "chute_2", at(21));
   EXPECT_EQ(place_of("B"), "chute_2");
 }
 
 TEST_F(StraysTest, WhatIsPutBackTookNobodyAnywhere) {
-  strays_.lifted("A", {{2, "B", {0.2, 0}}}, at(10));
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}}, at(10));
   look({box(2, "B", 0)});
   strays_.put_back("A");
   look({});
@@ -87,7 +87,7 @@ TEST_F(StraysTest, WhoIsBelievedNowhereAnyMoreHasGone) {
 
 // A camera may show the bare belt, and a label be read, before the load is let go of.
 TEST_F(StraysTest, WhoIsFoundGoneWhileTheLoadIsCarriedIsNamedWhenItIsLetGoOf) {
-  strays_.lifted("A", {{2, "", {0.2, 0}}}, at(10));
+  strays_.lifted("arm", "A", {{2, "", {0.2, 0}}}, at(10));
   look({box(2, "B", 0)});
   look({});
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "nobody knows where to yet";
@@ -101,21 +101,21 @@ TEST_F(StraysTest, WhoIsFoundGoneWhileTheLoadIsCarriedIsNamedWhenItIsLetGoOf) {
 
 // Torn off, it falls where it may; the light curtain there tells.
 TEST_F(StraysTest, WhoIsTornOffFellWhereACurtainTells) {
-  strays_.lifted("A", {{2, "B", {0.2, 0}}}, at(10));
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}}, at(10));
   look({box(2, "B", 0)});
-  strays_.fell("A", "chute_7", at(10.5));
+  strays_.fell("arm", "chute_7", at(10.5));
   strays_.let_go("A", "chute_1", at(11));
   EXPECT_EQ(place_of("B"), "chute_7");
   look({});
   ASSERT_EQ(strays_.take_found_gone().size(), 1U);
 
-  strays_.lifted("X", {{3, "C", {0.2, 0}}}, at(20));
+  strays_.lifted("arm", "X", {{3, "C", {0.2, 0}}}, at(20));
   strays_.let_go("X", "chute_2", at(21));
-  strays_.fell("another arm's", "chute_5", at(21.2));
+  strays_.fell("other", "chute_5", at(21.2));
   EXPECT_EQ(place_of("C"), "chute_2");
-  strays_.fell("X", "chute_3", at(21.5));
+  strays_.fell("arm", "chute_3", at(21.5));
   EXPECT_EQ(place_of("C"), "chute_3") << "off the rim";
-  strays_.fell("X", "chute_4", at(23));
+  strays_.fell("arm", "chute_4", at(25));
   EXPECT_EQ(place_of("C"), "chute_3") << "too late for it";
 }
 
