@@ -102,6 +102,19 @@ class Left:
         self.folder.cleanup()
 
 
+def is_begun(file: Path) -> bool:
+    """Whether it holds more than nothing: a process may be killed before it has laid a journal out, and the next one does."""
+    if not file.is_file():
+        return False
+    database = sqlite3.connect(file)
+    try:
+        return database.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0] > 0
+    except sqlite3.Error:
+        return True  # whatever it is, it is to be looked at
+    finally:
+        database.close()
+
+
 def check(pons: Path, file: Path) -> list[str]:
     """Each task's story: one acceptance, one outcome, no step done twice."""
     checked = subprocess.run([pons, "journal", "check", file], capture_output=True, text=True)

@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from kill_judges import Left, Sender, Stops, ask, check, ground, held_against, of_report, without_outcome
+from kill_judges import Left, Sender, Stops, ask, check, ground, held_against, is_begun, of_report, without_outcome
 
 BODY_GONE = 3
 GONE = "the body has gone"
@@ -131,7 +131,10 @@ class Run:
 
     def look_back(self):
         left = Left(self.journal)
-        if left.file.is_file():
+        if not is_begun(left.file):
+            if self.sender.told or self.begun():
+                self.wrong(f"the journal is empty, and {len(self.sender.told)} tasks were told accepted")
+        else:
             self.wrong(*check(self.pons, left.file), *held_against(left.file, self.sender, self.begun()))
             self.found.sums["journals looked at after a kill"] += 1
         left.close()
