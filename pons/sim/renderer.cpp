@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <stdexcept>
+
+#include "pons/sim/unseen.hpp"
 
 namespace pons::sim {
 namespace {
@@ -60,27 +60,6 @@ void drop_stencil(const GlContext& gl, const mjrContext& context, int width, int
 }
 
 Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
-
-// The driver finds out only triangle by triangle, after it has lit them, that a geom lies outside of the picture.
-void leave_out_unseen(const mjModel* model, const mjvGLCamera& camera, float aspect, mjvScene& scene) {
-  const Eigen::Vector3f forward = vector(camera.forward), up = vector(camera.up), right = forward.cross(up);
-  const float near = camera.frustum_near;
-  const float half_width = 0.5F * aspect * (camera.frustum_top - camera.frustum_bottom);
-  // Normals, inward, of the four sides, which meet in the camera.
-  const std::array<Eigen::Vector3f, 4> inward = {near * up - camera.frustum_bottom * forward,
-                                                 camera.frustum_top * forward - near * up,
-                                                 near * right + (half_width - camera.frustum_center) * forward,
-                                                 (half_width + camera.frustum_center) * forward - near * right};
-  const auto outside = [&](const mjvGeom& geom) {
-    if (geom.objtype != mjOBJ_GEOM) return false;
-    const auto radius = static_cast<float>(model->geom_rbound[geom.objid]);  // of an infinite one 0
-    const Eigen::Vector3f from_camera = vector(geom.pos) - vector(camera.pos);
-    return radius > 0 && std::ranges::any_of(inward, [&](const Eigen::Vector3f& normal) {
-             return normal.dot(from_camera) < -radius * normal.norm();
-           });
-  };
-  scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom, outside) - scene.geoms);
-}
 
 // What is hidden is then refused by its depth before it is shaded. The floor, which has a texture and is nearly always
 // hidden, would cost as much as everything else together.
