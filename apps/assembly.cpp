@@ -98,6 +98,8 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   if (!simulation) return std::unexpected(simulation.error());
   self->faults = setup.faults;
   self->simulation = std::move(*simulation);
+  self->simulation->lend(
+      [half = self.get()](const auto& first, const auto& second) { half->helper.both(first, second); });
   self->simulation->expect_visits(setup.visits);
   if (setup.arm_at) self->simulation->set_arm(*setup.arm_at);
   self->photographer = std::make_unique<runner::Photographer>(world, self->simulation->cameras(), meeting.frames,

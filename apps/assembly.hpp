@@ -68,6 +68,7 @@ class BodyHalf {
   [[nodiscard]] runner::BodyParts parts();
 
   world::FaultPlan faults;
+  runner::Helper helper;  // the cameras'
   std::unique_ptr<sim::Simulation> simulation;
   // What is one an arm, below the link.
   struct Arm {

@@ -104,7 +104,7 @@ void Perception::Impl::see_belt(const world::CameraSpec& camera, const RgbdFrame
   look.sees_belt = view.clear;
   const Segments& segments =
       segmenter.segment(view, marks(view, moment.belt_travel_m), known(view, frame.stamp, moment.belt_travel_m));
-  const std::vector<Sighting> sightings = measure(view, segments);
+  const std::vector<Sighting> sightings = measure(view, segments, both);
   const auto tracks = tracker.update(view, segments, sightings, frame.stamp, moment.belt_travel_m);
   look.cut.clear();
   for (std::size_t i = 0; i < sightings.size(); ++i) {

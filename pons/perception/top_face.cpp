@@ -300,27 +300,45 @@ bool Sighting::covers(double x_m, double y_m, double margin_m) const {
          std::abs(-s * offset.x() + c * offset.y()) <= 0.5 * size_m.y() + margin_m;
 }
 
-std::vector<Sighting> measure(const TopView& view, const Segments& segments) {
-  std::vector<Sighting> sightings;
-  for (const Region& region : segments.regions) {
-    const std::vector<cv::Point>& core = region.core.size() >= 20 ? region.core : region.cells;
-    const Plane plane = fit_plane(view, core);
-    const bool curved = plane.curved() && region.core.size() >= 20;
-    Sighting sighting = curved ? measure_curved(view, region, plane) : measure_flat(view, region, plane);
-    sighting.label = region.label;
-    sighting.flatness_m = plane.rms_m;
-    sighting.crowded = region.crowded || region.below_share > 0 || sighting.tilt_rad > kLeaning_rad;
-    sighting.near_robot = region.near_robot;
-    // A box that only lost a corner to the border is measured as well as a whole one.
-    // A narrow one is cut across by a short border.
-    const double border_m = region.border_share * 2 * (sighting.size_m.x() + sighting.size_m.y());
-    sighting.at_border = region.border_share > kLostCorner || border_m > kAcross * sighting.size_m.y() ||
-                         (region.border_share > 0 && sighting.fill < kNearlyWhole);
-    sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
-    sighting.sliver = sighting.size_m.y() < kNarrowest_m;
-    sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
-    sightings.push_back(sighting);
-  }
+namespace {
+
+Sighting measure_one(const TopView& view, const Region& region) {
+  const std::vector<cv::Point>& core = region.core.size() >= 20 ? region.core : region.cells;
+  const Plane plane = fit_plane(view, core);
+  const bool curved = plane.curved() && region.core.size() >= 20;
+  Sighting sighting = curved ? measure_curved(view, region, plane) : measure_flat(view, region, plane);
+  sighting.label = region.label;
+  sighting.flatness_m = plane.rms_m;
+  sighting.crowded = region.crowded || region.below_share > 0 || sighting.tilt_rad > kLeaning_rad;
+  sighting.near_robot = region.near_robot;
+  // A box that only lost a corner to the border is measured as well as a whole one.
+  // A narrow one is cut across by a short border.
+  const double border_m = region.border_share * 2 * (sighting.size_m.x() + sighting.size_m.y());
+  sighting.at_border = region.border_share > kLostCorner || border_m > kAcross * sighting.size_m.y() ||
+                       (region.border_share > 0 && sighting.fill < kNearlyWhole);
+  sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
+  sighting.sliver = sighting.size_m.y() < kNarrowest_m;
+  sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
+  return sighting;
+}
+
+// Of the regions, how many from the first on hold half of the cells.
+std::size_t half_of(const std::vector<Region>& regions) {
+  std::size_t all = 0, taken = 0, count = 0;
+  for (const Region& region : regions) all += region.cells.size();
+  while (count < regions.size() && 2 * taken < all) taken += regions[count++].cells.size();
+  return count;
+}
+
+}  // namespace
+
+std::vector<Sighting> measure(const TopView& view, const Segments& segments, const Both& both) {
+  std::vector<Sighting> sightings(segments.regions.size());
+  const auto some = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) sightings[i] = measure_one(view, segments.regions[i]);
+  };
+  const std::size_t half = half_of(segments.regions);
+  both([&] { some(0, half); }, [&] { some(half, sightings.size()); });
   // What leans on a lower neighbour hides a part of it, however whole the rest looks; of what is still coming into view
   // nobody knows whether it leans.
   for (std::size_t i = 0; i < sightings.size(); ++i) {

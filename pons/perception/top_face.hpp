@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "pons/core/both.hpp"
 #include "pons/core/pose.hpp"
 #include "pons/perception/segmentation.hpp"
 #include "pons/perception/top_view.hpp"
@@ -37,7 +38,7 @@ struct Sighting {
   [[nodiscard]] bool covers(double x_m, double y_m, double margin_m) const;
 };
 
-// One sighting a region, in their order.
-[[nodiscard]] std::vector<Sighting> measure(const TopView& view, const Segments& segments);
+// One sighting a region, in their order; `both` measures some of them beside the others.
+[[nodiscard]] std::vector<Sighting> measure(const TopView& view, const Segments& segments, const Both& both);
 
 }  // namespace pons::perception

@@ -75,8 +75,8 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt, Both both)
   for (Strip& strip : strips_) {
     strip.cell_row.resize(width), strip.height_row.resize(width);
     strip.raised.resize(width * static_cast<std::size_t>(strip.end - strip.begin));
-    strip.highest.create(rows, columns), strip.flags.create(rows, columns), strip.colour.create(rows, columns);
-    strip.sum.create(rows, columns), strip.count.create(rows, columns);
+    strip.highest.create(rows, columns), strip.flags.create(rows, columns);
+    strip.piles.resize(strip.highest.total());
   }
 }
 
@@ -178,34 +178,38 @@ void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv:
 
 // What was read of the highest surface of each cell.
 void TopViewer::accumulate(const RgbdFrame& frame, Strip& strip) const {
-  strip.sum.setTo(0), strip.count.setTo(0), strip.colour.setTo(cv::Scalar::all(0));
+  std::ranges::fill(strip.piles, Pile{});
   const auto* const highest = highest_.ptr<std::uint16_t>();
-  auto* const sum = strip.sum.ptr<int>();
-  auto* const count = strip.count.ptr<int>();
-  auto* const colour = strip.colour.ptr<cv::Vec3b>();
-  auto* const flags = strip.flags.ptr<std::uint8_t>();
   const auto stride = static_cast<std::size_t>(frame.intrinsics.width);
   const cv::Rect inner(kBorder, kBorder, sampling_.width - 2 * kBorder, sampling_.height - 2 * kBorder);
   for (std::size_t i = 0; i < strip.raised_count; ++i) {
     const Reading& reading = strip.raised[i];
     if (reading.height + kSameSurface < highest[reading.cell]) continue;
-    sum[reading.cell] += reading.height;
-    ++count[reading.cell];
+    Pile& pile = strip.piles[static_cast<std::size_t>(reading.cell)];
+    pile.sum += reading.height;
+    ++pile.count;
     const std::size_t pixel = 3 * (static_cast<std::size_t>(reading.row * sampling_.step) * stride +
                                    static_cast<std::size_t>(reading.column * sampling_.step));
-    colour[reading.cell] = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
-    if (!inner.contains({reading.column, reading.row})) flags[reading.cell] |= TopView::kAtBorder;
+    pile.colour = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
+    if (!inner.contains({reading.column, reading.row})) pile.flags |= TopView::kAtBorder;
   }
 }
 
 // The highest surface of each cell, averaged over its readings; and what was seen of it.
 void TopViewer::merge(int begin, int end) {
   const auto& [first, second] = strips_;
+  auto* const highest = highest_.ptr<std::uint16_t>();
+  auto* const colour = view_.colour.ptr<cv::Vec3b>();
+  auto* const flags = view_.flags.ptr<std::uint8_t>();
+  const auto *const first_flags = first.flags.ptr<std::uint8_t>(), *const second_flags =
+                                                                       second.flags.ptr<std::uint8_t>();
   for (int cell = begin * highest_.cols; cell < end * highest_.cols; ++cell) {
-    const int count = first.count(cell) + second.count(cell);
-    if (count > 1) highest_(cell) = static_cast<std::uint16_t>((first.sum(cell) + second.sum(cell)) / count);
-    view_.colour(cell) = second.count(cell) > 0 ? second.colour(cell) : first.colour(cell);
-    view_.flags(cell) = first.flags(cell) | second.flags(cell);
+    const Pile &one = first.piles[static_cast<std::size_t>(cell)],
+               &other = second.piles[static_cast<std::size_t>(cell)];
+    const int count = one.count + other.count;
+    if (count > 1) highest[cell] = static_cast<std::uint16_t>((one.sum + other.sum) / count);
+    colour[cell] = other.count > 0 ? other.colour : one.colour;
+    flags[cell] = static_cast<std::uint8_t>(one.flags | other.flags | first_flags[cell] | second_flags[cell]);
   }
 }
 

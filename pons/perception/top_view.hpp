@@ -69,6 +69,14 @@ class TopViewer {
   };
   // What hangs before the camera, or a camera without light, leaves whole tiles of the window without readings.
   static constexpr std::size_t kTiles = 16;
+  // What was read of the highest surface of one cell: the sum of its heights, how many there are, the last one's
+  // colour.
+  struct Pile {
+    int sum = 0;
+    std::uint16_t count = 0;
+    cv::Vec3b colour;
+    std::uint8_t flags = 0;
+  };
   // Some rows of samples, and the map as they alone would make it.
   struct Strip {
     int begin = 0, end = 0;
@@ -79,8 +87,7 @@ class TopViewer {
     std::size_t raised_count = 0;
     cv::Mat1w highest;
     std::array<int, kTiles> read{}, unread{};  // samples, by tile along the belt
-    cv::Mat1i sum, count;
-    cv::Mat3b colour;
+    std::vector<Pile> piles;                   // a cell
     cv::Mat1b flags;
   };
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 #include "pons/core/random.hpp"
 
@@ -30,29 +29,30 @@ struct Chance {
   float sigma = 0;                        // at 1 m
   std::uint32_t drop = 0, edge_drop = 0;  // of 2^32
 
-  // `line` holds true depths and gets measured ones; `below` is the next row; `first` is the index of line[0].
-  void disturb(float* line, const float* below, std::size_t columns, std::uint64_t first) const {
+  // True depths of a row and of the next one to measured ones; `first` is the index of the row's first pixel.
+  void disturb(const std::vector<float>& row, const std::vector<float>& below, std::uint64_t first, float* to) const {
     constexpr std::size_t kPiece = 256;
     std::array<std::uint32_t, kPiece> chance;
     std::array<int, kPiece> sum;
-    std::array<float, kPiece + 1> right;
-    const Chance own = *this;  // as a copy it cannot change with `line`
-    for (std::size_t at = 0; at < columns; at += kPiece) {
-      const std::size_t count = std::min(kPiece, columns - at);
+    const Chance own = *this;  // as a copy it cannot change with `to`
+    const std::size_t last = row.size() - 1;
+    for (std::size_t at = 0; at < row.size(); at += kPiece) {
+      const std::size_t count = std::min(kPiece, row.size() - at);
       for (std::size_t i = 0; i < count; ++i) {
         asm volatile("");  // keeps this loop scalar: emulated vector products of 64 bits are slower
         const std::uint64_t bits = mix(own.seed + (first + at + i) * 0x9e3779b97f4a7c15ULL);
         chance[i] = static_cast<std::uint32_t>((bits * 0xd1342543de82ef95ULL) >> 32);
         sum[i] = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
       }
-      std::copy_n(line + at, count, right.begin());
-      right[count] = line[std::min(at + count, columns - 1)];
-      for (std::size_t i = 0; i < count; ++i) {
-        const float z = right[i];
-        const bool edge = (std::abs(right[i + 1] - z) > kEdge_m) | (std::abs(below[at + i] - z) > kEdge_m);
+      const auto measure = [&](std::size_t i, float right) {
+        const float z = row[at + i];
+        const bool edge = (std::abs(right - z) > kEdge_m) | (std::abs(below[at + i] - z) > kEdge_m);
         const float measured = z + own.sigma * z * z * rough_normal(sum[i]);
-        line[at + i] = chance[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
-      }
+        to[at + i] = chance[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
+      };
+      const std::size_t beside = std::min(count, last - at);  // those that have a neighbour
+      for (std::size_t i = 0; i < beside; ++i) measure(i, row[at + i + 1]);
+      if (beside < count) measure(beside, row[last]);
     }
   }
 
@@ -96,18 +96,19 @@ void SimCamera::begin(Time now) {
 Expected<void> SimCamera::finish(RgbdFrame& frame) {
   if (!open_) return fail("finish() without begin()", spec_.name, "call begin() first");
   open_ = false;
-  if (auto drawn = renderer_->draw(rgb_, buffer_); !drawn) return drawn;
+  if (auto drawn = renderer_->draw(rgba_, buffer_); !drawn) return drawn;
   frame.camera = spec_.name;
   frame.stamp = stamp_;
   frame.intrinsics = intrinsics_;
   frame.world_from_optical = spec_.world_from_optical;
-  const auto row_bytes = 3 * static_cast<std::size_t>(spec_.width);
-  const auto rows = static_cast<std::size_t>(spec_.height);
-  frame.rgb.resize(row_bytes * rows);
-  for (std::size_t row = 0; row < rows; ++row) {
-    std::memcpy(frame.rgb.data() + row * row_bytes, rgb_.data() + (rows - 1 - row) * row_bytes, row_bytes);
-  }
-  measure_depth(frame.depth_m);
+  const auto rows = static_cast<std::size_t>(spec_.height), pixels = rows * static_cast<std::size_t>(spec_.width);
+  frame.rgb.resize(3 * pixels);
+  frame.depth_m.resize(pixels);
+  const auto measure = [&](std::size_t begin, std::size_t end) {
+    turn_over(rgba_, spec_.width, spec_.height, begin, end, frame.rgb.data());
+    measure_depth(begin, end, frame.depth_m);
+  };
+  both_([&] { measure(0, rows / 2); }, [&] { measure(rows / 2, rows); });
   spoil(frame);
   return {};
 }
@@ -130,24 +131,25 @@ void SimCamera::spoil(RgbdFrame& frame) const {
   }
 }
 
-void SimCamera::measure_depth(PixelArray<float>& depth_m) const {
+void SimCamera::measure_depth(std::size_t begin, std::size_t end, PixelArray<float>& depth_m) const {
   const auto columns = static_cast<std::size_t>(spec_.width), rows = static_cast<std::size_t>(spec_.height);
-  depth_m.resize(columns * rows);
   const auto near = static_cast<float>(renderer_->near_m());
   const auto slope = static_cast<float>(1 - renderer_->near_m() / renderer_->far_m());
-  for (std::size_t row = 0; row < rows; ++row) {
-    const float* from = buffer_.data() + (rows - 1 - row) * columns;
-    float* to = depth_m.data() + row * columns;
-    for (std::size_t column = 0; column < columns; ++column) to[column] = near / (1 - from[column] * slope);
-  }
+  const auto true_depths = [&](std::size_t row, std::vector<float>& line) {
+    const float* const from = buffer_.data() + (rows - 1 - row) * columns;
+    for (std::size_t column = 0; column < columns; ++column) line[column] = near / (1 - from[column] * slope);
+  };
   const auto of_all = [](double share) { return static_cast<std::uint32_t>(share * 4294967295.0); };
   const Chance chance{.seed = mix(seed_ ^ (static_cast<std::uint64_t>(stamp_.ns()) * 0x9e3779b97f4a7c15ULL)),
                       .sigma = static_cast<float>(spec_.depth_noise_m),
                       .drop = of_all(spec_.depth_dropout),
                       .edge_drop = of_all(std::min(kMostEdgeDropout, kEdgeDropout * spec_.depth_dropout))};
-  for (std::size_t row = 0; row < rows; ++row) {
-    float* line = depth_m.data() + row * columns;
-    chance.disturb(line, row + 1 < rows ? line + columns : line, columns, row * columns);
+  std::vector<float> line(columns), below(columns);
+  true_depths(begin, line);
+  for (std::size_t row = begin; row < end; ++row) {
+    if (row + 1 < rows) true_depths(row + 1, below);
+    chance.disturb(line, row + 1 < rows ? below : line, row * columns, depth_m.data() + row * columns);
+    line.swap(below);
   }
 }
 

@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "pons/body/body.hpp"
+#include "pons/core/both.hpp"
 #include "pons/sim/faults.hpp"
 #include "pons/sim/renderer.hpp"
 #include "pons/world/world.hpp"
@@ -24,10 +26,13 @@ class SimCamera final : public body::Camera {
   [[nodiscard]] const Intrinsics& intrinsics() const override { return intrinsics_; }
   void begin(Time now) override;
   [[nodiscard]] Expected<void> finish(RgbdFrame& frame) override;
+  // What finish() has the other half of a picture done by; before the first begin().
+  void lend(Both both) { both_ = std::move(both); }
 
  private:
   SimCamera() = default;
-  void measure_depth(PixelArray<float>& depth_m) const;
+  // Of the rows from `begin` to `end`.
+  void measure_depth(std::size_t begin, std::size_t end, PixelArray<float>& depth_m) const;
   void spoil(RgbdFrame& frame) const;
 
   world::CameraSpec spec_;
@@ -42,7 +47,8 @@ class SimCamera final : public body::Camera {
   Sight sight_;               // of the open shutter
   Time stamp_;
   bool open_ = false;
-  std::vector<std::uint8_t> rgb_;  // bottom row first
+  Both both_ = one_after_the_other;
+  std::vector<std::uint8_t> rgba_;  // bottom row first, as the renderer gives them
   std::vector<float> buffer_;
 };
 

@@ -184,6 +184,23 @@ TEST(Camera, FinishesOnAnotherThreadWhatWasTakenOnThisOne) {
   EXPECT_EQ(here.depth_m, there.depth_m);
 }
 
+TEST(Camera, HalvesOfAPictureMakeTheWholeWhoeverDoesThem) {
+  auto simulation = create(load_cell());
+  simulation->advance_to(Time(from_s(3)));
+  const RgbdFrame alone = shoot(*simulation, 1, Time(from_s(3)));
+  int lent = 0;
+  simulation->lend([&](const auto& first, const auto& second) {
+    ++lent;
+    std::thread other(second);
+    first();
+    other.join();
+  });
+  const RgbdFrame helped = shoot(*simulation, 1, Time(from_s(3)));
+  EXPECT_EQ(lent, 1);
+  EXPECT_EQ(alone.rgb, helped.rgb);
+  EXPECT_EQ(alone.depth_m, helped.depth_m);
+}
+
 TEST(Camera, FinishWithoutBeginIsAnError) {
   auto simulation = create(load_cell());
   RgbdFrame frame;

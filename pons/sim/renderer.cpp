@@ -5,18 +5,19 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <stdexcept>
+
+#include "pons/sim/unseen.hpp"
 
 namespace pons::sim {
 namespace {
 
 constexpr int kMostGeoms = 2000;
-constexpr int kStacks = 8;           // along the axis of what is round, caps included
-constexpr double kPlaneGrid_m = 20;  // spacing
+constexpr std::size_t kChannels = 4;  // of a pixel, as the driver keeps it
+constexpr int kStacks = 8;            // along the axis of what is round, caps included
+constexpr double kPlaneGrid_m = 20;   // spacing
 
 void set_look(mjvScene& scene, Look look) {
   const mjtByte on = look == Look::kPicture ? 1 : 0;
@@ -61,27 +62,6 @@ void drop_stencil(const GlContext& gl, const mjrContext& context, int width, int
 
 Eigen::Vector3f vector(const float v[3]) { return {v[0], v[1], v[2]}; }
 
-// The driver finds out only triangle by triangle, after it has lit them, that a geom lies outside of the picture.
-void leave_out_unseen(const mjModel* model, const mjvGLCamera& camera, float aspect, mjvScene& scene) {
-  const Eigen::Vector3f forward = vector(camera.forward), up = vector(camera.up), right = forward.cross(up);
-  const float near = camera.frustum_near;
-  const float half_width = 0.5F * aspect * (camera.frustum_top - camera.frustum_bottom);
-  // Normals, inward, of the four sides, which meet in the camera.
-  const std::array<Eigen::Vector3f, 4> inward = {near * up - camera.frustum_bottom * forward,
-                                                 camera.frustum_top * forward - near * up,
-                                                 near * right + (half_width - camera.frustum_center) * forward,
-                                                 (half_width + camera.frustum_center) * forward - near * right};
-  const auto outside = [&](const mjvGeom& geom) {
-    if (geom.objtype != mjOBJ_GEOM) return false;
-    const auto radius = static_cast<float>(model->geom_rbound[geom.objid]);  // of an infinite one 0
-    const Eigen::Vector3f from_camera = vector(geom.pos) - vector(camera.pos);
-    return radius > 0 && std::ranges::any_of(inward, [&](const Eigen::Vector3f& normal) {
-             return normal.dot(from_camera) < -radius * normal.norm();
-           });
-  };
-  scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom, outside) - scene.geoms);
-}
-
 // What is hidden is then refused by its depth before it is shaded. The floor, which has a texture and is nearly always
 // hidden, would cost as much as everything else together.
 void front_to_back(const mjvGLCamera& camera, mjvScene& scene) {
@@ -121,6 +101,7 @@ Expected<std::unique_ptr<Renderer>> Renderer::create(const mjModel* model, int w
     make_context(view, look, renderer->context_);
     mjr_setBuffer(mjFB_OFFSCREEN, &renderer->context_);
     if (look == Look::kSensor) drop_stencil(*renderer->gl_, renderer->context_, width, height);
+    renderer->context_.readPixelFormat = GL_RGBA;
   } catch (const std::runtime_error& error) {
     renderer->gl_->release();
     return fail(fmt::format("OpenGL cannot draw {} x {} pixels: {}", width, height, error.what()), "camera",
@@ -158,17 +139,17 @@ void Renderer::capture(const mjModel* model, mjData* data, int camera, const Lab
   }
 }
 
-Expected<void> Renderer::draw(std::vector<std::uint8_t>& rgb, std::vector<float>& depth) {
+Expected<void> Renderer::draw(std::vector<std::uint8_t>& rgba, std::vector<float>& depth) {
   if (auto current = gl_->make_current(); !current) return current;
   const mjrRect viewport{0, 0, width_, height_};
   const auto pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  rgb.resize(3 * pixels);
+  rgba.resize(kChannels * pixels);
   depth.resize(pixels);
   try {
     for (const int texture : changed_) mjr_uploadTexture(&view_, &context_, texture);
     changed_.clear();
     mjr_render(viewport, &scene_, &context_);
-    mjr_readPixels(rgb.data(), depth.data(), viewport, &context_);
+    mjr_readPixels(rgba.data(), depth.data(), viewport, &context_);
   } catch (const std::runtime_error& error) {
     gl_->release();
     return fail(fmt::format("OpenGL failed: {}", error.what()), "camera", "check the driver");
@@ -182,15 +163,24 @@ Expected<std::vector<std::uint8_t>> draw_picture(const mjModel* model, mjData* d
   auto renderer = Renderer::create(model, width, height, Look::kPicture);
   if (!renderer) return std::unexpected(renderer.error());
   (*renderer)->capture(model, data, camera, labels);
-  std::vector<std::uint8_t> upside_down;
+  std::vector<std::uint8_t> rgba;
   std::vector<float> depth;
-  if (auto drawn = (*renderer)->draw(upside_down, depth); !drawn) return std::unexpected(drawn.error());
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(upside_down.size());
-  const auto row = static_cast<std::ptrdiff_t>(3 * width);
-  for (int i = height - 1; i >= 0; --i)
-    rgb.insert(rgb.end(), upside_down.begin() + i * row, upside_down.begin() + (i + 1) * row);
+  if (auto drawn = (*renderer)->draw(rgba, depth); !drawn) return std::unexpected(drawn.error());
+  std::vector<std::uint8_t> rgb(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  turn_over(rgba, width, height, 0, static_cast<std::size_t>(height), rgb.data());
   return rgb;
+}
+
+// Four bytes at a time: what is written over into the next pixel that one overwrites.
+void turn_over(const std::vector<std::uint8_t>& rgba, int width, int height, std::size_t begin, std::size_t end,
+               std::uint8_t* rgb) {
+  const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
+  for (std::size_t row = begin; row < end; ++row) {
+    const std::uint8_t* const from = rgba.data() + (rows - 1 - row) * kChannels * columns;
+    std::uint8_t* const to = rgb + row * 3 * columns;
+    for (std::size_t i = 0; i + 1 < columns; ++i) std::memcpy(to + 3 * i, from + kChannels * i, kChannels);
+    std::memcpy(to + 3 * (columns - 1), from + kChannels * (columns - 1), 3);
+  }
 }
 
 }  // namespace pons::sim

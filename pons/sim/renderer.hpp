@@ -36,8 +36,9 @@ class Renderer {
   Renderer& operator=(const Renderer&) = delete;
 
   void capture(const mjModel* model, mjData* data, int camera, const LabelStore& labels);
-  // Bottom row first. Depth as in the buffer, 0 … 1; see depth_scale().
-  [[nodiscard]] Expected<void> draw(std::vector<std::uint8_t>& rgb, std::vector<float>& depth);
+  // Bottom row first. Colours as the driver keeps them, four bytes a pixel, the last without meaning: left to it, their
+  // conversion costs four times their way out. Depth as in the buffer, 0 … 1.
+  [[nodiscard]] Expected<void> draw(std::vector<std::uint8_t>& rgba, std::vector<float>& depth);
   // Metres along the optical axis from a buffer value d: near / (1 − d·(1 − near / far)).
   [[nodiscard]] double near_m() const { return near_m_; }
   [[nodiscard]] double far_m() const { return far_m_; }
@@ -56,6 +57,11 @@ class Renderer {
   int width_ = 0, height_ = 0;
   double near_m_ = 0, far_m_ = 0;
 };
+
+// Red, green and blue of what draw() gave, to `rgb`, height × width × 3 bytes, top row first: its rows from `begin` to
+// `end`.
+void turn_over(const std::vector<std::uint8_t>& rgba, int width, int height, std::size_t begin, std::size_t end,
+               std::uint8_t* rgb);
 
 // What that camera sees, for people: height × width × 3 bytes, top row first. On the thread that advances the physics.
 [[nodiscard]] Expected<std::vector<std::uint8_t>> draw_picture(const mjModel* model, mjData* data, int camera,

@@ -265,6 +265,9 @@ void Simulation::advance_to(Time time) {
 
 body::Body& Simulation::body(std::size_t arm) { return cell_->arm(arm); }
 const std::vector<body::Camera*>& Simulation::cameras() const { return cell_->camera_list; }
+void Simulation::lend(const Both& both) {
+  for (const auto& camera : cell_->cameras) camera->lend(both);
+}
 void Simulation::run_belt() {
   for (const auto& arm : cell_->arms)
     arm->write({.torque_nm = AxisVector::Zero(arm->station.robot.home.size()), .belt_runs = true});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pons/body/body.hpp"
+#include "pons/core/both.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
 #include "pons/world/faults.hpp"
@@ -45,6 +46,8 @@ class Simulation {
   [[nodiscard]] body::Body& body(std::size_t arm = 0);
   // In the order of world.cameras. They live as long as the simulation.
   [[nodiscard]] const std::vector<body::Camera*>& cameras() const;
+  // What the cameras have the halves of their pictures done by, one camera at a time; before the first picture.
+  void lend(const Both& both);
 
   // As set-points without power that let the belt run: what rides by an arm that stands.
   void run_belt();
