@@ -19,7 +19,7 @@ class Asker final : public Brain {
     Decisions decisions{.belt_waits = true};
     if (now < next || next >= until) return decisions;
     next = now + std::chrono::seconds(1);
-    const std::string id = "t" + std::to_string(++tasks);
+    const std::string id = std::string("t").append(std::to_string(++tasks));
     decisions.tasks.push_back({{"id", id}});
     decisions.rides.push_back({0, id, "why"});
     return decisions;

@@ -28,7 +28,11 @@ Json sorting(const std::string& id, const std::string& code, const std::string& 
   return task_of(id, code, {step("pick", {{"object", code}}), step("place", {{"place", place}, {"object", code}})});
 }
 
-Json home(const std::string& id) { return task_of(id, {}, {step("move_to", {{"place", "home"}})}); }
+Json move(const std::string& id, const std::string& place) {
+  return task_of(id, {}, {step("move_to", {{"place", place}})});
+}
+
+Json home(const std::string& id) { return move(id, "home"); }
 
 Json urgent(Json task) {
   task["priority"] = kUrgent;
@@ -91,7 +95,7 @@ std::vector<Json> Liar::tell(Lie lie, const std::vector<ObjectBelief>& beliefs) 
     case Lie::kWrongType:
       return {task_of(id, of.code, {step("pick", {{"object", 17}})})};
     case Lie::kUnknownObject:
-      return {task_of(id, {}, {step("pick", {{"object", kNobody}})})};
+      return {urgent(task_of(id, {}, {step("pick", {{"object", kNobody}})}))};
     case Lie::kUnknownPlace:
       return {sorting(id, of.code, "nowhere")};
     case Lie::kElsewhere:
@@ -124,20 +128,23 @@ std::vector<Json> Liar::tell(Lie lie, const std::vector<ObjectBelief>& beliefs) 
       return {task_of(id, of.code, {step("pick", {{"object", std::string(kLong, 'x')}})})};
     case Lie::kSortedAlready: {
       const Subject& done = ended_.empty() ? of : ended_.back();
-      return {sorting(id, done.code, done.place)};
+      return {urgent(sorting(id, done.code, done.place))};
     }
     case Lie::kPickOnly: {
       const auto there = std::ranges::find_if(beliefs, [](const ObjectBelief& object) { return !object.code.empty(); });
       const std::string code = there == beliefs.end() ? of.code : there->code;
-      return {task_of(id, code, {step("pick", {{"object", code}})})};
+      return {urgent(task_of(id, code, {step("pick", {{"object", code}})}))};
     }
     case Lie::kPlaceOnly:
-      return {task_of(id, of.code, {step("place", {{"place", of.place}, {"object", of.code}})})};
+      return {urgent(task_of(id, of.code, {step("place", {{"place", of.place}, {"object", of.code}})}))};
+    case Lie::kPutAway:
+      return {urgent(sorting(id, of.code, exception()))};
     case Lie::kTwice:
       return {urgent(sorting(id, of.code, of.place))};
     case Lie::kMoves: {
       std::vector<Json> moves;
-      for (int i = 0; i < kMovesAtOnce; ++i) moves.push_back(urgent(home(lies_.new_id())));
+      for (int i = 0; i < kMovesAtOnce; ++i)
+        moves.push_back(urgent(move(lies_.new_id(), i % 2 == 0 ? of.place : "home")));
       return moves;
     }
     case Lie::kNoTask:
@@ -161,6 +168,11 @@ std::string Liar::another_chute(const std::string& than) const {
     if (place.kind == world::PlaceKind::kChute && place.name != than) return place.name;
   }
   return than;
+}
+
+std::string Liar::exception() const {
+  const auto found = std::ranges::find(world_.places, world::PlaceKind::kException, &world::Place::kind);
+  return found == world_.places.end() ? "exception" : found->name;
 }
 
 bool Liar::is_lie(const Json& task) {

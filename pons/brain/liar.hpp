@@ -29,16 +29,17 @@ enum class Lie : std::uint8_t {
   kDeadline,       // long past
   kTooDeep,        // arrays in arrays
   kTooLong,        // an argument of 100,000 characters
-  kSortedAlready,  // a parcel whose task has ended, once more
-  kPickOnly,       // of one that lies there; nothing is said of what to do with it
-  kPlaceOnly,      // of one that it did not have picked
+  kSortedAlready,  // a parcel that is sorted, once more and urgently
+  kPickOnly,       // of one that lies there, urgently; nothing is said of what to do with it
+  kPlaceOnly,      // of one that it did not have picked by this task, urgently
+  kPutAway,        // into the exception chute, urgently
   kTwice,          // what it has asked for, urgently and under another id
   kMoves,          // the arm to and fro, urgently
   kNoTask,         // what is no task at all
   kBadId,          // a number where an id belongs
   kBadText,        // bytes that are no text
 };
-inline constexpr std::size_t kLies = 20;
+inline constexpr std::size_t kLies = 21;
 
 // When lies come and which, for a whole run: it outlives the brains. All kinds in turn, in an order drawn anew each
 // time.
@@ -49,7 +50,7 @@ class Lies {
   [[nodiscard]] std::optional<Lie> due(Time now);
   [[nodiscard]] std::int64_t count() const { return count_; }
   // For its id; differs from every other's of the run.
-  [[nodiscard]] std::string new_id() { return "lie-" + std::to_string(++ids_); }
+  [[nodiscard]] std::string new_id() { return std::string("lie-").append(std::to_string(++ids_)); }
 
  private:
   void wait(Time after);
@@ -87,6 +88,7 @@ class Liar final : public Brain {
   };
   [[nodiscard]] Subject asked() const;
   [[nodiscard]] std::string another_chute(const std::string& than) const;
+  [[nodiscard]] std::string exception() const;
 
   Brain& honest_;
   Lies& lies_;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 
 namespace pons::referee {
@@ -23,30 +22,32 @@ struct Entry {
   bool succeeded = false;
   bool ride = false;  // let go by on purpose
   std::string last_reason;
+  std::string put_into;   // where the last task that succeeded put it
   std::string fell_into;  // the chute that the last outcome, or a later entry, names
 };
 
-// The parcels that a task puts somewhere: what a step places or, where that does not say, what was picked before. None
-// for a task that looks or moves only.
-std::set<std::string> objects_of(const task::Task& task) {
-  std::set<std::string> objects;
+// The parcels that a task puts somewhere, and where: what a step places or, where that does not say, what was picked
+// before. None for a task that looks or moves only.
+std::map<std::string, std::string> objects_of(const task::Task& task) {
+  std::map<std::string, std::string> objects;
   std::string picked;
   for (const task::Step& step : task.steps) {
     if (step.skill == "pick") picked = step.arguments.value("object", std::string{});
     if (step.skill != "place") continue;
     const std::string placed = step.arguments.value("object", picked);
-    if (!placed.empty()) objects.insert(placed);
+    if (!placed.empty()) objects[placed] = task::text_of(step.arguments, "place");
   }
   return objects;
 }
 
-void take_in(Entry& entry, const std::optional<bridge::OutcomeRecord>& outcome) {
+void take_in(Entry& entry, const std::string& place, const std::optional<bridge::OutcomeRecord>& outcome) {
   entry.ended = outcome.has_value() && (entry.tasks == 0 || entry.ended);
   ++entry.tasks;
   if (!outcome) return;
   if (outcome->outcome == Outcome::kSucceeded) {
     entry.succeeded = true;
     ++entry.successes;
+    entry.put_into = place;
   }
   entry.last_reason = outcome->reason;
   entry.fell_into.clear();
@@ -66,7 +67,7 @@ Expected<Story> read(const bridge::Journal& journal) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (const bridge::TaskRecord& record : *tasks) {
-    for (const std::string& object : objects_of(record.task)) take_in(entries[object], record.outcome);
+    for (const auto& [object, place] : objects_of(record.task)) take_in(entries[object], place, record.outcome);
   }
   const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
@@ -137,7 +138,10 @@ class Judge {
   }
 
   void in_exception(const ParcelTruth& parcel, const Entry& entry) {
-    if (entry.succeeded) return lost(parcel, entry, "in the exception chute, but the journal says sorted");
+    // Some brain wanted it there.
+    const bool put_there = entry.succeeded && entry.put_into == parcel.place;
+    if (entry.succeeded && !put_there)
+      return lost(parcel, entry, "in the exception chute, but the journal says sorted");
     if (!entry.ride && !entry.ended) return lost(parcel, entry, "in the exception chute without an entry");
     if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {
       ++verdict_.deserved;

@@ -85,6 +85,22 @@ TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   EXPECT_THAT(verdict.findings, ::testing::ElementsAre(::testing::HasSubstr("B: lost")));
 }
 
+// Some brain wanted it so: nobody calls it sorted.
+TEST_F(RefereeTest, WhatATaskHasPutIntoTheExceptionChuteIsAnExceptionAndNotLost) {
+  for (const char* const code : {"A", "B"}) {
+    const std::string place = code == std::string("A") ? "exception" : "chute_1";
+    ASSERT_TRUE(journal_->accept(
+        {.id = code, .steps = {{"pick", {{"object", code}}}, {"place", {{"object", code}, {"place", place}}}}},
+        Time{}));
+    end(code, Outcome::kSucceeded);
+  }
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kException, "exception")});
+  EXPECT_EQ(verdict.sorted, 0);
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.lost, 1) << "the journal says that this one was sorted";
+}
+
 TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {
   ride("A");
   ASSERT_TRUE(journal_->accept({.id = "A", .steps = {{"detect", {{"object", "A"}}}}}, Time{}));

@@ -125,11 +125,11 @@ TEST(Faults, ABridgeThatIsKilledCostsTimeOnly) {
   EXPECT_GE(run.report["parcels"]["sorted"], 24) << run.said;
 }
 
-// Beside its work it asks for what is wrong in twenty ways: what is refused is refused by name, and what is not costs
-// time.
+// Beside its work it asks for what is wrong in some twenty ways: what is refused is refused by name, and what is not
+// costs time.
 TEST(Faults, ABrainThatLiesChangesNothingOfWhatIsSorted) {
   const Faulty run = run_with("brain_lie: {an_hour: 1200}\n", 30, 3);
-  EXPECT_GE(run.injected("brain_lie"), 20) << "each kind at least once";
+  EXPECT_GE(run.injected("brain_lie"), 21) << "each kind at least once";
   EXPECT_EQ(run.report["interventions"], 0) << run.said;
   EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
   EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 2) << run.said;
