@@ -104,8 +104,10 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
       forgotten_.push_back(track);
     }
     if (!robot->skills.take_strays) continue;
-    for (const Json& stray : robot->skills.take_strays())
-      bridge_.note("stray", stray, now, task::text_of(stray, "code"));
+    const std::vector<Json> strays = robot->skills.take_strays();
+    for (const Json& stray : strays) bridge_.note("stray", stray, now, task::text_of(stray, "code"));
+    // Durable at once: a bridge that comes after this one could not tell.
+    if (!strays.empty()) (void)bridge_.commit(now);
   }
   if (gone_.size() > kGoneRemembered) gone_.erase(gone_.begin(), gone_.end() - kGoneRemembered);
   return {};
