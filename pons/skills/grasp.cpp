@@ -10,11 +10,18 @@
 #include <utility>
 
 #include "pons/skills/grip.hpp"
+#include "pons/skills/scale.hpp"
 
 namespace pons::skills {
 namespace {
 
 constexpr double kPressFurther_m = 0.003, kPressTakes_s = 0.08, kPressRides_s = 0.4;
+constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
+constexpr double kTouched_kg = 0.25;     // and of anything that the cups touch
+constexpr int kPresses = 2;
+constexpr double kDeeper_m = 0.015, kDeeper_m_s = 0.15;
+constexpr double kOverBelt_m = 0.012;  // the thinnest is as high
+constexpr int kDeepest = 3;
 constexpr double kWithin_m = 0.02;    // the zone, where the arm waits,
 constexpr double kWait_m = 0.15;      // over the parcel that it waits for,
 constexpr double kWaitOver_m = 0.06;  // and over the others, which pass below
@@ -221,15 +228,26 @@ Expected<motion::Trajectory> way_to_wait(Cell& cell, const ObjectBelief& object,
                            cell.limits_empty());
 }
 
-Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at, const Eigen::Matrix3d& orientation) {
+Expected<PressedDown> press_down(Cell& cell, Time now, const Eigen::Matrix3d& orientation, Presses& presses) {
+  const double pushed_kg = -weigh_now(cell);
+  const bool touches = pushed_kg > kTouched_kg || cell.arm.cups().sealed_cups > 0;
+  int& tried = touches ? presses.further : presses.deeper;
+  if (pushed_kg > kPressedHard_kg || tried >= (touches ? kPresses : kDeepest)) return fail("pressed enough", "grasp");
+  const Time from = cell.arm.splice_time(now);
+  const AxisState start = cell.arm.planned(from);
+  const double tip_z = cell.model.world_from_tip(start.position).translation().z();
+  const double by_m =
+      touches ? kPressFurther_m : std::min(kDeeper_m, tip_z - cell.world.belt.surface_z_m - kOverBelt_m);
+  if (by_m <= 0) return fail("there is only the belt", "grasp");
   const Vector3 belt{cell.belt_speed_m_s(), 0, 0};
-  auto down = nudge(cell, start, at, orientation, kPressTakes_s * belt - Vector3(0, 0, kPressFurther_m), belt,
-                    cell.limits_empty());
+  const double takes_s = kPressTakes_s + (by_m - kPressFurther_m) / kDeeper_m_s;
+  auto down = nudge(cell, start, from, orientation, takes_s * belt - Vector3(0, 0, by_m), belt, cell.limits_empty());
   if (!down) return std::unexpected(down.error());
   const Time end = down->back().end();
   const auto along = ride(cell, motion::sample(*down, end, cell.model.axes()), end, orientation, kPressRides_s);
   if (!along) return std::unexpected(along.error());
   down->insert(down->end(), along->begin(), along->end());
+  ++tried;
   return PressedDown{*std::move(down), end};
 }
 

@@ -84,14 +84,20 @@ struct Lift {
 [[nodiscard]] Expected<motion::Trajectory> way_to_wait(Cell& cell, const ObjectBelief& object, const Grasp& grasp,
                                                        Time now);
 
-// The cups a little further down onto what they touch, riding along with the belt from `pressed` on. Error: out of
-// reach.
+// How often the cups of one grasp were pressed further onto what they touch, or brought deeper where they touch
+// nothing.
+struct Presses {
+  int further = 0, deeper = 0;
+};
+// Too few cups have sealed: a little further down, riding along with the belt from `pressed` on. A parcel that lies
+// askew meets some cups first; pressing on, the bellows give way and the others seal, too. What lay on another that is
+// gone lies lower than it was seen. Error: as hard or often as may be, as deep as the belt, or out of reach.
 struct PressedDown {
   motion::Trajectory trajectory;
   Time pressed;
 };
-[[nodiscard]] Expected<PressedDown> press_down(Cell& cell, const AxisState& start, Time at,
-                                               const Eigen::Matrix3d& orientation);
+[[nodiscard]] Expected<PressedDown> press_down(Cell& cell, Time now, const Eigen::Matrix3d& orientation,
+                                               Presses& presses);
 
 // What hangs on the cups, as if it were seen there.
 [[nodiscard]] ObjectBelief held_at(const Held& held, const Pose& world_from_tip);

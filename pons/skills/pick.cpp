@@ -20,8 +20,6 @@ using task::Status;
 constexpr Duration kVacuumLead = std::chrono::milliseconds(40);   // before the contact
 constexpr Duration kSealWithin = std::chrono::milliseconds(330);  // after it, while riding along
 constexpr Duration kPressAfter = std::chrono::milliseconds(90);   // the contact, when too few cups have sealed
-constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel bears twice as much
-constexpr int kPresses = 2;
 constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kTryEvery = std::chrono::milliseconds(40);
@@ -327,7 +325,7 @@ class Pick final : public ArmSkill {
     const int all = static_cast<int>(cell_.world.robot.tool.cups_m.size());
     const int needed_ticks = cups.sealed_cups == all ? 1 : 3;
     if (now >= grasp_.contact && sealed_ticks_ >= needed_ticks) return begin_lift(now);
-    if (now > grasp_.contact + kPressAfter && presses_ < kPresses && press_further(now)) return {};
+    if (now > grasp_.contact + kPressAfter && press_further(now)) return {};
     if (now > grasp_.contact + kSealWithin) {
       // It was not there, and no camera has seen it since another was taken from beside it.
       if (cups.sealed_cups == 0 && cell_.strays->missed_twice(code_))
@@ -344,14 +342,10 @@ class Pick final : public ArmSkill {
     return {};
   }
 
-  // A parcel that lies askew meets some cups first; pressing on, the bellows give way and the others seal, too.
   bool press_further(Time now) {
-    if (weigh_now(cell_) < -kPressedHard_kg) return false;
-    const Time from = cell_.arm.splice_time(now);
-    const auto down = press_down(cell_, cell_.arm.planned(from), from, grasp_.orientation);
+    const auto down = press_down(cell_, now, grasp_.orientation, presses_);
     if (!down || !cell_.arm.stream(down->trajectory)) return false;
     grasp_.contact = down->pressed;
-    ++presses_;
     return true;
   }
 
@@ -470,7 +464,8 @@ class Pick final : public ArmSkill {
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_, tangled_;
   GraspSearch search_;
-  int sealed_ticks_ = 0, presses_ = 0, quarters_ = 0;
+  Presses presses_;
+  int sealed_ticks_ = 0, quarters_ = 0;
   bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
 };
 

@@ -44,11 +44,12 @@ class PickTest : public ::testing::Test {
     state.position = at.position, state.speed = at.speed;
     state.belt_speed_m_s = belt_m_s_;
     state.belt_travel_m = belt_travel_m_ += 0.01 * belt_m_s_;
+    const Pose flange = cell_.model.world_from_tip(at.position) * world_.robot.tool.flange_from_tip.inverse();
+    const Vector3 tool_n = flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * world_.robot.tool.mass_kg);
+    if (feels_tool_) std::ranges::copy(tool_n, state.wrist_force_n.begin());
     if (grips_kg_) {
       state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
-      const Pose flange = cell_.model.world_from_tip(at.position) * world_.robot.tool.flange_from_tip.inverse();
       const Vector3 load_n = flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * *grips_kg_);
-      const Vector3 tool_n = flange.linear().transpose() * Vector3(0, 0, -kGravity_m_s2 * world_.robot.tool.mass_kg);
       const Vector3 moment_nm = (world_.robot.tool.flange_from_tip * hangs_in_tip_m_).cross(load_n);
       std::ranges::copy(load_n + tool_n, state.wrist_force_n.begin());
       std::ranges::copy(moment_nm, state.wrist_torque_nm.begin());
@@ -70,6 +71,7 @@ class PickTest : public ::testing::Test {
   bool asked_ = false;
   double belt_m_s_ = 0, belt_travel_m_ = 0;
   std::optional<double> grips_kg_;
+  bool feels_tool_ = false;                   // without a load, too: nothing pushes against it
   Vector3 hangs_in_tip_m_ = Vector3::Zero();  // where the weight of it does
   link::SafetyState safety_ = link::SafetyState::kOperational;
   const world::World world_ = parcel_cell();
@@ -257,6 +259,33 @@ TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
   }
   EXPECT_EQ(progress.status, Status::kRetry);
   EXPECT_THAT(progress.reason, HasSubstr("elsewhere"));
+}
+
+// What lay on another that has been taken since lies on the belt.
+TEST_F(PickTest, WhatLiesLowerThanItSeemedIsFoundFurtherDown) {
+  const auto touched_at = [this](double size_z_m, double really_m) {
+    feels_tool_ = true;
+    grips_kg_.reset();
+    tick_with({parcel(1, 0.1, 0, {0.2, 0.11, size_z_m})});
+    const auto skill = start("P1");
+    double lowest_m = 1;
+    Progress progress;
+    for (int i = 0; i < 600 && progress.status == Status::kRunning; ++i) {
+      tick_with({parcel(1, 0.1, 0, {0.2, 0.11, size_z_m})});
+      progress = skill->tick(now_);
+      const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
+      lowest_m = std::min(lowest_m, tip_z - world_.belt.surface_z_m);
+      if (lowest_m < really_m) grips_kg_ = 0.5;
+    }
+    return std::pair(progress.status, lowest_m);
+  };
+  const auto [found, height_m] = touched_at(0.11, 0.075);
+  EXPECT_EQ(found, Status::kSucceeded);
+  EXPECT_GT(height_m, 0.055);
+  cell_.held.reset();
+  const auto [missed, lowest_m] = touched_at(0.03, 0);
+  EXPECT_EQ(missed, Status::kRetry);
+  EXPECT_NEAR(lowest_m, 0.012, 0.003) << "never onto the belt";
 }
 
 // What stopped the arm may lean on it, and nobody knows where it is.
