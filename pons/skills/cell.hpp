@@ -45,6 +45,12 @@ struct Miss {
   Time time;
 };
 
+// A parcel on which another was found to hang, and what both weighed.
+struct Hooked {
+  std::string code;
+  double mass_kg = 0;
+};
+
 class Cell {
  public:
   // `link` and `world` must outlive it. `splice_lead`: see Arm.
@@ -57,6 +63,7 @@ class Cell {
   // When that frame was taken; where no camera watches the belt, the last tick.
   [[nodiscard]] Time seen() const { return seen_; }
 
+  [[nodiscard]] bool was_hooked(std::string_view code) const { return hooked && hooked->code == code; }
   // The belief with this label, or nullptr.
   [[nodiscard]] const ObjectBelief* find(std::string_view code) const;
   // Whether something that shows two codes has this one among them.
@@ -168,7 +175,7 @@ class Cell {
   Mouths mouths;
   std::optional<Held> held;
   std::optional<Miss> missed;
-  std::optional<std::string> hooked;                            // the last code on which another was found to hang
+  std::optional<Hooked> hooked;                                 // the last one
   std::optional<Held> lost;                                     // from the cups in the last stop in which anything was
   std::shared_ptr<Strays> strays = std::make_shared<Strays>();  // of all arms of a belt
   double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks

@@ -38,7 +38,8 @@ constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups sli
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
-constexpr double kUnweighable = 2.0;   // times the mass limit
+constexpr double kShed = 0.06, kShed_kg = 0.02;  // lighter by so much, it has lost what hung on it
+constexpr double kUnweighable = 2.0;             // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kUntangles = std::chrono::milliseconds(2000);
@@ -185,7 +186,7 @@ class Pick final : public ArmSkill {
   // again from where it lies.
   void keep_in_reach(const ObjectBelief& object, Time now) {
     const double x_m = object.world_from_top.translation().x();
-    if (cell_.hooked == code_ || cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
+    if (cell_.was_hooked(code_) || cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
   }
 
   // Then the belt waits for the arm, at the end of the zone; while it stops, nothing is met well.
@@ -207,7 +208,7 @@ class Pick final : public ArmSkill {
   // What was put back lies as it lay: it only seems tied to its neighbour until arm and shadow have left the view.
   bool untangles(Time now) {
     if (!tangled_) tangled_ = now;
-    return cell_.hooked == code_ && now < *tangled_ + kUntangles;
+    return cell_.was_hooked(code_) && now < *tangled_ + kUntangles;
   }
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
@@ -364,7 +365,7 @@ class Pick final : public ArmSkill {
                       .load = load_of(target_, grasp_.orientation),
                       .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
                       .falls = cell_.falls()};
-    cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company, lift_end_);
+    cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company);
     cell_.lost.reset();
     const Vector3& size = cell_.held->load.size_m;
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
@@ -391,13 +392,16 @@ class Pick final : public ArmSkill {
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
     const Held& held = *cell_.held;
     const Companion* const other = weighed ? felt_on(held.load, *weighed, held.company) : nullptr;
+    const bool again = cell_.was_hooked(code_);
+    // What hung on it then does so no longer: what is felt now is where the cups took hold.
+    const bool alone = again && weighed && weighed->mass_kg < (1 - kShed) * cell_.hooked->mass_kg - kShed_kg;
     const bool lopsided =
-        weighed && (other != nullptr ||
-                    hangs_beside(held.load, *weighed, cell_.hooked == code_ ? Uneven::kDoubted : Uneven::kUsual));
+        weighed && ((other != nullptr && !alone) ||
+                    hangs_beside(held.load, *weighed, again && !alone ? Uneven::kDoubted : Uneven::kUsual));
     // If it is put back, then within reach.
     const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
     if (lopsided || (near_end && !held.company.empty())) cell_.hold_belt(now);
-    if ((!weighed || heavy || lopsided) && !at_rest) return {};
+    if ((!weighed || heavy || lopsided || again) && !at_rest) return {};
     if ((target_.crowded || !held.company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
@@ -405,7 +409,7 @@ class Pick final : public ArmSkill {
     cell_.arm.expect_contact(0);
     if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
     if (lopsided) {
-      cell_.hooked = code_;
+      cell_.hooked = Hooked{code_, mass};
       const std::string name = other != nullptr && !other->code.empty() ? other->code : "another";
       return begin_put_back(now, 0, {Status::kRetry, name + " hangs on it: its weight is felt beside it", {}});
     }

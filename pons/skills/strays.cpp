@@ -17,7 +17,7 @@ void forget_oldest(auto& list) {
 
 }  // namespace
 
-void Strays::lifted(const std::string& arm, const std::string& load, const Company& company, Time hangs) {
+void Strays::lifted(const std::string& arm, const std::string& load, const Company& company) {
   put_back(load);  // as somebody else may have, of whom nobody told
   for (const Companion& companion : company) {
     Doubted one;
@@ -25,7 +25,6 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
     one.arm = arm;
     one.load = load;
     one.stray.code = companion.code;
-    one.since = hangs;
     doubted_.push_back(std::move(one));
   }
   forget_oldest(doubted_);
@@ -76,7 +75,7 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
   for (const ObjectBelief& object : objects) {
     std::erase_if(doubted_, [&](const Doubted& one) {
       const bool same = one.track == object.track || (!one.stray.code.empty() && one.stray.code == object.code);
-      return same && object.last_seen > one.since;
+      return same && one.let_go && object.last_seen > *one.let_go;
     });
   }
   for (Doubted& one : doubted_) {
@@ -88,17 +87,22 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
       one.ends_m = belt.travel_m + belt.end_m - *one.at_m;
       if (one.stray.code.empty()) one.stray.code = object->code;
     }
-    if (one.gone || !has_gone(one, believed, belt)) continue;
+    if (one.gone || !one.at_m) continue;
+    const bool unseen = !believed && *one.at_m < belt.view_end_m;
+    if (!unseen && !(is_over(one, belt) && !has_ridden_off(one))) continue;
     one.gone = true;
     if (one.let_go) found_gone_.push_back(one.stray);
   }
+  std::erase_if(doubted_, [&](const Doubted& one) {
+    return !one.gone && one.let_go && one.at_m && is_over(one, belt) && has_ridden_off(one);
+  });
 }
 
-bool Strays::has_gone(const Doubted& one, bool believed, const BeltAt& belt) const {
-  if (!one.at_m) return false;
-  if (!believed && *one.at_m < belt.view_end_m) return true;
-  if (belt.travel_m < one.ends_m + kLater_m) return false;
-  return std::ranges::none_of(rode_off_, [&](double travel_m) {
+// It must have come to the belt's end.
+bool Strays::is_over(const Doubted& one, const BeltAt& belt) { return belt.travel_m > one.ends_m + kLater_m; }
+
+bool Strays::has_ridden_off(const Doubted& one) const {
+  return std::ranges::any_of(rode_off_, [&](double travel_m) {
     return travel_m > one.ends_m - one.half_m - kSooner_m && travel_m < one.ends_m + kLater_m;
   });
 }

@@ -27,8 +27,8 @@ struct BeltAt {
 // Of all arms of a belt, which are told apart by their names, as loads are by their codes. One thread.
 class Strays {
  public:
-  // A load with that company hangs free on the arm's cups from then on.
-  void lifted(const std::string& arm, const std::string& load, const Company& company, Time hangs);
+  // A load with that company hangs on the arm's cups.
+  void lifted(const std::string& arm, const std::string& load, const Company& company);
   // It lies on the belt again, and who came along, too.
   void put_back(const std::string& load);
   // It was let go of, or fell, into that place.
@@ -38,8 +38,9 @@ class Strays {
   void fell(const std::string& arm, const std::string& place, Time now);
   // Something rode off the belt's end.
   void rode_off(double travel_m);
-  // Each tick's beliefs: whoever is seen has stayed. Who is believed to lie nowhere any more, and was to be seen, or
-  // should have ridden off the belt's end and did not, has gone.
+  // Each tick's beliefs: whoever is seen since the load was let go of has stayed, for until then who hangs beside it
+  // may be seen, too. Who is believed to lie nowhere any more, and was to be seen, or should have ridden off the belt's
+  // end and did not, has gone.
   void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt);
   // It was taken off the belt by itself.
   void taken(std::uint32_t track);
@@ -55,7 +56,6 @@ class Strays {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along
     Stray stray;                 // the place is empty as long as that hangs on the cups
-    Time since;                  // it hangs
     std::optional<Time> let_go;  // of the load
     bool torn_off = false;       // where it fell a light curtain has told
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
@@ -64,7 +64,8 @@ class Strays {
     bool missed = false, gone = false;
   };
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
-  [[nodiscard]] bool has_gone(const Doubted& one, bool believed, const BeltAt& belt) const;
+  [[nodiscard]] static bool is_over(const Doubted& one, const BeltAt& belt);
+  [[nodiscard]] bool has_ridden_off(const Doubted& one) const;
 
   std::vector<Doubted> doubted_;
   std::vector<Stray> found_gone_;
