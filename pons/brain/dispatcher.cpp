@@ -187,10 +187,12 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
   return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
 }
 
-// Asked for, and where the belt must stop now to keep it in the zone.
+// Asked for, or about to be again, and where the belt must stop now to keep it in the zone.
 bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
   const auto known = known_.find(belief.code);
-  if (known == known_.end() || !known->second.asked) return false;
+  if (known == known_.end()) return false;
+  const bool soon = known->second.failed && !decided_.contains(belief.track);
+  if (!known->second.asked && !soon) return false;
   return belt_.must_wait_for(belief.world_from_top.translation().x(), std::max(belief.velocity_m_s.x(), 0.0));
 }
 

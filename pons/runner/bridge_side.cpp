@@ -71,7 +71,10 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   if (const auto snapshot = observer.collect(now, std::exchange(forgotten_, {}))) take_in(*snapshot, now);
 
   const double belt_travel_m = first().state().belt_travel_m;
-  const std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
+  std::vector<ObjectBelief> objects = predicted(seen_.objects, now, belt_travel_m);
+  for (const auto& robot : robots_) {
+    if (robot->skills.label) robot->skills.label(objects);
+  }
   std::vector<ObjectBelief> obstacles = objects;
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
   for (const auto& robot : robots_) robot->skills.refresh(now, obstacles, seen_.belt_seen);

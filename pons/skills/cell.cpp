@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/grip.hpp"
 #include "pons/world/view.hpp"
@@ -35,6 +36,8 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;                 // the scale's
 constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
 constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
+constexpr double kBeside_m = 0.05;                 // its middle when a load falls that comes to lie on the belt
+constexpr double kInstant_s = 0.001;
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
@@ -83,8 +86,8 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   router.refresh();
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
-    lost = std::move(held);
-    holds_nothing();
+    lost = held;
+    dropped();
   }
   const double passed_s = to_s(now - now_);
   const double speed = belt_speed_m_s();
@@ -108,7 +111,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
   watch_strays();
-  recognise_left();
+  recognise(speed * passed_s);
   take_in_cut();
   add_unseen();
 }
@@ -192,9 +195,40 @@ void Cell::lifted(const ObjectBelief& object) {
   std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
 }
 
+void Cell::dropped() {
+  const link::State& state = arm.state();
+  const Vector3 tip = model.world_from_tip(state.position).translation();
+  const Vector3 tip_soon = model.world_from_tip(state.position + kInstant_s * state.speed).translation();
+  const double height_m = tip.z() - held->load.size_m.z() - world.belt.surface_z_m;
+  const double falls_s = std::sqrt(2 * std::max(0.0, height_m) / kGravity_m_s2);
+  const Vector3 lands = tip + falls_s / kInstant_s * (tip_soon - tip);
+  const bool on_belt = std::abs(lands.y() - world.belt.y_center_m) < 0.5 * world.belt.width_m + kBeside_m;
+  if (on_belt && in_view(lands.x())) fallen_.fell(held->code, held->load.size_m, lands, objects_, now_);
+  holds_nothing();
+}
+
+void Cell::recognise(double rode_m) {
+  recognise_left();
+  for (auto& [track, code] : fallen_.recognise(objects_, rode_m, now_)) {
+    note("recognised", {{"code", code}, {"track", track}});
+    labelled_[track] = std::move(code);
+  }
+  std::erase_if(labelled_, [&](const auto& entry) {
+    return std::ranges::find(objects_, entry.first, &ObjectBelief::track) == objects_.end();
+  });
+  label(objects_);
+}
+
+void Cell::label(std::vector<ObjectBelief>& objects) const {
+  for (ObjectBelief& object : objects) {
+    const auto label = labelled_.find(object.track);
+    if (label != labelled_.end() && object.code.empty() && object.disputed.empty()) object.code = label->second;
+  }
+}
+
 // Nothing else can have come to lie just there.
 void Cell::recognise_left() {
-  for (ObjectBelief& object : objects_) {
+  for (const ObjectBelief& object : objects_) {
     if (object.track == 0) continue;
     std::erase_if(left_, [&](const ObjectBelief& left) {
       const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
@@ -203,12 +237,7 @@ void Cell::recognise_left() {
       if (lies_there) labelled_[object.track] = left.code;
       return lies_there || (object.code == left.code && !left.code.empty());
     });
-    const auto label = labelled_.find(object.track);
-    if (label != labelled_.end() && object.code.empty()) object.code = label->second;
   }
-  std::erase_if(labelled_, [&](const auto& entry) {
-    return std::ranges::find(objects_, entry.first, &ObjectBelief::track) == objects_.end();
-  });
 }
 
 void Cell::hides(double reach_m, double height_m) {

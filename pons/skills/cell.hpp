@@ -17,6 +17,7 @@
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
 #include "pons/skills/company.hpp"
+#include "pons/skills/fallen.hpp"
 #include "pons/skills/mouths.hpp"
 #include "pons/skills/reach.hpp"
 #include "pons/skills/route.hpp"
@@ -82,6 +83,10 @@ class Cell {
   void weighs(double mass_kg);
   // Nothing is held any longer: likewise.
   void holds_nothing();
+  // What is held has fallen, likewise. Where that is over the belt it may lie there again, and belt and arm are to wait
+  // and to keep out of the view as long as it awaits() it.
+  void dropped();
+  [[nodiscard]] bool awaits(std::string_view code) const { return fallen_.awaits(code); }
 
   // A skill that was halted may have left something on the cups that nobody knows of.
   void let_go_of_unknown() {
@@ -95,6 +100,8 @@ class Cell {
   // What is held was put back on the belt, with the tip there. Until a camera sees it, it is known from that, riding
   // with the belt; then it keeps its label, which no camera may be able to read any more.
   void left_on_belt(const Pose& world_from_tip);
+  // Gives the codes to those unread that it knows from what was put back or has fallen.
+  void label(std::vector<ObjectBelief>& objects) const;
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt
   // counts as so high an obstacle, until the tip has left it; so long unseen_end() counts as no higher, either, or it
   // would hold the arm.
@@ -186,6 +193,7 @@ class Cell {
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
+  void recognise(double rode_m);
   void recognise_left();
   void take_in_cut();
   void watch_strays();
@@ -205,7 +213,8 @@ class Cell {
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;
-  std::vector<ObjectBelief> left_;                 // on the belt, and not seen since, as of now_
+  std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
+  Fallen fallen_;
   std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since
   std::uint32_t lefts_ = 0;
   std::optional<ObjectBelief> hidden_;

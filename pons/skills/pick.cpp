@@ -142,6 +142,7 @@ class Pick final : public ArmSkill {
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
       step_aside(now);
+      if (cell_.awaits(code_)) return cell_.hold_belt(now), Progress{};
       if (now - seen_ < kUnseenFor) return {};
       return not_there(cell_, code_);
     }
@@ -378,7 +379,7 @@ class Pick final : public ArmSkill {
   Progress lift(Time now) {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
-      cell_.holds_nothing();
+      cell_.dropped();
       cell_.strays->put_back(code_);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};

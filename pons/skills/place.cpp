@@ -235,7 +235,7 @@ class Place final : public ArmSkill {
   Progress begin_fall(Time now, Held load) {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
-    cell_.holds_nothing();
+    if (cell_.held) cell_.dropped();
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
     phase_ = Phase::kFall;
@@ -252,8 +252,16 @@ class Place final : public ArmSkill {
       detail["fell_into"] = chute->name;
       return {Status::kException, "fell into " + chute->name, std::move(detail)};
     }
+    if (cell_.awaits(fallen_.code)) return look_for_it(now);
     if (now < fell_at_ + kFallsWithin) return {};
     return {Status::kFailed, "dropped", std::move(detail)};
+  }
+
+  // On the belt, where it is asked for again once it is seen.
+  Progress look_for_it(Time now) {
+    cell_.hold_belt(now);
+    if (cell_.arm.operational()) aside_ = aside_ || cell_.step_aside(now);
+    return {};
   }
 
   // From the vertical, in radians, and still fall through the mouth: its lower edges move aside with its height.
@@ -311,7 +319,7 @@ class Place final : public ArmSkill {
   world::Entry entry_;
   Held fallen_;  // what the cups lost on the way
   Time fell_at_;
-  bool cancelled_ = false;
+  bool cancelled_ = false, aside_ = false;
 };
 
 // Beside the arm: what the place has, or any place may have that the arguments may come to name.

@@ -1,0 +1,71 @@
+#include "pons/skills/fallen.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace pons::skills {
+namespace {
+
+constexpr Duration kAwaited = std::chrono::milliseconds(3500);
+constexpr double kAbout_m = 0.40;                      // it may bounce, slide and roll
+constexpr int kFrames = 2;                             // in which it was seen: the first may show it still falling
+constexpr double kAsLarge_m = 0.015, kAsLarge = 0.06;  // two measurements of one side
+
+// Whichever side it lies on.
+bool as_large(Vector3 a, Vector3 b) {
+  std::ranges::sort(a), std::ranges::sort(b);
+  return ((a - b).cwiseAbs().array() <= (kAsLarge * a).cwiseMax(kAsLarge_m).array()).all();
+}
+
+bool is_believed(std::uint32_t track, const std::vector<ObjectBelief>& objects) {
+  return std::ranges::find(objects, track, &ObjectBelief::track) != objects.end();
+}
+
+}  // namespace
+
+void Fallen::fell(std::string code, const Vector3& size_m, const Vector3& lands_m,
+                  const std::vector<ObjectBelief>& objects, Time now) {
+  std::erase_if(loads_, [&](const Load& load) { return load.code == code; });
+  Load load{.code = std::move(code), .size_m = size_m, .lands_m = lands_m, .fell = now};
+  for (const ObjectBelief& object : objects) {
+    load.known.push_back(object.track);
+    if (object.track != 0 && as_large(object.size_m, size_m)) load.as_large.push_back(object.track);
+  }
+  loads_.push_back(std::move(load));
+}
+
+std::vector<std::pair<std::uint32_t, std::string>> Fallen::recognise(const std::vector<ObjectBelief>& objects,
+                                                                     double rode_m, Time now) {
+  std::vector<std::pair<std::uint32_t, std::string>> recognised;
+  std::erase_if(loads_, [&](Load& load) {
+    load.lands_m.x() += rode_m;
+    if (now > load.fell + kAwaited || std::ranges::find(objects, load.code, &ObjectBelief::code) != objects.end())
+      return true;
+    const ObjectBelief* const one = only_one(load, objects);
+    if (one != nullptr) recognised.emplace_back(one->track, load.code);
+    return one != nullptr;
+  });
+  return recognised;
+}
+
+const ObjectBelief* Fallen::only_one(const Load& load, const std::vector<ObjectBelief>& objects) {
+  const bool all_there =
+      std::ranges::all_of(load.as_large, [&](std::uint32_t track) { return is_believed(track, objects); });
+  const ObjectBelief* one = nullptr;
+  for (const ObjectBelief& object : objects) {
+    const Vector3 off = object.world_from_top.translation() - load.lands_m;
+    if (object.track == 0 || off.head<2>().norm() > kAbout_m || !as_large(object.size_m, load.size_m)) continue;
+    if (std::ranges::find(load.known, object.track) != load.known.end()) continue;
+    if (!all_there || one != nullptr) return nullptr;
+    one = &object;
+  }
+  const bool unread = one != nullptr && one->code.empty() && one->disputed.empty();
+  return unread && one->frames_seen >= kFrames ? one : nullptr;
+}
+
+bool Fallen::awaits(std::string_view code) const {
+  return std::ranges::find(loads_, code, &Load::code) != loads_.end();
+}
+
+}  // namespace pons::skills

@@ -1,0 +1,42 @@
+// Loads that the cups lost over the belt. Where they come to lie is known roughly, how not at all, and the label may be
+// below: the first thing that is seen about there and is as large is taken for it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "pons/core/belief.hpp"
+#include "pons/core/pose.hpp"
+#include "pons/core/time.hpp"
+
+namespace pons::skills {
+
+// One thread.
+class Fallen {
+ public:
+  // It lands about there, world frame, while `objects` are believed.
+  void fell(std::string code, const Vector3& size_m, const Vector3& lands_m, const std::vector<ObjectBelief>& objects,
+            Time now);
+  // Each tick, with the belt having ridden on: the tracks that are recognised now, by their codes. Nothing is while two
+  // might be it, or while anything as large that was believed then no longer is: it may be that, found again.
+  [[nodiscard]] std::vector<std::pair<std::uint32_t, std::string>> recognise(const std::vector<ObjectBelief>& objects,
+                                                                             double rode_m, Time now);
+  // Whether it may still be.
+  [[nodiscard]] bool awaits(std::string_view code) const;
+
+ private:
+  struct Load {
+    std::string code;
+    Vector3 size_m, lands_m;
+    Time fell;
+    std::vector<std::uint32_t> known, as_large;  // tracks then, and those of its size
+  };
+  [[nodiscard]] static const ObjectBelief* only_one(const Load& load, const std::vector<ObjectBelief>& objects);
+
+  std::vector<Load> loads_;
+};
+
+}  // namespace pons::skills

@@ -1,0 +1,95 @@
+#include "pons/skills/fallen.hpp"
+
+#include <gtest/gtest.h>
+
+namespace pons::skills {
+namespace {
+
+Time at(double s) { return Time(from_s(s)); }
+
+class FallenTest : public testing::Test {
+ protected:
+  static ObjectBelief box(std::uint32_t track, const Vector3& size_m, double x_m) {
+    ObjectBelief object;
+    object.track = track;
+    object.size_m = size_m;
+    object.world_from_top.translation() = Vector3(x_m, 0, 1.0);
+    object.frames_seen = 3;
+    return object;
+  }
+  // One of that size about there.
+  static ObjectBelief like_it(std::uint32_t track = 7) { return box(track, {0.302, 0.196, 0.105}, 0.2); }
+  void falls(const std::vector<ObjectBelief>& believed = {}) {
+    fallen_.fell("A", {0.3, 0.2, 0.1}, {0.1, 0.1, 0.9}, believed, at(10));
+  }
+  // As which track it is recognised; 0: none.
+  std::uint32_t seen(const std::vector<ObjectBelief>& objects, double after_s = 1) {
+    const auto recognised = fallen_.recognise(objects, 0, at(10 + after_s));
+    if (recognised.empty()) return 0;
+    EXPECT_EQ(recognised.size(), 1);
+    EXPECT_EQ(recognised[0].second, "A");
+    return recognised[0].first;
+  }
+  Fallen fallen_;
+};
+
+TEST_F(FallenTest, WhatIsSeenFirstAboutThereAndIsAsLargeIsIt) {
+  falls({box(1, {0.2, 0.1, 0.1}, 0)});
+  EXPECT_TRUE(fallen_.awaits("A"));
+  EXPECT_EQ(seen({box(1, {0.2, 0.1, 0.1}, 0)}), 0);
+  EXPECT_EQ(seen({box(1, {0.2, 0.1, 0.1}, 0), like_it()}), 7);
+  EXPECT_FALSE(fallen_.awaits("A"));
+  EXPECT_EQ(seen({like_it()}), 0) << "once";
+}
+
+TEST_F(FallenTest, ItMayLieOnAnotherSide) {
+  falls();
+  EXPECT_EQ(seen({box(7, {0.2, 0.1, 0.3}, 0)}), 7);
+}
+
+TEST_F(FallenTest, NothingElseIsTakenForIt) {
+  ObjectBelief read = like_it(), two_codes = like_it(), glimpsed = like_it();
+  read.code = "B";
+  two_codes.disputed = {"B", "C"};
+  glimpsed.frames_seen = 1;
+  falls();
+  EXPECT_EQ(seen({box(7, {0.3, 0.2, 0.15}, 0.2)}), 0) << "of another size";
+  EXPECT_EQ(seen({box(7, {0.3, 0.2, 0.1}, 0.6)}), 0) << "too far away";
+  EXPECT_EQ(seen({read}), 0);
+  EXPECT_EQ(seen({two_codes}), 0);
+  EXPECT_EQ(seen({glimpsed}), 0);
+  EXPECT_EQ(seen({like_it(7), like_it(8)}), 0) << "either may be it";
+  EXPECT_EQ(seen({like_it(0)}), 0) << "only an obstacle";
+  EXPECT_EQ(seen({like_it()}), 7);
+}
+
+TEST_F(FallenTest, WhatWasThereBeforeIsNotIt) {
+  falls({like_it()});
+  EXPECT_EQ(seen({like_it()}), 0);
+}
+
+// One as large whose track was lost meanwhile comes back under another number.
+TEST_F(FallenTest, NothingIsItWhileAnotherMayHaveBeenFoundAgain) {
+  falls({like_it(3)});
+  EXPECT_EQ(seen({like_it(7)}), 0);
+  EXPECT_EQ(seen({like_it(3), like_it(7)}), 7);
+}
+
+TEST_F(FallenTest, ItRidesWithTheBelt) {
+  falls();
+  EXPECT_EQ(fallen_.recognise({box(7, {0.3, 0.2, 0.1}, 0.8)}, 0.5, at(11)).size(), 1);
+}
+
+TEST_F(FallenTest, AfterAWhileOrOnceItsCodeIsReadNothingIsAwaited) {
+  falls();
+  EXPECT_EQ(seen({like_it()}, 4), 0);
+  EXPECT_FALSE(fallen_.awaits("A"));
+  falls();
+  ObjectBelief read = like_it();
+  read.code = "A";
+  EXPECT_EQ(seen({read}), 0);
+  EXPECT_FALSE(fallen_.awaits("A"));
+}
+
+}  // namespace
+}  // namespace pons::skills
