@@ -249,6 +249,7 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
          .refresh = [&cell](Time now, std::vector<ObjectBelief> objects,
                             Time seen) { cell.refresh(now, std::move(objects), seen); },
          .label = [&cell](std::vector<ObjectBelief>& objects) { cell.label(objects); },
+         .unseen = [&cell] { return cell.left(); },
          .state = [&cell]() -> const link::State& { return cell.arm.state(); },
          .take_forgotten = [&cell] { return cell.take_forgotten(); },
          .take_strays =

@@ -93,7 +93,7 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
-    if (decisions.belt_waits || !would_ride_past(belief)) continue;
+    if (decisions.belt_waits || !would_ride_past(belief, now)) continue;
     decisions.belt_waits = !set_aside.contains(id_of(belief.code, known_.find(belief.code)->second.tries));
   }
   return decisions;
@@ -188,10 +188,11 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
 }
 
 // Asked for, or about to be again, and where the belt must stop now to keep it in the zone.
-bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
+bool Dispatcher::would_ride_past(const ObjectBelief& belief, Time now) const {
   const auto known = known_.find(belief.code);
   if (known == known_.end()) return false;
-  const bool soon = known->second.failed && !decided_.contains(belief.track);
+  const std::optional<Time>& again = known->second.seen_again;
+  const bool soon = known->second.failed && again && now - *again < kAskAgainAfter;
   if (!known->second.asked && !soon) return false;
   return belt_.must_wait_for(belief.world_from_top.translation().x(), std::max(belief.velocity_m_s.x(), 0.0));
 }

@@ -77,7 +77,7 @@ class Dispatcher final : public Brain {
   [[nodiscard]] bool too_large(const Vector3& size_m, const Order& order) const;
   // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
-  [[nodiscard]] bool would_ride_past(const ObjectBelief& belief) const;
+  [[nodiscard]] bool would_ride_past(const ObjectBelief& belief, Time now) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);

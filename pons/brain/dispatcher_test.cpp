@@ -231,6 +231,34 @@ TEST_F(DispatcherTest, AsksAgainForWhatFailedAndTurnsUp) {
   EXPECT_EQ(never.tasks[0].at("id"), "P2");
 }
 
+// A load that fell on the belt, say, near the zone's end.
+TEST_F(DispatcherTest, TheBeltWaitsForWhatIsAboutToBeAskedForAgain) {
+  const double end_m = world_.belt.waits_at_m() + 0.001;
+  const auto waits_at = [&](double s) { return dispatcher_.observe({parcel(2, end_m, "P1")}, at(s)).belt_waits; };
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
+  dispatcher_.heard("P1", task::Outcome::kFailed);
+  EXPECT_TRUE(waits_at(2)) << "others have their turn first";
+  EXPECT_TRUE(waits_at(3)) << "asked for";
+  dispatcher_.heard("P1.2", task::Outcome::kException);
+  EXPECT_FALSE(waits_at(4));
+}
+
+// What lies on it may ride beside it for ever.
+TEST_F(DispatcherTest, TheBeltWaitsOnlyAWhileForWhatCannotBeAskedFor) {
+  world_.belt.pick_x_max_m = 0.4;  // within the camera's view
+  Dispatcher dispatcher({{"P1", {"chute_3", 20}}}, world_);
+  const auto waits_at = [&](double s) {
+    ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1"), upper = lower;
+    lower.confidence = 0.1;
+    upper.track = 2, upper.code.clear(), upper.world_from_top.translation().z() += 0.1;
+    return dispatcher.observe({lower, upper}, at(s)).belt_waits;
+  };
+  EXPECT_EQ(dispatcher.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
+  dispatcher.heard("P1", task::Outcome::kFailed);
+  EXPECT_TRUE(waits_at(2));
+  EXPECT_FALSE(waits_at(3));
+}
+
 TEST_F(DispatcherTest, CountsEachParcelOnce) {
   const auto tally = [&] { return std::pair(dispatcher_.tally().sorted, dispatcher_.tally().settled); };
   using Counts = std::pair<std::int64_t, std::int64_t>;

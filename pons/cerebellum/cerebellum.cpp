@@ -335,7 +335,9 @@ void Cerebellum::control(Time now, body::SetPoints& set_points) {
                               .felt = wrist_.at_tip(),
                               .dt_s = dt_s_,
                               .limits = limits(),
-                              .speed_share = state_.speed_share};
+                              .speed_share = state_.speed_share,
+                              .kind = !moves(state_.safety) && now >= stop_ends_ ? ControlLaws::Commanded::kStopped
+                                                                                 : ControlLaws::Commanded::kMotion};
   if (is_silent(now))
     laws_.blind(does, torque);
   else if (gives_way_)

@@ -62,6 +62,7 @@ Expected<void> check_numbers(const Settings& settings) {
   const std::array numbers{Number{"gains.position_1_s2", gains.position_1_s2},
                            Number{"gains.speed_1_s", gains.speed_1_s},
                            Number{"gains.integral_1_s3", gains.integral_1_s3},
+                           Number{"gains.integral_stopped_1_s3", gains.integral_stopped_1_s3},
                            Number{"gains.brake_1_s", gains.brake_1_s},
                            Number{"gains.integral_max_rad_s2", gains.integral_max_rad_s2},
                            Number{"following_error_rad", settings.following_error_rad},

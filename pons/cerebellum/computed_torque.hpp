@@ -15,6 +15,9 @@ struct Gains {
   double position_1_s2 = 4800;
   double speed_1_s = 120;
   double integral_1_s3 = 64'000;
+  // Of an arm that has been stopped. Below sqrt(integral / speed), 23 rad/s above, an integral drives what swings, as a
+  // heavy load on its bellows does, instead of damping it, and the arm never stands.
+  double integral_stopped_1_s3 = 4'000;
   double brake_1_s = 60;             // of an arm that gives way
   double integral_max_rad_s2 = 120;  // what the integral may ask for, so that it cannot wind up against an obstacle
 };

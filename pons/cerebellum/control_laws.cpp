@@ -6,10 +6,20 @@ namespace pons::cerebellum {
 
 using link::Controller;
 
+namespace {
+
+Gains stopped(Gains gains) {
+  gains.integral_1_s3 = gains.integral_stopped_1_s3;
+  return gains;
+}
+
+}  // namespace
+
 ControlLaws::ControlLaws(model::RobotModel& model, const Gains& gains, const ControlSettings& settings,
                          std::size_t delay)
     : model_(model),
       gains_(gains),
+      gains_stopped_(stopped(gains)),
       settings_(settings),
       corrections_(model.axes(), delay),
       asked_(delay, at_rest(AxisVector::Zero(model.axes()))),
@@ -59,7 +69,8 @@ void ControlLaws::torques(const Now& now, const AxisVector& last_nm, AxisVector&
   switch (controller_) {
     case Controller::kTracking:
       asked_.push(now.commanded);
-      computed_torque(model_, gains_, now.arm, now.commanded, acting(), now.dt_s, corrections_, torque_nm);
+      computed_torque(model_, now.kind == Commanded::kStopped ? gains_stopped_ : gains_, now.arm, now.commanded,
+                      acting(), now.dt_s, corrections_, torque_nm);
       break;
     case Controller::kImpedance:
       asked_.push(now.commanded);

@@ -2,6 +2,8 @@
 // a jump in torque.
 #pragma once
 
+#include <cstdint>
+
 #include "pons/cerebellum/compliance.hpp"
 #include "pons/cerebellum/computed_torque.hpp"
 #include "pons/cerebellum/delay_line.hpp"
@@ -46,6 +48,8 @@ class ControlLaws {
   // Likewise, and comes there at its speed, a tick's way in each `period_s`.
   void come(const AxisState& commanded, double period_s) PONS_NONBLOCKING;
 
+  // What is commanded: a motion, or the place where the arm was stopped.
+  enum class Commanded : std::uint8_t { kMotion, kStopped };
   // What the arm does at this tick.
   struct Now {
     ArmNow arm;
@@ -54,6 +58,7 @@ class ControlLaws {
     double dt_s;
     const AxisLimits& limits;
     double speed_share;  // that is allowed of each speed limit
+    Commanded kind = Commanded::kMotion;
   };
   // Not clamped. `last_nm` are the torques of the tick before.
   void torques(const Now& now, const AxisVector& last_nm, AxisVector& torque_nm) PONS_NONBLOCKING;
@@ -63,7 +68,7 @@ class ControlLaws {
 
  private:
   model::RobotModel& model_;
-  const Gains gains_;
+  const Gains gains_, gains_stopped_;
   const ControlSettings settings_;
   link::Controller controller_ = link::Controller::kTracking;
   link::Compliance compliance_;

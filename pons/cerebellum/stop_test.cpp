@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "pons/cerebellum/test_bench.hpp"
+#include "pons/core/gravity.hpp"
 #include "pons/motion/axis_plan.hpp"
 
 namespace pons::cerebellum {
@@ -264,7 +265,7 @@ TEST(StopLatch, HoldsItsPlaceUnderAProtectiveStop) {
   bench.mute = true;  // nobody needs to live for that
   bench.run(5s);
   EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
-  EXPECT_LT((bench.plant.sensors.position - stood).cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_LT((bench.plant.sensors.position - stood).cwiseAbs().maxCoeff(), 3e-4);
 }
 
 TEST(BodySilence, StopsBlindAndSaysFailedThenPowersOff) {
@@ -367,6 +368,44 @@ TEST(Heartbeat, AnyCommandCountsAndOneHundredMillisecondsAreEnough) {
   EXPECT_TRUE(bench.operational());
   bench.run(3ms);
   EXPECT_EQ(bench.state().cause, StopCause::kHeartbeatLost);
+}
+
+// On its bellows, which hardly damp it.
+struct SprungLoad {
+  static constexpr double kMass_kg = 8, kSwings_rad_s = 19, kDamping = 0.02;
+  Vector3 at, speed_m_s = Vector3::Zero();
+
+  void pull(Bench& bench, model::RobotModel& model) {
+    constexpr double kTick_s = 1e-3, kStiffness_n_m = kMass_kg * kSwings_rad_s * kSwings_rad_s;
+    const AxisVector& q = bench.plant.sensors.position;
+    const Eigen::Matrix3Xd jacobian = model.tip_jacobian(q).topRows<3>();
+    const Vector3 stretch_m = model.world_from_tip(q).translation() - at;
+    const Vector3 rate_m_s = jacobian * bench.plant.sensors.speed - speed_m_s;
+    const Vector3 force_n = kStiffness_n_m * stretch_m + 2 * kDamping * kMass_kg * kSwings_rad_s * rate_m_s;
+    speed_m_s += kTick_s * (force_n / kMass_kg - Vector3(0, 0, kGravity_m_s2));
+    at += kTick_s * speed_m_s;
+    bench.plant.extra_torque_nm = jacobian.transpose() * -force_n;
+  }
+};
+
+// Nobody told of its weight. An integral as fast as a motion's would keep it swinging, and the arm with it.
+TEST(StopResultTest, StandsThoughWhatItCarriesSwings) {
+  Settings settings;
+  settings.collision.torque_share = 1e9;
+  settings.following_error_rad = 1;
+  auto model = bench_model();
+  Bench bench({.step = 1ms}, settings);
+  bench.arm();
+  SprungLoad load{model.world_from_tip(bench.plant.sensors.position).translation()};
+  load.at.z() -= kGravity_m_s2 / (SprungLoad::kSwings_rad_s * SprungLoad::kSwings_rad_s);
+  load.speed_m_s = {0.05, 0, 0};
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  for (int tick = 0; tick < 3000; ++tick) {
+    load.pull(bench, model);
+    bench.tick();
+  }
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
 }
 
 }  // namespace

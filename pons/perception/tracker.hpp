@@ -1,6 +1,7 @@
 // Sightings of many frames become objects that stay themselves while the belt carries them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -53,13 +54,17 @@ class Tracker {
     bool doubtful = false;  // partly hidden or covered
     bool crowded = false;   // a neighbour may have had a say in its size
   };
+  static constexpr double kSlidesOn_s = 0.5;
   struct Estimate {
     Eigen::Vector2d position = Eigen::Vector2d::Zero();  // at `stamp`, relative to the belt
     Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  // likewise
     Time stamp;
     double z_m = 0, yaw_rad = 0, flatness_m = 0;
     Vector3 size_m = Vector3::Zero();
-    [[nodiscard]] Eigen::Vector2d at(Time time) const { return position + velocity * to_s(time - stamp); }
+    // What is seen no longer has come to rest on the belt soon.
+    [[nodiscard]] Eigen::Vector2d at(Time time) const {
+      return position + velocity * std::min(to_s(time - stamp), kSlidesOn_s);
+    }
   };
   struct Track {
     std::uint32_t id = 0;

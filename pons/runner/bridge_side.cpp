@@ -79,6 +79,9 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   std::ranges::copy(predicted(seen_.cut, now, belt_travel_m), std::back_inserter(obstacles));
   for (const auto& robot : robots_) robot->skills.refresh(now, obstacles, seen_.belt_seen);
   for (const auto& robot : robots_) {
+    if (robot->skills.unseen) std::ranges::copy(robot->skills.unseen(), std::back_inserter(objects));
+  }
+  for (const auto& robot : robots_) {
     if (auto good = robot->arming.tick(now); !good) return good;
   }
   look_after_parts(now);

@@ -30,6 +30,8 @@ struct SkillPort {
   std::function<void(const BaseBelief&)> locate;               // with each scan of a base's lidar; may be empty
   // Gives the codes to those unread that are known without a camera, as of the last refresh; may be empty.
   std::function<void(std::vector<ObjectBelief>&)> label;
+  // What lies on the belt besides, as of the last refresh, which no camera has seen there; may be empty.
+  std::function<std::vector<ObjectBelief>()> unseen;
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
   // What is found to have come along with others, {"code", "fell_into"} each, since the last call; may be empty.

@@ -35,6 +35,7 @@ constexpr double kSofter = 0.8;  // of the acceleration, when a load must be bro
 constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;                 // the scale's
 constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
+constexpr int kSeenBefore = 3;                     // at least: whoever asked for it trusted them
 constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
 constexpr double kBeside_m = 0.05;                 // its middle when a load falls that comes to lie on the belt
 constexpr double kInstant_s = 0.001;
@@ -156,6 +157,10 @@ void Cell::add_unseen() {
 
 void Cell::weighs(double mass_kg) {
   held->mass_kg = mass_kg;
+  bears(mass_kg);
+}
+
+void Cell::bears(double mass_kg) {
   arm.payload(mass_kg, world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * held->load.size_m.z()));
 }
 
@@ -182,6 +187,7 @@ void Cell::left_on_belt(const Pose& world_from_tip) {
   ObjectBelief object = held_at(*held, world_from_tip);
   object.world_from_top.translation().z() = world.belt.surface_z_m + object.size_m.z();
   object.track = kFirstLeft + lefts_++;
+  object.frames_seen = kSeenBefore;
   object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
   strays->put_back(held->code);

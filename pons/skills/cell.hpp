@@ -81,6 +81,8 @@ class Cell {
   // What is held weighs so much: the loop is told. It must know of every load before the arm moves with it, for it
   // takes what it does not know for a collision, or throws the arm up.
   void weighs(double mass_kg);
+  // Likewise, but not weighed yet: about so much.
+  void bears(double mass_kg);
   // Nothing is held any longer: likewise.
   void holds_nothing();
   // What is held has fallen, likewise. Where that is over the belt it may lie there again, and belt and arm are to wait
@@ -100,6 +102,8 @@ class Cell {
   // What is held was put back on the belt, with the tip there. Until a camera sees it, it is known from that, riding
   // with the belt; then it keeps its label, which no camera may be able to read any more.
   void left_on_belt(const Pose& world_from_tip);
+  // What was put back and no camera has seen since.
+  [[nodiscard]] const std::vector<ObjectBelief>& left() const { return left_; }
   // Gives the codes to those unread that it knows from what was put back or has fallen.
   void label(std::vector<ObjectBelief>& objects) const;
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <string>
+
 #include "pons/skills/scale.hpp"
 
 namespace pons::skills {
@@ -34,29 +37,35 @@ TEST(CompanyTest, IsWhatLiesCloseToIt) {
 
 class FeltTest : public testing::Test {
  protected:
-  // Hangs so far from the load's middle, tip frame.
-  [[nodiscard]] const Companion* felt(double mass_kg, double x_m, double y_m) const {
-    return felt_on(load_, {mass_kg, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(x_m, y_m)}, company_);
+  // Whose weight, of what hangs so far from the load's middle, tip frame.
+  [[nodiscard]] std::string felt(double mass_kg, double x_m, double y_m, std::optional<double> hooked_kg = {}) const {
+    const Weight weight{mass_kg, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(x_m, y_m)};
+    return hangs_beside(load_, weight, company_, hooked_kg).value_or(Beside{"nobody"}).whose;
   }
   const Load load_{.size_m = {0.3, 0.3, 0.1}, .offset_in_tip_m = {0.02, 0.01, 0}};
   const Company company_{{2, "B", {0.2, 0}}, {3, "C", {0, -0.2}}};
 };
 
 TEST_F(FeltTest, TowardsWhomItWeighsMore) {
-  ASSERT_NE(felt(1, 0.03, 0.01), nullptr);
-  EXPECT_EQ(felt(1, 0.03, 0.01)->code, "B");
-  EXPECT_EQ(felt(1, 0, -0.03)->code, "C");
-  EXPECT_EQ(felt(1, -0.03, 0), nullptr) << "nothing lay there";
-  EXPECT_EQ(felt(2.5, 0.008, 0), nullptr) << "so well is a load's middle known";
-  EXPECT_EQ(felt(0.2, 0.02, 0), nullptr) << "the wrist does not feel so little";
+  EXPECT_EQ(felt(1, 0.03, 0.01), "B");
+  EXPECT_EQ(felt(1, 0, -0.03), "C");
+  EXPECT_EQ(felt(1, -0.03, 0), "nobody") << "nothing lay there";
+  EXPECT_EQ(felt(2.5, 0.008, 0), "nobody") << "so well is a load's middle known";
+  EXPECT_EQ(felt(0.2, 0.02, 0), "nobody") << "the wrist does not feel so little";
 }
 
 TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItBefore) {
-  const Weight uneven{1, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(-0.05, 0)};
-  EXPECT_FALSE(hangs_beside(load_, uneven, Uneven::kUsual));
-  EXPECT_TRUE(hangs_beside(load_, uneven, Uneven::kDoubted));
-  const Weight beyond{1, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(-0.14, 0)};
-  EXPECT_TRUE(hangs_beside(load_, beyond, Uneven::kUsual)) << "no parcel is";
+  EXPECT_EQ(felt(1, -0.05, 0), "nobody");
+  EXPECT_EQ(felt(1, -0.05, 0, 0.5), "another");
+  EXPECT_EQ(felt(1, -0.14, 0), "another") << "no parcel is";
+}
+
+// Put back because another hung on it, or seemed to.
+TEST_F(FeltTest, WhatIsNotHeavierThanThenIsAlone) {
+  EXPECT_EQ(felt(1, 0.03, 0, 1.5), "nobody") << "lighter: it has shed what hung on it";
+  EXPECT_EQ(felt(1, -0.14, 0, 1.5), "nobody") << "the cups may hold it by its edge";
+  EXPECT_EQ(felt(1, 0.03, 0, 1), "nobody") << "as heavy: it is uneven";
+  EXPECT_EQ(felt(1, 0.03, 0, 0.8), "B") << "heavier: the neighbour bore a part of it then";
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/conduct.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
@@ -38,8 +39,8 @@ constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups sli
 constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
-constexpr double kShed = 0.06, kShed_kg = 0.02;  // lighter by so much, it has lost what hung on it
-constexpr double kUnweighable = 2.0;             // times the mass limit
+constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;  // felt while it is lifted, over what it was taken for
+constexpr double kUnweighable = 2.0;                 // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kUntangles = std::chrono::milliseconds(2000);
@@ -368,9 +369,8 @@ class Pick final : public ArmSkill {
                       .falls = cell_.falls()};
     cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company);
     cell_.lost.reset();
-    const Vector3& size = cell_.held->load.size_m;
-    expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * size.prod());
-    cell_.arm.payload(expected_kg_, cell_.world.robot.tool.flange_from_tip * Vector3(0, 0, 0.5 * size.z()));
+    expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * cell_.held->load.size_m.prod());
+    cell_.bears(expected_kg_);
     cell_.lifted(seen != nullptr ? *seen : target_);
     phase_ = Phase::kLift;
     return {};
@@ -384,6 +384,7 @@ class Pick final : public ArmSkill {
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }
+    bear_at_least(weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2));
     if (height < kLifted_m) return {};
     scale_.add(cell_);
     const std::optional<Weight> weighed = scale_.weigh(cell_, expected_kg_);
@@ -391,30 +392,29 @@ class Pick final : public ArmSkill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
-    const Held& held = *cell_.held;
-    const Companion* const other = weighed ? felt_on(held.load, *weighed, held.company) : nullptr;
-    const bool again = cell_.was_hooked(code_);
-    // What hung on it then does so no longer: what is felt now is where the cups took hold.
-    const bool alone = again && weighed && weighed->mass_kg < (1 - kShed) * cell_.hooked->mass_kg - kShed_kg;
-    const bool lopsided =
-        weighed && ((other != nullptr && !alone) ||
-                    hangs_beside(held.load, *weighed, again && !alone ? Uneven::kDoubted : Uneven::kUsual));
+    const Company& company = cell_.held->company;
+    const auto hooked_kg = cell_.was_hooked(code_) ? std::optional(cell_.hooked->mass_kg) : std::nullopt;
+    const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked_kg) : std::nullopt;
     // If it is put back, then within reach.
     const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
-    if (lopsided || (near_end && !held.company.empty())) cell_.hold_belt(now);
-    if ((!weighed || heavy || lopsided || again) && !at_rest) return {};
-    if ((target_.crowded || !held.company.empty()) && now < lift_end_) return {};
+    if (beside || (near_end && !company.empty())) cell_.hold_belt(now);
+    if ((!weighed || heavy || beside || hooked_kg) && !at_rest) return {};
+    if ((target_.crowded || !company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(0.0, mass));
-    cell_.arm.expect_contact(0);
     if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
-    if (lopsided) {
+    cell_.arm.expect_contact(0);
+    if (beside) {
       cell_.hooked = Hooked{code_, mass};
-      const std::string name = other != nullptr && !other->code.empty() ? other->code : "another";
-      return begin_put_back(now, 0, {Status::kRetry, name + " hangs on it: its weight is felt beside it", {}});
+      return begin_put_back(now, 0, {Status::kRetry, beside->whose + " hangs on it: its weight is felt beside it", {}});
     }
     return success(now);
+  }
+
+  // Small things may be heavy: drives that reckon with far less than they lift fall behind, and stop.
+  void bear_at_least(double felt_kg) {
+    if (felt_kg > kHeavier * expected_kg_ + kHeavier_kg) cell_.bears(expected_kg_ = felt_kg);
   }
 
   // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along. What

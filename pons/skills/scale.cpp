@@ -17,8 +17,9 @@ constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
 constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
 constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
 constexpr double kUneven_m = 0.012;  // between where a load's middle seems to be and where it weighs: both are measured
-constexpr double kFeltLeast_nm = 0.06;  // the wrist's own error
-constexpr double kTowards = 0.6;        // cosine: a companion may reach around a corner
+constexpr double kFeltLeast_nm = 0.06;           // the wrist's own error
+constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
+constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
 
 // What pulls the wrist down.
 double pull_n(Cell& cell) {
@@ -45,21 +46,20 @@ constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 
-bool hangs_beside(const Load& load, const Weight& weight, Uneven uneven) {
-  const Eigen::Vector2d beside =
-      Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * (weight.beside_tip_m - load.offset_in_tip_m.head<2>());
-  const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside.norm();
-  if (uneven == Uneven::kDoubted) return beside.norm() > kUneven_m && moment_nm > kFeltLeast_nm;
-  const double share = beside.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
-  return share > kNearEdge && moment_nm > kFelt_nm;
-}
-
-const Companion* felt_on(const Load& load, const Weight& weight, const Company& company) {
-  if (!hangs_beside(load, weight, Uneven::kDoubted)) return nullptr;
-  const Eigen::Vector2d uneven_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
-  for (const Companion& companion : company)
-    if (uneven_m.dot(companion.aside_m.normalized()) > kTowards * uneven_m.norm()) return &companion;
-  return nullptr;
+std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
+                                   std::optional<double> hooked_kg) {
+  if (hooked_kg && weight.mass_kg < (1 + kMore) * *hooked_kg + kMore_kg) return std::nullopt;
+  const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
+  const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
+  if (beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
+    for (const Companion& companion : company)
+      if (beside_m.dot(companion.aside_m.normalized()) > kTowards * beside_m.norm())
+        return companion.code.empty() ? Beside{} : Beside{companion.code};
+    if (hooked_kg) return Beside{};
+  }
+  const Eigen::Vector2d in_load_m = Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * beside_m;
+  const double share = in_load_m.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
+  return share > kNearEdge && moment_nm > kFelt_nm ? std::optional(Beside{}) : std::nullopt;
 }
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }

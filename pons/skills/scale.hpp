@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pons/skills/cell.hpp"
@@ -14,13 +15,15 @@ struct Weight {
   Eigen::Vector2d beside_tip_m{0, 0};  // of its centre of mass, tip frame: how far from the tip's axis
 };
 
-// Whether it hangs so far beside the load's middle that it cannot be the load's alone: near its edge or beyond, where
-// no parcel is that uneven; or, where another has hung on it before, at all.
-enum class Uneven : std::uint8_t { kUsual, kDoubted };
-[[nodiscard]] bool hangs_beside(const Load& load, const Weight& weight, Uneven uneven);
-
-// Towards whom the load, hanging still, weighs more than one alone does; nullptr: nobody.
-[[nodiscard]] const Companion* felt_on(const Load& load, const Weight& weight, const Company& company);
+// What hangs on a load besides, and whose weight it seems to be, by code.
+struct Beside {
+  std::string whose = "another";
+};
+// Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; less
+// far, towards one of its company; or, where another was found on it in an earlier lift, at all. But what is not
+// heavier than it was then, `hooked_kg`, is the load alone, for hardly anything hooks twice.
+[[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
+                                                 std::optional<double> hooked_kg);
 
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same

@@ -19,6 +19,7 @@ constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kRounds = 3;
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
+constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid of a heavy load: no collision
 
 }  // namespace
 
@@ -76,6 +77,11 @@ Vector3 SetDown::free_spot(Time time, double over_belt_m) const {
 }
 
 Expected<bool> SetDown::tick(Time now) {
+  if (emptied_at_) {
+    if (now < *emptied_at_ + kSpringsUp) return false;
+    cell_.arm.expect_contact(0);
+    return true;
+  }
   released_at_ += delay_.take();
   if (now < released_at_) {
     if (weigh_now(cell_) > kPushedBack_kg) return false;
@@ -87,8 +93,8 @@ Expected<bool> SetDown::tick(Time now) {
   if (!cell_.arm.cups().open && now < released_at_ + kOpensWithin) return false;
   cell_.left_on_belt(cell_.model.world_from_tip(cell_.arm.state().position));
   cell_.holds_nothing();
-  cell_.arm.expect_contact(0);
-  return true;
+  emptied_at_ = now;
+  return false;
 }
 
 }  // namespace pons::skills

@@ -1,6 +1,8 @@
 // Lays what the cups hold on the belt, to ride into the exception chute: what cannot be placed must not stay held.
 #pragma once
 
+#include <optional>
+
 #include "pons/skills/cell.hpp"
 
 namespace pons::skills {
@@ -16,6 +18,7 @@ class SetDown {
   // The way down is under way already, and ends then.
   void begin_at(Time released_at) {
     released_at_ = released_at;
+    emptied_at_.reset();
     (void)delay_.take();
   }
   // Once a period after that: true when the cups are empty. Error: the arm does not obey.
@@ -30,6 +33,7 @@ class SetDown {
   Cell::Search search_{.must = true};
   std::size_t height_ = 0;  // over the belt, that is being searched
   Time released_at_;
+  std::optional<Time> emptied_at_;
 };
 
 }  // namespace pons::skills
