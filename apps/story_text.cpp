@@ -138,15 +138,35 @@ std::string allowed(const Json& d) { return fmt::format("by {}, {}", text(d, "by
 
 std::string stopped(const Json& d) { return fmt::format("by {}: {}", text(d, "by"), text(d, "cause")); }
 
+std::string recognised(const Json& d) { return "on the belt again, as track " + text(d, "track"); }
+
 const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
-    {"seen", seen},       {"accepted", accepted}, {"started", started},
-    {"attempt", attempt}, {"plan", plan},         {"motion", motion},
-    {"carries", carries}, {"ride", reason},       {"attempt_ended", attempt_ended},
-    {"resumed", step},    {"found_done", step},   {"cancelling", reason},
-    {"halting", reason},  {"pausing", reason},    {"paused", stop},
-    {"preempted", stop},  {"held", held},         {"preempting", preempting},
-    {"ended", ended},     {"refused", reason},    {"asked", asked},
-    {"allowed", allowed}, {"stopped", stopped},   {"left_out", left_out}};
+    {"seen", seen},
+    {"accepted", accepted},
+    {"started", started},
+    {"attempt", attempt},
+    {"plan", plan},
+    {"motion", motion},
+    {"carries", carries},
+    {"ride", reason},
+    {"attempt_ended", attempt_ended},
+    {"resumed", step},
+    {"found_done", step},
+    {"cancelling", reason},
+    {"halting", reason},
+    {"pausing", reason},
+    {"paused", stop},
+    {"preempted", stop},
+    {"held", held},
+    {"preempting", preempting},
+    {"ended", ended},
+    {"refused", reason},
+    {"asked", asked},
+    {"allowed", allowed},
+    {"stopped", stopped},
+    {"left_out", left_out},
+    {"recognised", recognised},
+};
 
 }  // namespace
 

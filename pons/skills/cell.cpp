@@ -115,6 +115,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   recognise(speed * passed_s);
   take_in_cut();
   add_unseen();
+  believe_felt();
 }
 
 void Cell::watch_strays() {
@@ -198,6 +199,7 @@ void Cell::left_on_belt(const Pose& world_from_tip) {
 void Cell::lifted(const ObjectBelief& object) {
   forgotten_.push_back(object.track);
   strays->taken(object.track);
+  if (felt_ && felt_->code == object.code) felt_.reset();
   std::erase_if(left_, [&](const ObjectBelief& left) { return left.code == object.code; });
 }
 
@@ -229,6 +231,31 @@ void Cell::label(std::vector<ObjectBelief>& objects) const {
   for (ObjectBelief& object : objects) {
     const auto label = labelled_.find(object.track);
     if (label != labelled_.end() && object.code.empty() && object.disputed.empty()) object.code = label->second;
+  }
+}
+
+void Cell::felt_by_some(std::string_view code, const Eigen::Matrix3d& world_from_tip) {
+  const world::Tool& tool = world.robot.tool;
+  Vector3 sum_m = Vector3::Zero();
+  int sealed = 0;
+  for (std::size_t i = 0; i < tool.cups_m.size(); ++i) {
+    if (arm.state().cup_vacuum_kpa[i] < tool.sealed_kpa) continue;
+    sum_m += tool.cups_m[i];
+    ++sealed;
+  }
+  if (sealed == 0) return;
+  Eigen::Vector2d aside_m = (world_from_tip * sum_m).head<2>() / sealed;
+  if (felt_ && felt_->code == code) aside_m += felt_->aside_m;
+  felt_ = Felt{std::string(code), now_, aside_m};
+}
+
+void Cell::believe_felt() {
+  for (ObjectBelief& object : objects_) {
+    if (!felt_ || object.code != felt_->code) continue;
+    if (object.last_seen > felt_->time)
+      felt_.reset();
+    else
+      object.world_from_top.translation().head<2>() += felt_->aside_m;
   }
 }
 

@@ -46,6 +46,13 @@ struct Miss {
   Time time;
 };
 
+// Of a parcel that too few cups have sealed on: how far from where it was believed, world frame, they say it lies.
+struct Felt {
+  std::string code;
+  Time time;
+  Eigen::Vector2d aside_m;
+};
+
 // A parcel on which another was found to hang, and what both weighed.
 struct Hooked {
   std::string code;
@@ -123,6 +130,9 @@ class Cell {
   // Since the last call, the motions that were sent among them.
   [[nodiscard]] std::vector<task::Note> take_notes();
 
+  // Some cups have sealed on that parcel, on the way to it with the tip turned like that, but too few to lift it: it is
+  // taken to lie towards them until a camera sees it again.
+  void felt_by_some(std::string_view code, const Eigen::Matrix3d& world_from_tip);
   // Taken off the belt: perception is told to let go of the track.
   void lifted(const ObjectBelief& object);
   [[nodiscard]] std::vector<std::uint32_t> take_forgotten() { return std::exchange(forgotten_, {}); }
@@ -199,6 +209,7 @@ class Cell {
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
   void recognise(double rode_m);
   void recognise_left();
+  void believe_felt();
   void take_in_cut();
   void watch_strays();
   void add_unseen();
@@ -219,6 +230,7 @@ class Cell {
   std::vector<ObjectBelief> objects_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
   Fallen fallen_;
+  std::optional<Felt> felt_;                       // of the last one
   std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since
   std::uint32_t lefts_ = 0;
   std::optional<ObjectBelief> hidden_;

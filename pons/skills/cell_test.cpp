@@ -138,6 +138,53 @@ TEST_F(LeftOnBeltTest, WhatIsSeenThereKeepsItsLabelAndIsOne) {
   EXPECT_EQ(cell_.take_forgotten(), std::vector<std::uint32_t>{7});
 }
 
+class FeltBySomeTest : public ObedientArmTest {
+ protected:
+  void SetUp() override {
+    stands({0.1, 0, 1.2});
+    ObjectBelief object;
+    object.track = 3;
+    object.code = "P1";
+    object.last_seen = now_;
+    object.world_from_top.translation() = Vector3(0.3, 0, 1.0);
+    seen_ = {object};
+  }
+  // Some cups have sealed, the tool down and its x axis along the world's.
+  void touches(std::size_t cups) {
+    sealed_cups_ = cups;
+    pass();
+    cell_.felt_by_some("P1", Cell::tip_down({}, 0).linear());
+    pass();
+  }
+  Vector3 believed() { return cell_.find("P1")->world_from_top.translation(); }
+};
+
+TEST_F(FeltBySomeTest, ItLiesTowardsTheCupsThatSealed) {
+  const std::vector<Vector3>& cups = world_.robot.tool.cups_m;
+  const Vector3 first_two = 0.5 * (cups[0] + cups[1]);  // pointing down, the tool has the world's y the other way
+  touches(2);
+  EXPECT_NEAR(believed().x(), 0.3 + first_two.x(), 1e-9);
+  EXPECT_NEAR(believed().y(), -first_two.y(), 1e-9);
+  touches(2);
+  EXPECT_NEAR(believed().y(), -2 * first_two.y(), 1e-9) << "further still";
+}
+
+TEST_F(FeltBySomeTest, UntilItIsSeenAgain) {
+  touches(1);
+  EXPECT_NE(believed(), Vector3(0.3, 0, 1.0));
+  seen_[0].last_seen = now_ + from_s(1);
+  pass();
+  EXPECT_EQ(believed(), Vector3(0.3, 0, 1.0));
+  seen_[0].last_seen = Time{};
+  pass();
+  EXPECT_EQ(believed(), Vector3(0.3, 0, 1.0)) << "a camera knew better";
+}
+
+TEST_F(FeltBySomeTest, CupsOfWhichNoneSealsTellNothing) {
+  touches(0);
+  EXPECT_EQ(believed(), Vector3(0.3, 0, 1.0));
+}
+
 TEST_F(LeftOnBeltTest, WhatIsSeenElsewhereIsAnother) {
   cell_.refresh(now_ + from_s(0.5), {seen(0.2, 0.05)});
   ASSERT_EQ(cell_.objects().size(), 2U);

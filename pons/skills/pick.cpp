@@ -333,6 +333,7 @@ class Pick final : public ArmSkill {
       // It was not there, and no camera has seen it since another was taken from beside it.
       if (cups.sealed_cups == 0 && cell_.strays->missed_twice(code_))
         return begin_retreat(now, not_there(cell_, code_)), Progress{};
+      cell_.felt_by_some(code_, grasp_.orientation);
       return give_up(now, fmt::format("{} of {} cups sealed", cups.sealed_cups, all));
     }
     return {};

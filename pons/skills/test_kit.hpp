@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -55,6 +56,7 @@ class ObedientArmTest : public testing::Test {
   Time now_ = Time(from_s(5));
   const Held held_{"P1", {{0.3, 0.2, 0.1}, 0.7, {0.01, -0.02, 0}}, 1.25};
   bool opened_ = false;
+  std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
   std::vector<ObjectBelief> seen_;
   std::optional<Time> blind_since_;
@@ -71,7 +73,7 @@ class ObedientArmTest : public testing::Test {
     if (!opened_) {
       state.vacuum_on = 15;
       state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
-      state.cup_vacuum_kpa.fill(kSealed_kpa);
+      std::fill_n(state.cup_vacuum_kpa.begin(), sealed_cups_, kSealed_kpa);
     }
     link::CerebellumEnd(*link_).publish(state);
   }
