@@ -13,9 +13,11 @@ constexpr double kHidden_m = 0.03;   // how far one may go on under what leans o
 constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
 constexpr double kUpright = 0.9986;  // cosine of 3 degrees
-constexpr int kGlimpses = 3;         // seen less often, it may have been a bad cut between two
+constexpr int kGlimpses = 3;         // seen less often, and not read, it may have been a bad cut between two
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
+
+bool is_glimpse(const ObjectBelief& object) { return object.frames_seen < kGlimpses && object.code.empty(); }
 
 bool overlap(const ObjectBelief& a, const ObjectBelief& b, double least_m) { return apart_m(a, b) <= -least_m; }
 
@@ -41,7 +43,7 @@ double apart_m(const ObjectBelief& a, const ObjectBelief& b) {
 }
 
 bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
-  if (upper.track == lower.track || upper.frames_seen < kGlimpses) return false;
+  if (upper.track == lower.track || is_glimpse(upper)) return false;
   const bool is_hidden = lower.confidence < kSure;
   if (!overlap(upper, lower, leans(upper) && is_hidden ? -kHidden_m : kOverlap_m)) return false;
   // What leans lies on what stands, however high. Else the lower one must look hidden, too: neighbours that only touch
@@ -51,7 +53,7 @@ bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
 }
 
 bool is_part(const ObjectBelief& part, const ObjectBelief& whole) {
-  if (part.track == whole.track || part.frames_seen < kGlimpses) return false;
+  if (part.track == whole.track || is_glimpse(part)) return false;
   if (part.size_m.head<2>().prod() > kLargerPart * whole.size_m.head<2>().prod()) return false;
   const Vector3 off = whole.world_from_top.inverse() * part.world_from_top.translation();
   return std::abs(off.x()) < 0.5 * whole.size_m.x() - kOverlap_m &&

@@ -54,6 +54,7 @@ ObjectBelief box(std::uint32_t track, double x_m, double y_m, double z_m, double
   belief.world_from_top = pose_xyz_yaw(x_m, y_m, z_m, yaw_rad);
   belief.size_m = Vector3(0.3, 0.2, 0.1);
   belief.confidence = 0.97;
+  belief.frames_seen = 3;
   return belief;
 }
 
@@ -85,6 +86,17 @@ TEST(Belief, APartIsWithinAndAsHigh) {
   ObjectBelief larger = box(2, 0.08, 0.05, 0.21);
   larger.size_m.head<2>() *= 1.3;
   EXPECT_FALSE(is_part(larger, whole)) << "cut together with a neighbour";
+}
+
+TEST(Belief, AGlimpseOfWhatNobodyHasReadIsNothing) {
+  ObjectBelief lower = box(1, 0, 0, 0.1), upper = box(2, 0.1, 0.05, 0.2), part = box(3, 0.08, 0.05, 0.1);
+  lower.confidence = 0.3;
+  upper.frames_seen = part.frames_seen = 2;
+  EXPECT_FALSE(lies_on(upper, lower));
+  EXPECT_FALSE(is_part(part, lower));
+  upper.code = part.code = "P1";
+  EXPECT_TRUE(lies_on(upper, lower));
+  EXPECT_TRUE(is_part(part, lower));
 }
 
 TEST(Belief, WhatLeansLiesOnWhatStandsHoweverHigh) {

@@ -32,33 +32,50 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
 
 void Strays::put_back(const std::string& load) {
   std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go; });
+  std::erase_if(torn_, [&](const Torn& torn) { return torn.load == load; });
 }
 
 void Strays::let_go(const std::string& load, const std::string& place, Time now) {
   std::vector<Doubted> own;
   for (const Doubted& one : doubted_)
     if (one.load == load && !one.let_go) own.push_back(one);
-  put_back(load);
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go; });
   for (Doubted& one : own) {
     // Who may have gone with an earlier one has gone with the last.
     std::erase_if(doubted_, [&](const Doubted& earlier) {
       return earlier.track == one.track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
     });
     one.let_go = now;
-    if (!one.torn_off) one.stray.place = place;
-    if (one.gone) found_gone_.push_back(one.stray);
+    one.stray.place = place;
+    if (one.gone) found_gone(one);
     doubted_.push_back(std::move(one));
   }
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
-  for (Doubted& one : doubted_) {
-    if (one.arm != arm) continue;
-    if (one.gone && one.let_go) continue;  // that has been told
-    if (one.let_go && now > *one.let_go + kTornOff) continue;
-    one.stray.place = place;
-    one.torn_off = true;
+  const auto torn = std::ranges::find_if(doubted_.rbegin(), doubted_.rend(), [&](const Doubted& one) {
+    const bool told = one.gone && one.let_go;
+    return one.arm == arm && !told && !(one.let_go && now > *one.let_go + kTornOff);
+  });
+  if (torn == doubted_.rend()) return;
+  torn_.push_back({torn->load, place});
+  forget_oldest(torn_);
+}
+
+// As many of a load's company as were counted were torn off; the others, if they are gone, went with it.
+const std::string& Strays::place_of(const Doubted& one) const {
+  if (one.gone) return one.stray.place;
+  const auto torn = std::ranges::find(torn_, one.load, &Torn::load);
+  return torn != torn_.end() ? torn->place : one.stray.place;
+}
+
+void Strays::found_gone(Doubted& one) {
+  const auto torn = std::ranges::find(torn_, one.load, &Torn::load);
+  if (torn != torn_.end()) {
+    one.stray.place = torn->place;
+    torn_.erase(torn);
   }
+  found_gone_.push_back(one.stray);
 }
 
 void Strays::rode_off(double travel_m) {
@@ -91,7 +108,7 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
     const bool unseen = !believed && *one.at_m < belt.view_end_m;
     if (!unseen && !(is_over(one, belt) && !has_ridden_off(one))) continue;
     one.gone = true;
-    if (one.let_go) found_gone_.push_back(one.stray);
+    if (one.let_go) found_gone(one);
   }
   std::erase_if(doubted_, [&](const Doubted& one) {
     return !one.gone && one.let_go && one.at_m && is_over(one, belt) && has_ridden_off(one);
@@ -121,7 +138,7 @@ bool Strays::missed_twice(const std::string& code) {
 
 const std::string* Strays::place_of(const std::string& code) const {
   const Doubted* const found = of(code);
-  return found == nullptr ? nullptr : &found->stray.place;
+  return found == nullptr ? nullptr : &place_of(*found);
 }
 
 }  // namespace pons::skills

@@ -33,7 +33,7 @@ class Strays {
   void put_back(const std::string& load);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
-  // Something fell into that place of the arm's, over which nothing was let go of: it was torn off a load of this
+  // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
   // moment.
   void fell(const std::string& arm, const std::string& place, Time now);
   // Something rode off the belt's end.
@@ -55,19 +55,25 @@ class Strays {
   struct Doubted {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along
-    Stray stray;                 // the place is empty as long as that hangs on the cups
+    Stray stray;                 // the place is the load's, and empty as long as that hangs on the cups
     std::optional<Time> let_go;  // of the load
-    bool torn_off = false;       // where it fell a light curtain has told
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
     std::optional<double> at_m = {};
     double half_m = 0, ends_m = 0;
     bool missed = false, gone = false;
   };
+  // One of a load's company, where a light curtain has told.
+  struct Torn {
+    std::string load, place;
+  };
+  [[nodiscard]] const std::string& place_of(const Doubted& one) const;
+  void found_gone(Doubted& one);
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
   [[nodiscard]] static bool is_over(const Doubted& one, const BeltAt& belt);
   [[nodiscard]] bool has_ridden_off(const Doubted& one) const;
 
   std::vector<Doubted> doubted_;
+  std::vector<Torn> torn_;  // and not found gone yet
   std::vector<Stray> found_gone_;
   std::vector<double> rode_off_;  // the belt's travel each time
 };

@@ -119,6 +119,31 @@ TEST_F(StraysTest, WhoIsTornOffFellWhereACurtainTells) {
   EXPECT_EQ(place_of("C"), "chute_3") << "too late for it";
 }
 
+// A curtain counts one: the other, if it is gone, went with the load.
+TEST_F(StraysTest, OfTwoOneIsTornOff) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}, {3, "C", {0, 0.2}}});
+  look({box(2, "B", 0), box(3, "C", 0)});
+  strays_.fell("arm", "chute_7", at(10.5));
+  strays_.let_go("A", "chute_1", at(11));
+  look({box(3, "C", 0)});
+  EXPECT_EQ(place_of("B"), "chute_7");
+  look({});
+  EXPECT_EQ(place_of("C"), "chute_1");
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 2U);
+  EXPECT_EQ(gone[0].place, "chute_7");
+  EXPECT_EQ(gone[1].place, "chute_1");
+}
+
+// What was torn off before it was put back lies somewhere, and has nothing to do with the next lift.
+TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.fell("arm", "chute_7", at(10.5));
+  strays_.put_back("A");
+  carry();
+  EXPECT_EQ(place_of("B"), "chute_1");
+}
+
 // Out of the cameras' view what should have ridden off and did not is not on the belt any more.
 TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
   carry({{2, "B", {0, 0}}, {3, "C", {0, 0}}});
