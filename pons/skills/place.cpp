@@ -46,6 +46,8 @@ constexpr Duration kRested = std::chrono::milliseconds(20);           // after t
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
+constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
+constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 
 class Place final : public ArmSkill {
  public:
@@ -247,13 +249,23 @@ class Place final : public ArmSkill {
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
     if (const world::Place* const chute = cell_.fallen_since(fallen_.falls)) {
-      cell_.strays->let_go(fallen_.code, chute->name, now);
-      if (chute->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
-      detail["fell_into"] = chute->name;
-      return {Status::kException, "fell into " + chute->name, std::move(detail)};
+      cell_.mouths.expect_anywhere(now);  // it may have grazed that one
+      fallen_.falls = cell_.falls();
+      into_ = chute;
+      counted_at_ = now;
+    }
+    if (into_ != nullptr) {
+      if (now < counted_at_ + kBounces) return {};
+      cell_.strays->let_go(fallen_.code, into_->name, now);
+      if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
+      detail["fell_into"] = into_->name;
+      return {Status::kException, "fell into " + into_->name, std::move(detail)};
     }
     if (cell_.awaits(fallen_.code)) return look_for_it(now);
     if (now < fell_at_ + kFallsWithin) return {};
+    // On a rim, maybe, off which it falls later: then a mouth's curtain counts what nobody let go of.
+    cell_.strays->lifted(cell_.world.arm, fallen_.code, {{.track = kNoTrack, .code = fallen_.code, .aside_m = {0, 0}}});
+    cell_.strays->let_go(fallen_.code, "", now);
     return {Status::kFailed, "dropped", std::move(detail)};
   }
 
@@ -317,7 +329,9 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
-  Held fallen_;  // what the cups lost on the way
+  Held fallen_;                         // what the cups lost on the way
+  const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
+  Time counted_at_;
   Time fell_at_;
   bool cancelled_ = false, aside_ = false;
 };

@@ -48,10 +48,10 @@ constexpr double kLightest_kg = 0.01;
 
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                    std::optional<double> hooked_kg) {
-  if (hooked_kg && weight.mass_kg < (1 + kMore) * *hooked_kg + kMore_kg) return std::nullopt;
+  const bool alone = hooked_kg && weight.mass_kg < (1 + kMore) * *hooked_kg + kMore_kg;
   const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
   const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
-  if (beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
+  if (!alone && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
     for (const Companion& companion : company)
       if (beside_m.dot(companion.aside_m.normalized()) > kTowards * beside_m.norm())
         return companion.code.empty() ? Beside{} : Beside{companion.code};

@@ -20,8 +20,8 @@ struct Beside {
   std::string whose = "another";
 };
 // Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; less
-// far, towards one of its company; or, where another was found on it in an earlier lift, at all. But what is not
-// heavier than it was then, `hooked_kg`, is the load alone, for hardly anything hooks twice.
+// far, towards one of its company; or, where another was found on it in an earlier lift, at all. But the last two only
+// while it is heavier than it was then, `hooked_kg`: hardly anything hooks twice.
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                                  std::optional<double> hooked_kg);
 

@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::size_t kRemembered = 64;                         // of those who are gone
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
+constexpr Duration kAstray = std::chrono::seconds(30);          // what fell nobody knows where: something may push it
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
 constexpr double kSooner_m = 0.05, kLater_m = 0.30;
 
@@ -43,7 +44,8 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   for (Doubted& one : own) {
     // Who may have gone with an earlier one has gone with the last.
     std::erase_if(doubted_, [&](const Doubted& earlier) {
-      return earlier.track == one.track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
+      const bool same_track = earlier.track == one.track && one.stray.code != one.load;  // a load has lost its own
+      return same_track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
     });
     one.let_go = now;
     one.stray.place = place;
@@ -55,11 +57,15 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   const auto torn = std::ranges::find_if(doubted_.rbegin(), doubted_.rend(), [&](const Doubted& one) {
     const bool told = one.gone && one.let_go;
-    return one.arm == arm && !told && !(one.let_go && now > *one.let_go + kTornOff);
+    const Duration within = one.stray.place.empty() ? kAstray : kTornOff;
+    return one.arm == arm && !told && !(one.let_go && now > *one.let_go + within);
   });
   if (torn == doubted_.rend()) return;
   torn_.push_back({torn->load, place});
   forget_oldest(torn_);
+  if (!torn->let_go || !torn->stray.place.empty()) return;
+  torn->gone = true;
+  found_gone(*torn);
 }
 
 // As many of a load's company as were counted were torn off; the others, if they are gone, went with it.
@@ -138,7 +144,8 @@ bool Strays::missed_twice(const std::string& code) {
 
 const std::string* Strays::place_of(const std::string& code) const {
   const Doubted* const found = of(code);
-  return found == nullptr ? nullptr : &place_of(*found);
+  const std::string* const place = found == nullptr ? nullptr : &place_of(*found);
+  return place == nullptr || place->empty() ? nullptr : place;
 }
 
 }  // namespace pons::skills

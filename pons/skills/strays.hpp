@@ -31,7 +31,7 @@ class Strays {
   void lifted(const std::string& arm, const std::string& load, const Company& company);
   // It lies on the belt again, and who came along, too.
   void put_back(const std::string& load);
-  // It was let go of, or fell, into that place.
+  // It was let go of, or fell, into that place; empty: nobody knows where to, and its company may lie anywhere.
   void let_go(const std::string& load, const std::string& place, Time now);
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
   // moment.

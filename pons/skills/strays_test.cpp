@@ -144,6 +144,37 @@ TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
   EXPECT_EQ(place_of("B"), "chute_1");
 }
 
+// A load that was lost on its way, and lies on a rim, or on the belt with its label below.
+TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
+  const auto loses = [&](const char* code) {
+    strays_.lifted("arm", code, {{9, code, {0, 0}}});
+    strays_.let_go(code, "", at(11));
+  };
+  loses("A");
+  EXPECT_EQ(place_of("A"), "");
+  look({});
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+  strays_.fell("arm", "chute_5", at(20));
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "A");
+  EXPECT_EQ(gone[0].place, "chute_5");
+  strays_.fell("arm", "chute_6", at(21));
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "once";
+
+  loses("D");
+  loses("B");
+  strays_.fell("arm", "chute_5", at(22));
+  strays_.fell("arm", "chute_6", at(23));
+  EXPECT_EQ(strays_.take_found_gone().size(), 2U) << "each";
+
+  loses("B");
+  look({box(12, "B", 0, 12)});
+  loses("C");
+  strays_.fell("arm", "chute_5", at(50));
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "one was seen again, and for the other it is too late";
+}
+
 // Out of the cameras' view what should have ridden off and did not is not on the belt any more.
 TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
   carry({{2, "B", {0, 0}}, {3, "C", {0, 0}}});
