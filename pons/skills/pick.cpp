@@ -385,7 +385,7 @@ class Pick final : public ArmSkill {
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }
-    bear_at_least(weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2));
+    bear_at_least(std::min(cell_.world.rules.max_mass_kg, weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2)));
     if (height < kLifted_m) return {};
     scale_.add(cell_);
     const std::optional<Weight> weighed = scale_.weigh(cell_, expected_kg_);
