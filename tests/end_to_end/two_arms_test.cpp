@@ -25,7 +25,7 @@ std::string to_the_zone() {
 
 TEST(TwoArms, ShareWhatComes) {
   const Folder folder;
-  const Finished run = run_pons({"run", "parcel_cell_two_arms", "--parcels", "40", "--seed", "2", "--quiet",
+  const Finished run = run_pons({"run", "parcel_cell_two_arms", "--parcels", "40", "--seed", "3", "--quiet",
                                  "--explain", "--report", folder / "report.json", "--journal", folder / "j.db"});
   EXPECT_EQ(run.code, 0) << run.out << run.err;
   const json report = read_json(folder / "report.json");
