@@ -27,7 +27,7 @@ struct SkillPort {
   // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
   // the belt was taken that they come from.
   std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
-  std::function<void(const BaseBelief&)> locate;               // with each scan of a base's lidar; may be empty
+  std::function<void(const BaseBelief&)> locate;  // with each scan of a base's lidar; may be empty
   // Gives the codes to those unread that are known without a camera, as of the last refresh; may be empty.
   std::function<void(std::vector<ObjectBelief>&)> label;
   // What lies on the belt besides, as of the last refresh, which no camera has seen there; may be empty.
