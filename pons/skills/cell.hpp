@@ -96,6 +96,8 @@ class Cell {
   // and to keep out of the view as long as it awaits() it.
   void dropped();
   [[nodiscard]] bool awaits(std::string_view code) const { return fallen_.awaits(code); }
+  // It is known to lie elsewhere.
+  void await_no_more(std::string_view code) { fallen_.forget(code); }
 
   // A skill that was halted may have left something on the cups that nobody knows of.
   void let_go_of_unknown() {

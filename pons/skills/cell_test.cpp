@@ -138,6 +138,47 @@ TEST_F(LeftOnBeltTest, WhatIsSeenThereKeepsItsLabelAndIsOne) {
   EXPECT_EQ(cell_.take_forgotten(), std::vector<std::uint32_t>{7});
 }
 
+class DroppedTest : public ObedientArmTest {
+ protected:
+  void loses_over(const Vector3& tip) {
+    stands(tip);
+    cell_.held = held_;
+    cell_.dropped();
+  }
+  // Unread, of the load's size on another side.
+  [[nodiscard]] ObjectBelief seen() const {
+    ObjectBelief object;
+    object.track = 3;
+    object.frames_seen = 3;
+    object.size_m = {0.3, 0.1, 0.2};
+    object.world_from_top.translation() = Vector3(-0.1, 0.1, 1.1);
+    return object;
+  }
+};
+
+TEST_F(DroppedTest, OverTheBeltItIsAwaitedAndKnownByPlaceAndSize) {
+  loses_over({-0.2, 0, 1.2});
+  EXPECT_FALSE(cell_.held);
+  EXPECT_TRUE(cell_.awaits("P1"));
+  pass();
+  EXPECT_EQ(cell_.find("P1"), nullptr);
+  seen_ = {seen()};
+  pass();
+  ASSERT_NE(cell_.find("P1"), nullptr);
+  EXPECT_EQ(cell_.find("P1")->track, 3U);
+  EXPECT_FALSE(cell_.awaits("P1"));
+  std::vector<ObjectBelief> others{seen()};
+  cell_.label(others);
+  EXPECT_EQ(others[0].code, "P1") << "for the brain, too";
+}
+
+TEST_F(DroppedTest, OverAChuteOrOutOfViewItIsNot) {
+  loses_over({-0.2, 0.46, 1.2});
+  EXPECT_FALSE(cell_.awaits("P1"));
+  loses_over({0.4, 0, 1.2});
+  EXPECT_FALSE(cell_.awaits("P1"));
+}
+
 class FeltBySomeTest : public ObedientArmTest {
  protected:
   void SetUp() override {

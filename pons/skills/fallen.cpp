@@ -26,7 +26,7 @@ bool is_believed(std::uint32_t track, const std::vector<ObjectBelief>& objects) 
 
 void Fallen::fell(std::string code, const Vector3& size_m, const Vector3& lands_m,
                   const std::vector<ObjectBelief>& objects, Time now) {
-  std::erase_if(loads_, [&](const Load& load) { return load.code == code; });
+  forget(code);
   Load load{.code = std::move(code), .size_m = size_m, .lands_m = lands_m, .fell = now};
   for (const ObjectBelief& object : objects) {
     load.known.push_back(object.track);
@@ -62,6 +62,10 @@ const ObjectBelief* Fallen::only_one(const Load& load, const std::vector<ObjectB
   }
   const bool unread = one != nullptr && one->code.empty() && one->disputed.empty();
   return unread && one->frames_seen >= kFrames ? one : nullptr;
+}
+
+void Fallen::forget(std::string_view code) {
+  std::erase_if(loads_, [&](const Load& load) { return load.code == code; });
 }
 
 bool Fallen::awaits(std::string_view code) const {

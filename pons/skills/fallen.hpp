@@ -24,7 +24,9 @@ class Fallen {
   // might be it, or while anything as large that was believed then no longer is: it may be that, found again.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, std::string>> recognise(const std::vector<ObjectBelief>& objects,
                                                                              double rode_m, Time now);
-  // Whether it may still be.
+  // It is known to lie elsewhere.
+  void forget(std::string_view code);
+  // Whether it may still be recognised.
   [[nodiscard]] bool awaits(std::string_view code) const;
 
  private:

@@ -91,5 +91,13 @@ TEST_F(FallenTest, AfterAWhileOrOnceItsCodeIsReadNothingIsAwaited) {
   EXPECT_FALSE(fallen_.awaits("A"));
 }
 
+// A light curtain has counted it in a chute.
+TEST_F(FallenTest, WhatIsKnownToLieElsewhereIsNotRecognised) {
+  falls();
+  fallen_.forget("A");
+  EXPECT_FALSE(fallen_.awaits("A"));
+  EXPECT_EQ(seen({like_it()}), 0);
+}
+
 }  // namespace
 }  // namespace pons::skills

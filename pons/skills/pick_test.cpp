@@ -219,6 +219,20 @@ TEST_F(PickTest, WhatTurnsOutToBeTwoOnTheWayIsLetGoOf) {
   EXPECT_THAT(progress.reason, HasSubstr("P2"));
 }
 
+// Lost while it was lifted, it lies about there; the label may be below.
+TEST_F(PickTest, TheBeltWaitsWhileWhatFellOnItIsLookedFor) {
+  tick_with({});
+  cell_.held = Held{"P1", {.size_m = {0.2, 0.15, 0.1}}, 0};
+  cell_.dropped();
+  ASSERT_TRUE(cell_.awaits("P1"));
+  const auto skill = start("P1");
+  for (int i = 0; i < 200; ++i) {
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning) << i;
+    EXPECT_TRUE(cell_.holds_belt(now_));
+    tick_with({});
+  }
+}
+
 // Only one of its labels had been read when it was asked for.
 TEST_F(PickTest, WhatTurnsOutToShowTwoCodesIsLeftToTheBrain) {
   ObjectBelief object = parcel(1, 0.1, 0, {0.2, 0.11, 0.11});

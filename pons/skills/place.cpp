@@ -47,7 +47,6 @@ constexpr double kGoneShare = 0.4;                                    // of the 
 constexpr double kGoneLeast_kg = 0.08;
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
 constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
-constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 
 class Place final : public ArmSkill {
  public:
@@ -249,6 +248,7 @@ class Place final : public ArmSkill {
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
     if (const world::Place* const chute = cell_.fallen_since(fallen_.falls)) {
+      cell_.await_no_more(fallen_.code);
       cell_.mouths.expect_anywhere(now);  // it may have grazed that one
       fallen_.falls = cell_.falls();
       into_ = chute;
@@ -264,8 +264,7 @@ class Place final : public ArmSkill {
     if (cell_.awaits(fallen_.code)) return look_for_it(now);
     if (now < fell_at_ + kFallsWithin) return {};
     // On a rim, maybe, off which it falls later: then a mouth's curtain counts what nobody let go of.
-    cell_.strays->lifted(cell_.world.arm, fallen_.code, {{.track = kNoTrack, .code = fallen_.code, .aside_m = {0, 0}}});
-    cell_.strays->let_go(fallen_.code, "", now);
+    cell_.strays->dropped(cell_.world.arm, fallen_.code, now);
     return {Status::kFailed, "dropped", std::move(detail)};
   }
 

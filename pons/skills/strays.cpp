@@ -8,7 +8,8 @@ namespace {
 
 constexpr std::size_t kRemembered = 64;                         // of those who are gone
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
-constexpr Duration kAstray = std::chrono::seconds(30);          // what fell nobody knows where: something may push it
+constexpr Duration kAstray = std::chrono::seconds(30);          // after a load was dropped: something may push it
+constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
 constexpr double kSooner_m = 0.05, kLater_m = 0.30;
 
@@ -44,14 +45,24 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   for (Doubted& one : own) {
     // Who may have gone with an earlier one has gone with the last.
     std::erase_if(doubted_, [&](const Doubted& earlier) {
-      const bool same_track = earlier.track == one.track && one.stray.code != one.load;  // a load has lost its own
-      return same_track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
+      return earlier.track == one.track || (!one.stray.code.empty() && one.stray.code == earlier.stray.code);
     });
     one.let_go = now;
     one.stray.place = place;
     if (one.gone) found_gone(one);
     doubted_.push_back(std::move(one));
   }
+}
+
+void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load || one.stray.code == load; });
+  Doubted one;
+  one.track = kNoTrack;
+  one.arm = arm;
+  one.load = one.stray.code = load;
+  one.let_go = now;
+  doubted_.push_back(std::move(one));
+  forget_oldest(doubted_);
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {

@@ -31,10 +31,12 @@ class Strays {
   void lifted(const std::string& arm, const std::string& load, const Company& company);
   // It lies on the belt again, and who came along, too.
   void put_back(const std::string& load);
-  // It was let go of, or fell, into that place; empty: nobody knows where to, and its company may lie anywhere.
+  // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
+  // The arm lost it on its way, and nobody knows where to; it may lie on a rim, off which it falls later.
+  void dropped(const std::string& arm, const std::string& load, Time now);
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
-  // moment.
+  // moment, or is what was dropped.
   void fell(const std::string& arm, const std::string& place, Time now);
   // Something rode off the belt's end.
   void rode_off(double travel_m);
@@ -55,7 +57,7 @@ class Strays {
   struct Doubted {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along
-    Stray stray;                 // the place is the load's, and empty as long as that hangs on the cups
+    Stray stray;                 // the place is the load's; empty while that hangs on the cups, and of what was dropped
     std::optional<Time> let_go;  // of the load
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
     std::optional<double> at_m = {};

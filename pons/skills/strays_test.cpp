@@ -146,10 +146,7 @@ TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
 
 // A load that was lost on its way, and lies on a rim, or on the belt with its label below.
 TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
-  const auto loses = [&](const char* code) {
-    strays_.lifted("arm", code, {{9, code, {0, 0}}});
-    strays_.let_go(code, "", at(11));
-  };
+  const auto loses = [&](const char* code) { strays_.dropped("arm", code, at(11)); };
   loses("A");
   EXPECT_EQ(place_of("A"), "");
   look({});

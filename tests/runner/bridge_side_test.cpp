@@ -22,11 +22,25 @@ world::World load() {
   return std::move(*world);
 }
 
+// Skills that take their time.
+task::SkillRegistry of(bridge::Actor& hand) {
+  task::SkillRegistry registry;
+  for (const char* const name : {"pick", "place"}) {
+    task::SkillType type = hand.type();
+    type.name = name;
+    type.schema = bridge::Json{{"type", "object"}};
+    registry.add(std::move(type));
+  }
+  return registry;
+}
+
 // A bridge on the journal of one that had armed the arm; no camera shows anything.
 class TakeOverTest : public testing::Test {
  protected:
   SkillPort port() {
     return {.refresh = [](Time, const std::vector<ObjectBelief>&, Time) {},
+            .label = [](std::vector<ObjectBelief>&) {},
+            .unseen = [this] { return left_; },
             .state = [this]() -> const link::State& { return state_; },
             .take_forgotten = [] { return std::vector<std::uint32_t>{}; },
             .arm = [](Time) {},
@@ -38,6 +52,7 @@ class TakeOverTest : public testing::Test {
             .raise_emergency = [] {},
             .release_emergency = [] {},
             .carries = [] { return bridge::Json{}; },
+            .takes_until_m = world_.belt.pick_x_max_m,
             .restore = [this](const bridge::Json&) { ++restores_; },
             .resume = {},
             .settle = [this](Time) { return settled_; }};
@@ -54,15 +69,17 @@ class TakeOverTest : public testing::Test {
   world::World world_ = load();
   bridge::TemporaryFolder folder_;
   std::unique_ptr<bridge::Journal> journal_ = bridge::Journal::open(folder_ / "j.db").value();
-  task::SkillRegistry registry_;
+  bridge::Actor hand_{"hand", {{.ticks = 1000}}};
+  task::SkillRegistry registry_ = of(hand_);
   bridge::Bridge bridge_{*journal_, registry_, world_};
-  brain::Dispatcher dispatcher_{{}, world_};
+  brain::Dispatcher dispatcher_{{{"P1", {world_.places[0].name, 50}}}, world_};
   Darkroom darkroom_{world_};
   perception::Perception perception_{world_, model::RobotModel::load(world_.robot).value()};
   Observer observer_{world_, perception_, darkroom_.frames, darkroom_.pages, darkroom_.memory(), Pace::kRealTime};
   BridgeSide side_{bridge_, dispatcher_, {port()}, world_, Recovery::kRefused, {}};
   link::State state_;
   std::optional<link::Belt> belt_;
+  std::vector<ObjectBelief> left_;
   int rests_ = 0, restores_ = 0;
   bool settled_ = false;
   Time now_;
@@ -99,6 +116,24 @@ TEST_F(TakeOverTest, WithoutAPredecessorTheBeltRuns) {
   state_.safety = link::SafetyState::kOperational;
   tick();
   EXPECT_EQ(belt_, link::Belt::kRuns);
+}
+
+// Whoever asked for it has the belt wait, though no camera sees it where it was laid down.
+TEST_F(TakeOverTest, TheBeltWaitsForWhatWasPutBackUnseen) {
+  state_.safety = link::SafetyState::kOperational;
+  ObjectBelief object;
+  object.track = 9;
+  object.code = "P1";
+  object.frames_seen = 3;
+  object.confidence = 1;
+  object.size_m = {0.2, 0.15, 0.1};
+  object.world_from_top.translation() = Vector3(world_.belt.pick_x_min_m, world_.belt.y_center_m, 1.0);
+  left_ = {object};
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kRuns);
+  left_[0].world_from_top.translation().x() = world_.belt.waits_at_m() + 0.001;
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kWaits);
 }
 
 }  // namespace
