@@ -14,8 +14,8 @@ constexpr double kSwing_s_per_root_kg = 0.08;
 constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
-constexpr double kNearEdge = 0.75;   // of the way from the middle to an edge
-constexpr double kFelt_nm = 0.4;     // a moment below that the cups bear easily
+constexpr double kNearEdge = 0.6;    // of the way from the middle to an edge
+constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
 constexpr double kUneven_m = 0.012;  // between where a load's middle seems to be and where it weighs: both are measured
 constexpr double kFeltLeast_nm = 0.06;           // the wrist's own error
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
@@ -105,10 +105,11 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   const double whole_kg = mass_kg(first, last) - tool_kg;
   const double change_kg = std::abs(mass_kg(first, middle) - mass_kg(middle, last));
   if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
-  // The tool hangs straight below the flange, so its own weight has no moment there.
-  const double pull_ns = impulse(&Reading::force_n, first, last) * whole_kg / (whole_kg + tool_kg);
+  // What hangs beside the cups tilts them, and swings far more slowly than up and down: over a part of that the moment
+  // is anything from none to twice its mean. The tool hangs straight below the flange, so its own weight has no moment.
+  const double pull_ns = impulse(&Reading::force_n, 0, last) * whole_kg / (whole_kg + tool_kg);
   if (pull_ns <= 0) return Weight{whole_kg};
-  const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, first, last);
+  const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, 0, last);
   return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
 }
 

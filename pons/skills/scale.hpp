@@ -26,8 +26,8 @@ struct Beside {
                                                  std::optional<double> hooked_kg);
 
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
-// ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over the same
-// swing, tells where it hangs.
+// ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over all
+// readings, tells where it hangs.
 class Scale {
  public:
   // Call once a bridge tick while nothing supports the load.

@@ -64,9 +64,10 @@ class ScaleTest : public ::testing::Test {
   }
 
   // What the wrist feels, and the bridge's tick that weighs it, until the way ends. Before `free_s` a neighbour
-  // bears half of the load.
+  // bears half of the load. Where `tilts_rad_s` is not 0, what hangs beside the cups swings about them so fast.
   std::vector<Reading> weigh(SwingingLoad load, const motion::Trajectory& way, double free_s = 0,
-                             const Vector3& hangs_in_tip_m = Vector3::Zero(), double expected_kg = 0) {
+                             const Vector3& hangs_in_tip_m = Vector3::Zero(), double expected_kg = 0,
+                             double tilts_rad_s = 0) {
     constexpr int kSubsteps = 40;
     const double dt_s = to_s(kTick) / kSubsteps;
     Scale scale;
@@ -82,7 +83,9 @@ class ScaleTest : public ::testing::Test {
         load.step(flange_m_s2, time_s < free_s ? 0.5 : 0, dt_s);
       }
       last_speed_m_s = speed_m_s;
-      hear(now, arm, {load.pull_n(), world_.robot.tool.mass_kg * (kGravity_m_s2 + flange_m_s2)}, hangs_in_tip_m);
+      const double share = tilts_rad_s > 0 ? 1 - std::cos(tilts_rad_s * since_s) : 1;  // of the moment at rest
+      hear(now, arm, {load.pull_n(), world_.robot.tool.mass_kg * (kGravity_m_s2 + flange_m_s2)},
+           {share * hangs_in_tip_m.x(), share * hangs_in_tip_m.y(), hangs_in_tip_m.z()});
       scale.add(cell_);
       readings.push_back({since_s, weigh_now(cell_), scale.weigh(cell_, expected_kg)});
     }
@@ -160,6 +163,19 @@ TEST_F(ScaleTest, FeelsWhereTheLoadHangs) {
     }
     EXPECT_GT(read, 5);
   }
+}
+
+// Three tilts a second: by the last tenth of one it would hang where the load's own middle is, or twice as far beside.
+TEST_F(ScaleTest, WhatTiltsTheCupsIsFeltWhereItHangsThroughoutTheLift) {
+  const Vector3 hangs_m(0, 0.12, 0.05);
+  int read = 0;
+  for (const Reading& reading : weigh({0.7, 1, kDamping_n_s_m}, lift(0.25), 0, hangs_m, 0, 20)) {
+    if (!reading.weight || reading.time_s < 0.3) continue;
+    EXPECT_LT((reading.weight->beside_tip_m - hangs_m.head<2>()).norm(), 0.25 * hangs_m.y())
+        << "after " << reading.time_s << " s";
+    ++read;
+  }
+  EXPECT_GT(read, 20);
 }
 
 TEST_F(ScaleTest, SaysNothingBeforeASwingIsOver) {
