@@ -53,10 +53,11 @@ struct Felt {
   Eigen::Vector2d aside_m;
 };
 
-// A parcel on which another was found to hang, and what both weighed.
+// A parcel on which another was found to hang, what both weighed the last time, and how often that was.
 struct Hooked {
   std::string code;
   double mass_kg = 0;
+  int times = 1;
 };
 
 class Cell {

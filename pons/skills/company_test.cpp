@@ -38,9 +38,9 @@ TEST(CompanyTest, IsWhatLiesCloseToIt) {
 class FeltTest : public testing::Test {
  protected:
   // Whose weight, of what hangs so far from the load's middle, tip frame.
-  [[nodiscard]] std::string felt(double mass_kg, double x_m, double y_m, std::optional<double> hooked_kg = {}) const {
+  [[nodiscard]] std::string felt(double mass_kg, double x_m, double y_m, std::optional<Hooked> before = {}) const {
     const Weight weight{mass_kg, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(x_m, y_m)};
-    return hangs_beside(load_, weight, company_, hooked_kg).value_or(Beside{"nobody"}).whose;
+    return hangs_beside(load_, weight, company_, before).value_or(Beside{"nobody"}).whose;
   }
   const Load load_{.size_m = {0.3, 0.3, 0.1}, .offset_in_tip_m = {0.02, 0.01, 0}};
   const Company company_{{2, "B", {0.2, 0}}, {3, "C", {0, -0.2}}};
@@ -50,22 +50,24 @@ TEST_F(FeltTest, TowardsWhomItWeighsMore) {
   EXPECT_EQ(felt(1, 0.03, 0.01), "B");
   EXPECT_EQ(felt(1, 0, -0.03), "C");
   EXPECT_EQ(felt(1, -0.03, 0), "nobody") << "nothing lay there";
-  EXPECT_EQ(felt(2.5, 0.008, 0), "nobody") << "so well is a load's middle known";
+  EXPECT_EQ(felt(2.5, 0.007, 0), "nobody") << "so well is a load's middle known";
   EXPECT_EQ(felt(0.2, 0.02, 0), "nobody") << "the wrist does not feel so little";
 }
 
-TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItBefore) {
+TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItAndItIsHeavierStill) {
   EXPECT_EQ(felt(1, -0.05, 0), "nobody");
-  EXPECT_EQ(felt(1, -0.05, 0, 0.5), "another");
+  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 0.5}), "another");
+  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 1}), "nobody");
   EXPECT_EQ(felt(1, -0.14, 0), "another") << "no parcel is";
 }
 
 // Put back because another hung on it, or seemed to.
-TEST_F(FeltTest, WhatIsNotHeavierThanThenIsAlone) {
-  EXPECT_EQ(felt(1, 0.03, 0, 1.5), "nobody") << "lighter: it has shed what hung on it";
-  EXPECT_EQ(felt(1, -0.14, 0, 1.5), "another") << "no parcel is that uneven";
-  EXPECT_EQ(felt(1, 0.03, 0, 1), "nobody") << "as heavy: it is uneven";
-  EXPECT_EQ(felt(1, 0.03, 0, 0.8), "B") << "heavier: the neighbour bore a part of it then";
+TEST_F(FeltTest, WhatIsFeltTimeAndAgainIsUneven) {
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1}), "B") << "it may have hooked again";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 2}), "B");
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 3}), "nobody");
+  EXPECT_EQ(felt(1, -0.14, 0, Hooked{"A", 1.5, 3}), "another") << "no parcel is that uneven";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 3}), "B") << "heavier: the neighbour bore a part of it then";
 }
 
 }  // namespace

@@ -394,12 +394,12 @@ class Pick final : public ArmSkill {
     // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
     const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
     const Company& company = cell_.held->company;
-    const auto hooked_kg = cell_.was_hooked(code_) ? std::optional(cell_.hooked->mass_kg) : std::nullopt;
-    const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked_kg) : std::nullopt;
+    const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
+    const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked) : std::nullopt;
     // If it is put back, then within reach.
     const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
     if (beside || (near_end && !company.empty())) cell_.hold_belt(now);
-    if ((!weighed || heavy || beside || hooked_kg) && !at_rest) return {};
+    if ((!weighed || heavy || beside || hooked) && !at_rest) return {};
     if ((target_.crowded || !company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
@@ -407,7 +407,7 @@ class Pick final : public ArmSkill {
     if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
     if (beside) {
-      cell_.hooked = Hooked{code_, mass};
+      cell_.hooked = Hooked{code_, mass, hooked ? hooked->times + 1 : 1};
       return begin_put_back(now, 0, {Status::kRetry, beside->whose + " hangs on it: its weight is felt beside it", {}});
     }
     return success(now);

@@ -14,10 +14,11 @@ constexpr double kSwing_s_per_root_kg = 0.08;
 constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
-constexpr double kNearEdge = 0.6;    // of the way from the middle to an edge
+constexpr double kNearEdge = 0.45;   // of the way from the middle to an edge
 constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
-constexpr double kUneven_m = 0.012;  // between where a load's middle seems to be and where it weighs: both are measured
-constexpr double kFeltLeast_nm = 0.06;           // the wrist's own error
+constexpr double kUneven_m = 0.008;  // between where a load's middle seems to be and where it weighs: both are measured
+constexpr double kFeltLeast_nm = 0.05;  // the wrist's own error
+constexpr int kTimeAndAgain = 3;
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
 
@@ -47,15 +48,16 @@ constexpr double kLightest_kg = 0.01;
 }  // namespace
 
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
-                                   std::optional<double> hooked_kg) {
-  const bool alone = hooked_kg && weight.mass_kg < (1 + kMore) * *hooked_kg + kMore_kg;
+                                   const std::optional<Hooked>& before) {
+  const bool heavier = before && weight.mass_kg > (1 + kMore) * before->mass_kg + kMore_kg;
+  const bool uneven = before && !heavier && before->times >= kTimeAndAgain;
   const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
   const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
-  if (!alone && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
+  if (!uneven && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
     for (const Companion& companion : company)
       if (beside_m.dot(companion.aside_m.normalized()) > kTowards * beside_m.norm())
         return companion.code.empty() ? Beside{} : Beside{companion.code};
-    if (hooked_kg) return Beside{};
+    if (heavier) return Beside{};
   }
   const Eigen::Vector2d in_load_m = Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * beside_m;
   const double share = in_load_m.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();

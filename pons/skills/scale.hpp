@@ -19,11 +19,11 @@ struct Weight {
 struct Beside {
   std::string whose = "another";
 };
-// Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; less
-// far, towards one of its company; or, where another was found on it in an earlier lift, at all. But the last two only
-// while it is heavier than it was then, `hooked_kg`: hardly anything hooks twice.
+// Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; or less
+// far, towards one of its company; or, where another was found on it `before` and it is heavier still, at all. What was
+// found so time and again, and is no heavier now, is uneven by itself: only the first of these counts then.
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
-                                                 std::optional<double> hooked_kg);
+                                                 const std::optional<Hooked>& before);
 
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over all
