@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace pons::referee {
 namespace {
@@ -20,7 +21,9 @@ struct Entry {
   int tasks = 0, successes = 0;
   bool ended = false;  // every task of it has an outcome
   bool succeeded = false;
-  bool ride = false;  // let go by on purpose
+  bool ride = false;                   // let go by on purpose
+  bool rode_since = false;             // likewise, what bears its code, since a task of it succeeded
+  std::pair<std::int64_t, Time> done;  // the last success: run and when
   std::string last_reason;
   std::string put_into;   // where the last task that succeeded put it
   std::string fell_into;  // the chute that the last outcome, or a later entry, names
@@ -48,6 +51,7 @@ void take_in(Entry& entry, const std::string& place, const std::optional<bridge:
     entry.succeeded = true;
     ++entry.successes;
     entry.put_into = place;
+    entry.done = {outcome->run, outcome->stamp};
   }
   entry.last_reason = outcome->reason;
   entry.fell_into.clear();
@@ -83,6 +87,7 @@ Expected<Story> read(const bridge::Journal& journal) {
     if (event.kind != "ride") continue;
     Entry& entry = entries[code];
     entry.ride = true;
+    entry.rode_since = entry.succeeded && std::pair(event.run, event.stamp) > entry.done;
     if (entry.tasks == 0) entry.last_reason = task::text_of(event.detail, "reason");
   }
   return story;
@@ -140,7 +145,8 @@ class Judge {
   void in_exception(const ParcelTruth& parcel, const Entry& entry) {
     // Some brain wanted it there.
     const bool put_there = entry.succeeded && entry.put_into == parcel.place;
-    if (entry.succeeded && !put_there)
+    // Another that bore its code was sorted; what rode by later is named, too.
+    if (entry.succeeded && !put_there && !entry.rode_since)
       return lost(parcel, entry, "in the exception chute, but the journal says sorted");
     if (!entry.ride && !entry.ended) return lost(parcel, entry, "in the exception chute without an entry");
     if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {

@@ -33,7 +33,9 @@ class RefereeTest : public ::testing::Test {
     const task::Task task{.id = id, .steps = {{"pick", {{"object", object}}}, {"place", {{"place", "chute_1"}}}}};
     ASSERT_TRUE(journal_->accept(task, Time{}));
   }
-  void end(const std::string& id, Outcome outcome) { ASSERT_TRUE(journal_->outcome(id, outcome, "why", Time{})); }
+  void end(const std::string& id, Outcome outcome, Time now = {}) {
+    ASSERT_TRUE(journal_->outcome(id, outcome, "why", now));
+  }
   void fell(const std::string& id, const std::string& place) {
     const bridge::Json detail{{"steps", {{{"skill", "place"}, {"detail", {{"fell_into", place}}}}}}};
     ASSERT_TRUE(journal_->outcome(id, Outcome::kException, "fell into " + place, Time{}, detail));
@@ -41,7 +43,9 @@ class RefereeTest : public ::testing::Test {
   void stray(const std::string& code, const std::string& place) {
     ASSERT_TRUE(journal_->note(Time{}, "stray", {{"code", code}, {"fell_into", place}}));
   }
-  void ride(const std::string& code) { ASSERT_TRUE(journal_->note(Time{}, "ride", {{"code", code}, {"reason", "r"}})); }
+  void ride(const std::string& code, Time now = {}) {
+    ASSERT_TRUE(journal_->note(now, "ride", {{"code", code}, {"reason", "r"}}));
+  }
 
   Verdict judge(const std::vector<ParcelTruth>& parcels, RunEnd end = RunEnd::kComplete) {
     auto verdict = referee::judge(parcels, arm_, *journal_, {120, 0.6}, end);
@@ -99,6 +103,18 @@ TEST_F(RefereeTest, WhatATaskHasPutIntoTheExceptionChuteIsAnExceptionAndNotLost)
   EXPECT_EQ(verdict.sorted, 0);
   EXPECT_EQ(verdict.undeserved, 1);
   EXPECT_EQ(verdict.lost, 1) << "the journal says that this one was sorted";
+}
+
+// Sorted was another that bore its code, or what rode by does: both entries are there, and say where.
+TEST_F(RefereeTest, WhatRodeByAfterItWasSortedIsAnException) {
+  for (const char* const id : {"A", "B"}) accept(id, id);
+  ride("B", Time(from_s(1)));
+  for (const char* const id : {"A", "B"}) end(id, Outcome::kSucceeded, Time(from_s(2)));
+  ride("A", Time(from_s(3)));
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kException, "exception")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.lost, 1) << "B rode by before it was sorted";
 }
 
 TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {

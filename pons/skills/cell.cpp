@@ -118,6 +118,13 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   believe_felt();
 }
 
+void Cell::watch(std::string_view place, int things, Time seen) {
+  const auto known = std::ranges::find(watched_, place, &Watched::place);
+  Watched& watched = known != watched_.end() ? *known : watched_.emplace_back(std::string(place));
+  watched.things = things;
+  watched.seen = seen;
+}
+
 void Cell::watch_strays() {
   const double travel_m = arm.state().belt_travel_m;
   for (const world::Place* const place : mouths.unexpected(falls(), now_)) {

@@ -125,6 +125,14 @@ class Cell {
   // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
   // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
+  // How many things a camera saw in a place where nothing should lie, in a frame of that time.
+  void watch(std::string_view place, int things, Time seen);
+  struct Watched {
+    std::string place;
+    int things = 0;
+    Time seen;
+  };
+  [[nodiscard]] const std::vector<Watched>& watched() const { return watched_; }
   [[nodiscard]] const Falls& falls() const { return arm.state().fallen_into; }
   // The chute into which something has fallen since; nullptr: none. What rides off the belt's end breaks no chute's.
   [[nodiscard]] const world::Place* fallen_since(const Falls& before) const;
@@ -231,6 +239,7 @@ class Cell {
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
   std::vector<ObjectBelief> objects_;
+  std::vector<Watched> watched_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
   Fallen fallen_;
   std::optional<Felt> felt_;                       // of the last one

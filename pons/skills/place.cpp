@@ -46,6 +46,7 @@ constexpr Duration kRested = std::chrono::milliseconds(20);           // after t
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
+constexpr Duration kLooksWithin = std::chrono::milliseconds(2500);  // a camera that watches the tray
 constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
 
 class Place final : public ArmSkill {
@@ -236,6 +237,7 @@ class Place final : public ArmSkill {
   Progress begin_fall(Time now, Held load) {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
+    watched_ = cell_.watched();
     if (cell_.held) cell_.dropped();
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
@@ -255,7 +257,12 @@ class Place final : public ArmSkill {
       counted_at_ = now;
     }
     if (into_ != nullptr) {
-      if (now < counted_at_ + kBounces) return {};
+      if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
+      const std::string* const beside = lies_beside();
+      if (beside != nullptr) {
+        detail["fell_into"] = *beside;
+        return {Status::kException, "fell into " + *beside, std::move(detail)};
+      }
       cell_.strays->let_go(fallen_.code, into_->name, now);
       if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
       detail["fell_into"] = into_->name;
@@ -266,6 +273,20 @@ class Place final : public ArmSkill {
     // On a rim, maybe, off which it falls later: then a mouth's curtain counts what nobody let go of.
     cell_.strays->dropped(cell_.world.arm, fallen_.code, now);
     return {Status::kFailed, "dropped", std::move(detail)};
+  }
+
+  // A curtain counts what then bounces off its mouth's rim, too.
+  [[nodiscard]] bool looked_beside(Time now) const {
+    const auto has = [&](const Cell::Watched& one) { return one.seen >= fell_at_ + kFallsWithin; };
+    return now >= fell_at_ + kLooksWithin || std::ranges::all_of(cell_.watched(), has);
+  }
+  // Where one more lies than before, though nothing should; nullptr: nowhere.
+  [[nodiscard]] const std::string* lies_beside() const {
+    for (const Cell::Watched& before : watched_) {
+      const auto one = std::ranges::find(cell_.watched(), before.place, &Cell::Watched::place);
+      if (one->things > before.things) return &one->place;
+    }
+    return nullptr;
   }
 
   // On the belt, where it is asked for again once it is seen.
@@ -328,6 +349,7 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_;
   Cell::Search search_;
   world::Entry entry_;
+  std::vector<Cell::Watched> watched_;  // when it fell
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
   Time counted_at_;

@@ -19,6 +19,7 @@ constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
 constexpr double kUneven_m = 0.008;  // between where a load's middle seems to be and where it weighs: both are measured
 constexpr double kFeltLeast_nm = 0.05;  // the wrist's own error
 constexpr int kTimeAndAgain = 3;
+constexpr double kFellOff = 2;                   // of the mass of the latest readings: over all of them
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
 
@@ -109,9 +110,11 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
   // What hangs beside the cups tilts them, and swings far more slowly than up and down: over a part of that the moment
   // is anything from none to twice its mean. The tool hangs straight below the flange, so its own weight has no moment.
-  const double pull_ns = impulse(&Reading::force_n, 0, last) * whole_kg / (whole_kg + tool_kg);
+  // But what has fallen off meanwhile is felt no more.
+  const std::size_t since_then = mass_kg(0, last) - tool_kg > kFellOff * whole_kg + kAgreeLeast_kg ? first : 0;
+  const double pull_ns = impulse(&Reading::force_n, since_then, last) * whole_kg / (whole_kg + tool_kg);
   if (pull_ns <= 0) return Weight{whole_kg};
-  const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, 0, last);
+  const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, since_then, last);
   return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
 }
 
