@@ -55,16 +55,16 @@ TEST(Faults, WhatFallsOnTheWayIsAccountedFor) {
 
 // Felt at the wrist, both are put back where they lay and taken one by one.
 TEST(Faults, WhatHangsOnAnotherIsPutBack) {
-  const Faulty run = run_with("double_pick: {a_pick: 0.1}\n", 40, 6);
-  EXPECT_GE(run.injected("double_pick"), 3);
-  EXPECT_LE(run.report["parcels"]["exceptions"].value("undeserved", 99), 2) << run.said;
+  const Faulty run = run_with("double_pick: {a_pick: 0.1}\n", 40, 4);
+  EXPECT_GE(run.injected("double_pick"), 2);
+  EXPECT_LE(run.report["parcels"]["exceptions"].value("undeserved", 99), 0) << run.said;
 }
 
-// In this run one comes along unfelt.
+// In this run some come along unfelt.
 TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
   const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 30);
   const json reasons = run.report["parcels"]["exceptions"]["reasons"];
-  EXPECT_EQ(reasons.value("came along with another, into chute_#", json::object()).value("undeserved", 0), 1)
+  EXPECT_GE(reasons.value("came along with another, into chute_#", json::object()).value("undeserved", 0), 1)
       << run.said;
 }
 
