@@ -391,19 +391,19 @@ class Pick final : public ArmSkill {
     const std::optional<Weight> weighed = scale_.weigh(cell_, expected_kg_);
     const bool at_rest = now >= lift_end_ + (weighed ? kWeighAtRest : kWeighAtMost);
     const double limit = cell_.world.rules.max_mass_kg;
-    // A neighbour may bear a part of it or drag along: only a reading at rest tells for sure.
-    const bool heavy = weighed && weighed->mass_kg > (1 - kNearLimit) * limit;
+    // A neighbour may bear it or drag along: only a reading at rest tells for sure.
+    const bool odd = weighed && (weighed->mass_kg > (1 - kNearLimit) * limit || weighed->mass_kg < kLightest_kg);
     const Company& company = cell_.held->company;
     const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
     const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked) : std::nullopt;
-    // If it is put back, then within reach.
-    const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;
+    const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;  // put back, it must be in reach
     if (beside || (near_end && !company.empty())) cell_.hold_belt(now);
-    if ((!weighed || heavy || beside || hooked) && !at_rest) return {};
+    if ((!weighed || odd || beside || hooked) && !at_rest) return {};
     if ((target_.crowded || !company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
-    cell_.weighs(std::max(0.0, mass));
+    cell_.weighs(std::max(kLightest_kg, mass));
+    if (mass < kLightest_kg) return begin_put_back(now, 0, {Status::kRetry, "something bears it", {}});
     if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
     if (beside) {

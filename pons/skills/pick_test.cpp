@@ -381,6 +381,25 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
   }
 }
 
+// It is wedged in, or stands on something that came up with it: carried off, it would strike something.
+TEST_F(PickTest, WhatSomethingBearsGoesBack) {
+  const auto all = [&] { return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1})}; };
+  tick_with(all());
+  const auto skill = start("P1");
+  Progress progress;
+  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+    const bool held = cell_.held.has_value();
+    tick_with(all());
+    progress = skill->tick(now_);
+    const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
+    if (tip_z < all()[0].world_from_top.translation().z()) grips_kg_ = -0.5;
+    if (held && !cell_.held) grips_kg_.reset();
+  }
+  EXPECT_EQ(progress.status, Status::kRetry) << progress.reason;
+  EXPECT_THAT(progress.reason, HasSubstr("something bears it"));
+  EXPECT_FALSE(cell_.held);
+}
+
 // What an earlier task could not place must not stay on the cups, however large it is.
 class HeldSize : public PickTest, public ::testing::WithParamInterface<Vector3> {};
 INSTANTIATE_TEST_SUITE_P(SmallAndLarge, HeldSize, ::testing::Values(Vector3(0.1, 0.1, 0.1), Vector3(0.40, 0.34, 0.18)));

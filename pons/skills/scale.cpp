@@ -19,7 +19,7 @@ constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
 constexpr double kUneven_m = 0.008;  // between where a load's middle seems to be and where it weighs: both are measured
 constexpr double kFeltLeast_nm = 0.05;  // the wrist's own error
 constexpr int kTimeAndAgain = 3;
-constexpr double kFellOff = 2;                   // of the mass of the latest readings: over all of them
+constexpr double kFellOff = 1.5;                 // of the mass of the latest readings: over all of them
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
 
@@ -44,7 +44,6 @@ Eigen::Vector2d moment_nm(const Cell& cell) {
 constexpr double kFree_m = 0.06;     // between a load and the belt: it may hang lower than its size says
 constexpr double kFreed_m_s2 = 2.5;  // lifted so softly, it hardly swings
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
-constexpr double kLightest_kg = 0.01;
 
 }  // namespace
 

@@ -15,6 +15,8 @@ struct Weight {
   Eigen::Vector2d beside_tip_m{0, 0};  // of its centre of mass, tip frame: how far from the tip's axis
 };
 
+inline constexpr double kLightest_kg = 0.01;  // of all loads: what weighs less is borne by something
+
 // What hangs on a load besides, and whose weight it seems to be, by code.
 struct Beside {
   std::string whose = "another";

@@ -178,6 +178,21 @@ TEST_F(ScaleTest, WhatTiltsTheCupsIsFeltWhereItHangsThroughoutTheLift) {
   EXPECT_GT(read, 20);
 }
 
+TEST_F(ScaleTest, WhatFellOffMeanwhileIsFeltNoMore) {
+  const AxisState still = motion::sample(lift(0), begin_, cell_.model.axes());
+  Scale scale;
+  for (int i = 0; i < 60; ++i) {
+    const double mass_kg = i < 30 ? 2.0 : 0.5, aside_m = i < 30 ? 0.15 : 0;
+    hear(begin_ + i * kTick, still, {mass_kg * kGravity_m_s2, world_.robot.tool.mass_kg * kGravity_m_s2},
+         {aside_m, 0, 0.05});
+    scale.add(cell_);
+  }
+  const std::optional<Weight> weight = scale.weigh(cell_, 0);
+  ASSERT_TRUE(weight);
+  EXPECT_NEAR(weight->mass_kg, 0.5, 0.02);
+  EXPECT_LT(weight->beside_tip_m.norm(), 0.005);
+}
+
 TEST_F(ScaleTest, SaysNothingBeforeASwingIsOver) {
   for (const auto& [mass_kg, ticks] : {std::pair{0.2, 5}, {1.0, 8}, {3.5, 15}}) {
     int early = 0;
