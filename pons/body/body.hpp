@@ -27,7 +27,7 @@ struct Sensors {
   bool watchdog_tripped = false;                  // the body's watchdog has taken the power off: see Body
   // How often, since the start, something fell through the light curtain in the mouth of each of the world's places.
   std::array<std::uint16_t, kMaxPlaces> fallen_into{};
-  std::uint32_t zones_occupied = 0;               // bit i: somebody is in the world's zone i (scanner, light curtain)
+  std::uint32_t zones_occupied = 0;  // bit i: somebody is in the world's zone i (scanner, light curtain)
 };
 
 // What the robot is told. Fixed size.

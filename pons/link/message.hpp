@@ -138,11 +138,11 @@ struct State {
   double belt_travel_m = 0, belt_speed_m_s = 0;
   bool photo_eye_blocked = false;
   std::array<std::uint16_t, kMaxPlaces> fallen_into{};  // as the body counts it
-  bool watchdog_tripped = false;     // the body's has taken the power off
-  std::uint32_t zones_occupied = 0;  // bit i: somebody is in the world's zone i
-  std::uint32_t zones_entered = 0;   // bit i: somebody was in zone i, one that stops, in any tick since the last reset
-  double speed_share = 1;            // what the zones allow of each axis' speed limit
-  double rate = 1;                   // how fast the motion's time goes beside the clock's, 0 to 1
+  bool watchdog_tripped = false;                        // the body's has taken the power off
+  std::uint32_t zones_occupied = 0;                     // bit i: somebody is in the world's zone i
+  std::uint32_t zones_entered = 0;  // bit i: somebody was in zone i, one that stops, in any tick since the last reset
+  double speed_share = 1;           // what the zones allow of each axis' speed limit
+  double rate = 1;                  // how fast the motion's time goes beside the clock's, 0 to 1
   Duration late{0};  // so far the motion's time is behind the clock's: a segment begins at its start + late
 };
 
