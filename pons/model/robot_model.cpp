@@ -448,7 +448,8 @@ void RobotModel::mass_matrix(const AxisVector& q, const Payload& payload, AxisMa
   impl_->carry(payload);
   impl_->q = q;
   impl_->forget();  // it keeps its own in the same places
-  pinocchio::crba(impl_->model, impl_->data, impl_->q);
+  // The type for which Pinocchio's library holds this function: any other costs a minute of compiling.
+  pinocchio::crba(impl_->model, impl_->data, Eigen::Ref<const Eigen::VectorXd>(impl_->q));
   mass = impl_->data.M.selfadjointView<Eigen::Upper>();
 }
 
