@@ -46,9 +46,8 @@ double left_s(const ObjectBelief& belief, const world::Belt& belt) {
 
 std::string id_of(const std::string& code, int tries) { return tries == 1 ? code : code + "." + std::to_string(tries); }
 
-bool is_covered(const ObjectBelief& belief, const std::vector<ObjectBelief>& all) {
-  return std::any_of(all.begin(), all.end(),
-                     [&](const ObjectBelief& other) { return lies_on(other, belief) || is_part(other, belief); });
+bool covers(const ObjectBelief& other, const ObjectBelief& belief) {
+  return lies_on(other, belief) || is_part(other, belief);
 }
 
 }  // namespace
@@ -93,8 +92,12 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
-    if (decisions.belt_waits || !would_ride_past(belief, now)) continue;
-    decisions.belt_waits = !set_aside.contains(id_of(belief.code, known_.find(belief.code)->second.tries));
+    if (decisions.belt_waits || !would_ride_past(belief)) continue;
+    const bool may_be_asked_for = !decided_.contains(belief.track) && orders_.contains(belief.code);
+    decisions.belt_waits = is_waited_for(belief, now, set_aside) ||
+                           (may_be_asked_for && std::ranges::any_of(beliefs, [&](const ObjectBelief& other) {
+                              return covers(other, belief) && is_waited_for(other, now, set_aside);
+                            }));
   }
   return decisions;
 }
@@ -135,11 +138,15 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     if (!known.seen_again) known.seen_again = now;
     if (now - *known.seen_again < kAskAgainAfter) return;
   }
-  if (is_covered(belief, all)) {
-    // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare.
-    if (x_m < label_view_end_m_) return;
-    return ride(belief, kRideCovered, decisions);
+  bool covered = false;
+  for (const ObjectBelief& other : all) {
+    if (!covers(other, belief)) continue;
+    // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare; and what lies
+    // on it may be about to be taken.
+    if (x_m < label_view_end_m_ || is_waited_for(other, now, {})) return;
+    covered = true;
   }
+  if (covered) return ride(belief, kRideCovered, decisions);
   if (order->second.priority >= kExpressPriority && must_wait(belief, all)) return;
   decided_.insert(belief.track);
   if (known.tries > 0 || known.rode) --tally_.settled;
@@ -187,14 +194,17 @@ bool Dispatcher::past_label_view(const ObjectBelief& belief) const {
   return belief.world_from_top.translation().x() > label_view_end_m_ + half_m + on_the_way_m;
 }
 
-// Asked for, or about to be again, and where the belt must stop now to keep it in the zone.
-bool Dispatcher::would_ride_past(const ObjectBelief& belief, Time now) const {
+// Where the belt must stop now to keep it in the zone.
+bool Dispatcher::would_ride_past(const ObjectBelief& belief) const {
+  return belt_.must_wait_for(belief.world_from_top.translation().x(), std::max(belief.velocity_m_s.x(), 0.0));
+}
+
+bool Dispatcher::is_waited_for(const ObjectBelief& belief, Time now, const std::set<std::string>& set_aside) const {
   const auto known = known_.find(belief.code);
   if (known == known_.end()) return false;
   const std::optional<Time>& again = known->second.seen_again;
   const bool soon = known->second.failed && again && now - *again < kAskAgainAfter;
-  if (!known->second.asked && !soon) return false;
-  return belt_.must_wait_for(belief.world_from_top.translation().x(), std::max(belief.velocity_m_s.x(), 0.0));
+  return (known->second.asked || soon) && !set_aside.contains(id_of(belief.code, known->second.tries));
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {

@@ -77,7 +77,9 @@ class Dispatcher final : public Brain {
   [[nodiscard]] bool too_large(const Vector3& size_m, const Order& order) const;
   // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;
-  [[nodiscard]] bool would_ride_past(const ObjectBelief& belief, Time now) const;
+  [[nodiscard]] bool would_ride_past(const ObjectBelief& belief) const;
+  // Asked for, or about to be again, and not `set_aside`.
+  [[nodiscard]] bool is_waited_for(const ObjectBelief& belief, Time now, const std::set<std::string>& set_aside) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);

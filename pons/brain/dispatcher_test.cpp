@@ -325,6 +325,34 @@ TEST_F(DispatcherTest, WhatStaysCoveredBeyondTheCameraRides) {
   EXPECT_EQ(dispatcher_.observe({beside, upper}, at(0)).tasks.size(), 1u);
 }
 
+TEST_F(DispatcherTest, WhatLiesUnderOneThatIsAskedForIsWaitedFor) {
+  ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1");
+  ObjectBelief upper = parcel(2, lower.world_from_top.translation().x() - 0.1, "P2");
+  lower.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  (void)dispatcher_.observe({upper}, at(0));
+  const Decisions covered = dispatcher_.observe({lower, upper}, at(0.1));
+  EXPECT_TRUE(covered.rides.empty());
+  EXPECT_TRUE(covered.belt_waits);
+  EXPECT_FALSE(dispatcher_.observe({lower, upper}, at(0.2), {"P2"}).belt_waits) << "nobody takes the upper one now";
+  const Decisions bare = dispatcher_.observe({lower}, at(0.3));
+  ASSERT_EQ(bare.tasks.size(), 1U);
+  EXPECT_EQ(bare.tasks[0].at("id"), "P1");
+}
+
+TEST_F(DispatcherTest, WhatLiesUnderOneThatIsGivenUpRides) {
+  ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1");
+  ObjectBelief upper = parcel(2, lower.world_from_top.translation().x() - 0.1, "P2");
+  lower.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  (void)dispatcher_.observe({upper}, at(0));
+  dispatcher_.heard("P2", task::Outcome::kException);
+  const Decisions covered = dispatcher_.observe({lower, upper}, at(0.1));
+  ASSERT_EQ(covered.rides.size(), 1U);
+  EXPECT_EQ(covered.rides[0].reason, kRideCovered);
+  EXPECT_FALSE(covered.belt_waits);
+}
+
 TEST_F(DispatcherTest, WhatMayBeTwoIsNotAskedFor) {
   ObjectBelief whole = parcel(1, 0.2, "P1");
   whole.size_m = Vector3(0.17, 0.09, 0.1);

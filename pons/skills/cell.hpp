@@ -53,10 +53,10 @@ struct Felt {
   Eigen::Vector2d aside_m;
 };
 
-// A parcel on which another was found to hang, what both weighed the last time, and how often that was.
+// A parcel on which another was found to hang, what both weighed the last time and at most, and how often that was.
 struct Hooked {
   std::string code;
-  double mass_kg = 0;
+  double mass_kg = 0, most_kg = 0;
   int times = 1;
 };
 

@@ -56,18 +56,23 @@ TEST_F(FeltTest, TowardsWhomItWeighsMore) {
 
 TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItAndItIsHeavierStill) {
   EXPECT_EQ(felt(1, -0.05, 0), "nobody");
-  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 0.5}), "another");
-  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 1}), "nobody");
+  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 0.5, 0.5}), "another");
+  EXPECT_EQ(felt(1, -0.05, 0, Hooked{"A", 1, 1}), "nobody");
   EXPECT_EQ(felt(1, -0.14, 0), "another") << "no parcel is";
 }
 
 // Put back because another hung on it, or seemed to.
 TEST_F(FeltTest, WhatIsFeltTimeAndAgainIsUneven) {
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1}), "B") << "it may have hooked again";
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 2}), "B");
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 3}), "nobody");
-  EXPECT_EQ(felt(1, -0.14, 0, Hooked{"A", 1.5, 3}), "another") << "no parcel is that uneven";
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 3}), "B") << "heavier: the neighbour bore a part of it then";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 1}), "B") << "it may have hooked again";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 2}), "nobody");
+  EXPECT_EQ(felt(1, -0.14, 0, Hooked{"A", 1.5, 1.5, 2}), "another") << "no parcel is that uneven";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 0.8, 2}), "B") << "heavier: the neighbour bore a part of it then";
+}
+
+TEST_F(FeltTest, WhatIsLighterThanWhenAnotherHungOnItIsUneven) {
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.3, 1.3, 1}), "nobody") << "that has let go";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.05, 1.05, 1}), "B") << "no more than two weighings differ";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.6, 1.3, 2}), "B") << "but heavier than the last time";
 }
 
 }  // namespace

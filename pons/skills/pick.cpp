@@ -407,7 +407,7 @@ class Pick final : public ArmSkill {
     if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
     if (beside) {
-      cell_.hooked = Hooked{code_, mass, hooked ? hooked->times + 1 : 1};
+      cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
       return begin_put_back(now, 0, {Status::kRetry, beside->whose + " hangs on it: its weight is felt beside it", {}});
     }
     return success(now);

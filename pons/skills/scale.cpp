@@ -18,7 +18,7 @@ constexpr double kNearEdge = 0.45;   // of the way from the middle to an edge
 constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
 constexpr double kUneven_m = 0.008;  // between where a load's middle seems to be and where it weighs: both are measured
 constexpr double kFeltLeast_nm = 0.05;  // the wrist's own error
-constexpr int kTimeAndAgain = 3;
+constexpr int kTimeAndAgain = 2;
 constexpr double kFellOff = 1.5;                 // of the mass of the latest readings: over all of them
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
@@ -50,7 +50,8 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                    const std::optional<Hooked>& before) {
   const bool heavier = before && weight.mass_kg > (1 + kMore) * before->mass_kg + kMore_kg;
-  const bool uneven = before && !heavier && before->times >= kTimeAndAgain;
+  const bool lighter = before && (1 + kMore) * weight.mass_kg + kMore_kg < before->most_kg;
+  const bool uneven = before && !heavier && (lighter || before->times >= kTimeAndAgain);
   const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
   const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
   if (!uneven && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
