@@ -242,7 +242,7 @@ class Pick final : public ArmSkill {
   }
 
   Progress set_down(Time now) {
-    if (verdict_.status == Status::kRetry) cell_.hold_belt(now);
+    cell_.hold_belt(now);  // or what is behind it rides against it, and stays behind, perhaps where no camera sees it
     const auto laid = set_down_.tick(now);
     if (!laid) return {Status::kRetry, laid.error().line(), {}};
     if (!*laid) return {};
