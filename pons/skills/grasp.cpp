@@ -267,12 +267,13 @@ Expected<Lift> lift(Cell& cell, const AxisState& start, Time at, const Eigen::Ma
   // Seen from the belt, as it runs and changes speed now, the way is straight: what touches the load is neither pushed
   // nor left to push.
   // A belt that starts or stops gains more than the arm could take up or leave at a stroke: that much goes uncopied.
-  const double gains_m_s2 = std::clamp(cell.belt_acceleration_m_s2(), -kGainsMost_m_s2, kGainsMost_m_s2);
-  const Vector3 belt = belt_velocity(cell), gains(gains_m_s2, 0, 0);
+  double takes_s = std::sqrt(kLeastJerk * offset.norm() / peak_m_s2), rides_s = kRideLifted_s;
+  const Vector3 belt = belt_velocity(cell);
+  const double loses_most_m_s2 = std::min(kGainsMost_m_s2, belt.x() / takes_s);  // it does not run backwards
+  const Vector3 gains(std::clamp(cell.belt_acceleration_m_s2(), -loses_most_m_s2, kGainsMost_m_s2), 0, 0);
   std::array<Vector3, 3> from = tip_motion(cell, start);
   from[1] -= belt;
   from[2] -= gains;
-  double takes_s = std::sqrt(kLeastJerk * offset.norm() / peak_m_s2), rides_s = kRideLifted_s;
   Expected<motion::Trajectory> way = fail("out of reach", "lift");
   for (int round = 0; round < kRounds && !way; ++round) {
     // An axis may come to its limit: sooner or later it would have to turn back all the way.

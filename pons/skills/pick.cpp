@@ -35,10 +35,9 @@ constexpr double kLifted_m_s2 = 5.0;
 constexpr double kLifted_m = 0.020;  // nothing below supports the load any more: the bellows stretch 12 mm at most
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kDragged_m = 0.006;   // behind the belt; further, the cups slide over what they touch
-constexpr double kPutBack_m = 0.02;    // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
-constexpr double kPutAside = 2.5;      // times as far from its neighbours as it was lifted: what is heavy swings,
-constexpr double kLowered_m_s2 = 2.5;  // but the less, the softer it is lowered
+constexpr double kDragged_m = 0.006;  // behind the belt; further, the cups slide over what they touch
+constexpr double kPutBack_m = 0.02;   // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
+constexpr double kPutAside = 2.5;     // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;  // felt while it is lifted, over what it was taken for
 constexpr double kUnweighable = 2.0;                 // times the mass limit
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
@@ -220,15 +219,12 @@ class Pick final : public ArmSkill {
   Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
-    const AxisState state = cell_.arm.planned(from);
     Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
-    to.x() += belt_travel_m(from) - lift_travel_m_;
+    to.x() -= lift_travel_m_;
     to.z() = lift_from_.z() + kPutBack_m;
-    const Vector3 offset = to - cell_.model.world_from_tip(state.position).translation();
-    const auto down = skills::lift(cell_, state, from, grasp_.orientation, offset, kLowered_m_s2);
-    if (!down || !cell_.arm.stream(down->trajectory)) return begin_set_down(now, std::move(verdict));
+    if (auto begun = set_down_.begin_back(now, to, grasp_.orientation); !begun)
+      return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
-    set_down_.begin_at(down->top);
     phase_ = Phase::kSetDown;
     return {};
   }

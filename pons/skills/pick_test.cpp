@@ -8,6 +8,7 @@
 
 #include "pons/core/gravity.hpp"
 #include "pons/skills/rest.hpp"
+#include "pons/skills/set_down.hpp"
 #include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
@@ -335,7 +336,7 @@ TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
   belt_m_s_ = 0.15;
   const Vector3 size_m{0.2, 0.15, 0.1};
   const auto all = [&] {
-    return std::vector{parcel(1, -0.2 + belt_travel_m_, 0, size_m), parcel(2, -0.38 + belt_travel_m_, 0, size_m)};
+    return std::vector{parcel(1, -0.4 + belt_travel_m_, 0, size_m), parcel(2, -0.58 + belt_travel_m_, 0, size_m)};
   };
   const auto tip = [&]() -> Vector3 { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); };
   for (int i = 0; i < 50; ++i) belt_m_s_ += 0.001, tick_with(all());
@@ -379,6 +380,31 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
     grips_kg_.reset();
     cell_.held.reset();
   }
+}
+
+// What stands beside its place is no lower than the load was lifted. The belt has come to rest just now.
+TEST_F(PickTest, WhatGoesBackComesDownStraight) {
+  for (int i = 20; i >= 0; --i) belt_m_s_ = 0.01 * i, tick_with({});
+  const Pose from = cell_.model.world_from_tip(cell_.arm.planned(now_).position);
+  const Vector3 to = from.translation() + Vector3(-0.05, 0.02, -0.15);
+  cell_.held = Held{.code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}};
+  grips_kg_ = 1;
+  SetDown set_down(cell_);
+  ASSERT_TRUE(set_down.begin_back(now_, to - belt_travel_m_ * Vector3::UnitX(), from.linear()));
+  double lowest_m = from.translation().z(), most_aside_m = 0;
+  Expected<bool> laid = false;
+  for (int i = 0; i < 300 && laid && !*laid; ++i) {
+    tick_with({});
+    laid = set_down.tick(now_);
+    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+    if (cell_.held && tip.z() < from.translation().z() - 0.01)
+      most_aside_m = std::max(most_aside_m, (tip - to).head<2>().norm());
+    if (cell_.held) lowest_m = std::min(lowest_m, tip.z());
+    if (!cell_.held) grips_kg_.reset();
+  }
+  ASSERT_TRUE(laid && *laid);
+  EXPECT_NEAR(lowest_m, to.z(), 0.002);
+  EXPECT_LT(most_aside_m, 0.01);
 }
 
 // It is wedged in, or stands on something that came up with it: carried off, it would strike something.

@@ -15,16 +15,16 @@ class SetDown {
   // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. Error: no way
   // there now; what is in it rides on.
   [[nodiscard]] Expected<void> begin(Time now);
-  // The way down is under way already, and ends then.
-  void begin_at(Time released_at) {
-    released_at_ = released_at;
-    emptied_at_.reset();
-    (void)delay_.take();
-  }
+  // Sets out for a place on the belt beside others: to over it first, and straight down from there. `tip_m`: where the
+  // tip is to be, relative to the belt (world x less its travel). Error: out of reach.
+  [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation);
   // Once a period after that: true when the cups are empty. Error: the arm does not obey.
   [[nodiscard]] Expected<bool> tick(Time now);
 
  private:
+  // To over the place if it is not there yet, else down.
+  [[nodiscard]] Expected<void> go_back(Time now);
+  void begin_at(Time released_at);
   [[nodiscard]] Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m);
   [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const;
 
@@ -32,6 +32,12 @@ class SetDown {
   Delay delay_;
   Cell::Search search_{.must = true};
   std::size_t height_ = 0;  // over the belt, that is being searched
+  struct Back {
+    Vector3 tip_m;  // relative to the belt
+    Eigen::Matrix3d orientation;
+    std::optional<Time> over;  // it, by then; the way down is found only then
+  };
+  std::optional<Back> back_;
   Time released_at_;
   std::optional<Time> emptied_at_;
 };
