@@ -31,8 +31,8 @@ template <typename Code>
 
 }  // namespace pons::test_allocations
 
-// NOLINTBEGIN: replacing the global operators is how allocations are seen. None is inlined: GCC would find a free() of what
-// it knows to come from operator new.
+// NOLINTBEGIN: replacing the global operators is how allocations are seen. None is inlined: GCC would find a free() of
+// what it knows to come from operator new.
 void* operator new(std::size_t size) { return pons::test_allocations::counted(size); }
 void* operator new[](std::size_t size) { return pons::test_allocations::counted(size); }
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
