@@ -94,10 +94,8 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
     if (decisions.belt_waits || !would_ride_past(belief)) continue;
     const bool may_be_asked_for = !decided_.contains(belief.track) && orders_.contains(belief.code);
-    decisions.belt_waits = is_waited_for(belief, now, set_aside) ||
-                           (may_be_asked_for && std::ranges::any_of(beliefs, [&](const ObjectBelief& other) {
-                              return covers(other, belief) && is_waited_for(other, now, set_aside);
-                            }));
+    decisions.belt_waits =
+        is_waited_for(belief, now, set_aside) || (may_be_asked_for && will_be_bare(belief, beliefs, now, set_aside));
   }
   return decisions;
 }
@@ -138,15 +136,11 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     if (!known.seen_again) known.seen_again = now;
     if (now - *known.seen_again < kAskAgainAfter) return;
   }
-  bool covered = false;
-  for (const ObjectBelief& other : all) {
-    if (!covers(other, belief)) continue;
-    // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare; and what lies
-    // on it may be about to be taken.
-    if (x_m < label_view_end_m_ || is_waited_for(other, now, {})) return;
-    covered = true;
+  if (std::ranges::any_of(all, [&](const ObjectBelief& other) { return covers(other, belief); })) {
+    // Taken now, what lies on it would come along. As long as a camera looks, it may still see it bare.
+    if (x_m < label_view_end_m_ || will_be_bare(belief, all, now, {})) return;
+    return ride(belief, kRideCovered, decisions);
   }
-  if (covered) return ride(belief, kRideCovered, decisions);
   if (order->second.priority >= kExpressPriority && must_wait(belief, all)) return;
   decided_.insert(belief.track);
   if (known.tries > 0 || known.rode) --tally_.settled;
@@ -205,6 +199,12 @@ bool Dispatcher::is_waited_for(const ObjectBelief& belief, Time now, const std::
   const std::optional<Time>& again = known->second.seen_again;
   const bool soon = known->second.failed && again && now - *again < kAskAgainAfter;
   return (known->second.asked || soon) && !set_aside.contains(id_of(belief.code, known->second.tries));
+}
+
+bool Dispatcher::will_be_bare(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
+                              const std::set<std::string>& set_aside) const {
+  return std::ranges::any_of(
+      all, [&](const ObjectBelief& other) { return covers(other, belief) && is_waited_for(other, now, set_aside); });
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {

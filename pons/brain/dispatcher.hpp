@@ -80,6 +80,9 @@ class Dispatcher final : public Brain {
   [[nodiscard]] bool would_ride_past(const ObjectBelief& belief) const;
   // Asked for, or about to be again, and not `set_aside`.
   [[nodiscard]] bool is_waited_for(const ObjectBelief& belief, Time now, const std::set<std::string>& set_aside) const;
+  // What lies on it is waited for.
+  [[nodiscard]] bool will_be_bare(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
+                                  const std::set<std::string>& set_aside) const;
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
   [[nodiscard]] Json task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const;
   void ride(const ObjectBelief& belief, std::string_view reason, Decisions& decisions);

@@ -81,6 +81,11 @@ class Cell {
   // Where that belief will be at `time`, carried on by the belt as it runs and changes speed now.
   [[nodiscard]] Vector3 predict(const ObjectBelief& object, Time time) const;
   [[nodiscard]] double belt_speed_m_s() const { return arm.state().belt_speed_m_s; }
+  // At the speed it runs at now.
+  [[nodiscard]] double belt_travel_m(Time time) const {
+    const link::State& state = arm.state();
+    return state.belt_travel_m + to_s(time - state.stamp) * state.belt_speed_m_s;
+  }
   [[nodiscard]] double belt_acceleration_m_s2() const { return belt_acceleration_m_s2_; }
 
   // Whether a camera could see it on the belt there.

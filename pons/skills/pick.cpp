@@ -353,7 +353,7 @@ class Pick final : public ArmSkill {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
     lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    lift_travel_m_ = belt_travel_m(from);
+    lift_travel_m_ = cell_.belt_travel_m(from);
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_), kLifted_m_s2);
     if (!up || !cell_.arm.stream(up->trajectory))
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
@@ -430,11 +430,6 @@ class Pick final : public ArmSkill {
     retreated_at_ = now;
     if (up && cell_.arm.stream(*up)) retreated_at_ = up->back().end();
     phase_ = Phase::kRetreat;
-  }
-
-  [[nodiscard]] double belt_travel_m(Time time) const {
-    const link::State& state = cell_.arm.state();
-    return state.belt_travel_m + to_s(time - state.stamp) * state.belt_speed_m_s;
   }
 
   Progress retreat(Time now) {

@@ -18,7 +18,7 @@ constexpr double kRoom_m = 0.02;                              // to the next par
 constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kRounds = 3;
 constexpr double kBack_m_s2 = 2.5;       // the less, the softer it is lowered
-constexpr double kBeside_m = 0.01;       // from over its place: it would come against what stands there
+constexpr double kBeside_m = 0.01;       // from over its place, coming down would bring it against what stands there
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
 constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid of a heavy load: no collision
@@ -26,13 +26,13 @@ constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid 
 }  // namespace
 
 Expected<void> SetDown::begin(Time now) {
+  back_.reset();
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (; height_ < kOverBelt_m.size() && !way; ++height_) {
     way = way_to_belt(now, kOverBelt_m[height_]);
     if (!way && cell_.router.spent()) return std::unexpected(way.error());  // the next tick goes on from there
   }
   height_ = 0;
-  back_.reset();
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(*way); !sent) return sent;
   begin_at(way->back().end());
@@ -40,27 +40,24 @@ Expected<void> SetDown::begin(Time now) {
 }
 
 Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation) {
-  back_ = Back{tip_m, orientation, {}};
+  back_ = Back{tip_m, orientation};
   return go_back(now);
 }
 
 Expected<void> SetDown::go_back(Time now) {
   const Time from = cell_.arm.splice_time(now);
   const AxisState start = cell_.arm.planned(from);
-  const link::State& state = cell_.arm.state();
-  const double travel_m = state.belt_travel_m + to_s(from - state.stamp) * state.belt_speed_m_s;
   const Vector3 tip = cell_.model.world_from_tip(start.position).translation();
-  Vector3 offset = back_->tip_m + travel_m * Vector3::UnitX() - tip;
+  Vector3 offset = back_->tip_m + cell_.belt_travel_m(from) * Vector3::UnitX() - tip;
   const bool aside = !back_->over && offset.head<2>().norm() > kBeside_m;
   if (aside) offset.z() = 0;
   const auto way = lift(cell_, start, from, back_->orientation, offset, kBack_m_s2);
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(way->trajectory); !sent) return sent;
-  if (aside) {
-    back_->over = way->top;
-  } else {
+  if (aside)
+    back_->over = true;
+  else
     back_.reset();
-  }
   begin_at(way->top);
   return {};
 }

@@ -18,7 +18,7 @@ class SetDown {
   // Sets out for a place on the belt beside others: to over it first, and straight down from there. `tip_m`: where the
   // tip is to be, relative to the belt (world x less its travel). Error: out of reach.
   [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation);
-  // Once a period after that: true when the cups are empty. Error: the arm does not obey.
+  // Once a period after that: true when the cups are empty. Error: the arm does not obey, or down is out of reach.
   [[nodiscard]] Expected<bool> tick(Time now);
 
  private:
@@ -35,7 +35,7 @@ class SetDown {
   struct Back {
     Vector3 tip_m;  // relative to the belt
     Eigen::Matrix3d orientation;
-    std::optional<Time> over;  // it, by then; the way down is found only then
+    bool over = false;  // it, when the present way ends; the way down is found only then
   };
   std::optional<Back> back_;
   Time released_at_;
