@@ -49,7 +49,11 @@ struct Perception::Impl {
   std::map<double, Look> looks;
 
   Impl(const world::World& the_world, model::RobotModel model, Both the_both)
-      : world(the_world), both(std::move(the_both)), self_filter(std::move(model)), tracker(the_world) {
+      : world(the_world),
+        both(std::move(the_both)),
+        self_filter(std::move(model), both),
+        segmenter(both),
+        tracker(the_world) {
     for (const auto& camera : world.cameras) {
       const world::Place* const place = world.place(camera.watches);
       if (place != nullptr) watches.try_emplace(place->name, world, *place);

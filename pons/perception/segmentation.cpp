@@ -6,8 +6,6 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "pons/perception/plane.hpp"
-
 namespace pons::perception {
 namespace {
 
@@ -38,6 +36,13 @@ int typical_height(const TopView& view, const std::vector<cv::Point>& cells) {
 }
 
 }  // namespace
+
+std::size_t half_of(const std::vector<Region>& regions) {
+  std::size_t all = 0, taken = 0, count = 0;
+  for (const Region& region : regions) all += region.cells.size();
+  while (count < regions.size() && 2 * taken < all) taken += regions[count++].cells.size();
+  return count;
+}
 
 void Segmenter::find_cores(const TopView& view) {
   const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_RECT, {3, 3});
@@ -176,20 +181,33 @@ void Segmenter::cut(std::size_t index, const Line& line) {
   std::ranges::copy_if(first.core, std::back_inserter(second.core), beyond);
   std::erase_if(first.cells, beyond);
   std::erase_if(first.core, beyond);
+  first.plane.reset();
   for (const cv::Point& cell : second.cells) segments_.labels(cell) = label;
   segments_.regions.push_back(std::move(second));
 }
 
+void Segmenter::fit_planes(const TopView& view) {
+  std::vector<Region>& regions = segments_.regions;
+  const auto some = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (regions[i].core.size() >= kFewestCells) regions[i].plane = fit_plane(view, regions[i].core);
+    }
+  };
+  const std::size_t half = half_of(regions);
+  both_([&] { some(0, half); }, [&] { some(half, regions.size()); });
+}
+
 // Objects that touch at equal height: first by colour, then by an outline that no single box has.
 void Segmenter::split(const TopView& view) {
-  splitter_.prepare(view);
+  fit_planes(view);
   int cuts = 0;
   for (std::size_t i = 0; i < segments_.regions.size(); ++i) {
     while (cuts < kMostCuts) {
       Region& region = segments_.regions[i];
-      if (region.core.size() < 20) break;
+      if (region.core.size() < kFewestCells) break;
       // A curve is shaded: its colours say nothing. Its core ends where it gets steep, with a ragged outline.
-      const bool curved = fit_plane(view, region.core).curved();
+      if (!region.plane) region.plane = fit_plane(view, region.core);
+      const bool curved = region.plane->curved();
       std::optional<Line> line;
       if (!curved) line = splitter_.by_colour(view, region.core);
       const bool whole =
@@ -244,7 +262,7 @@ void Segmenter::split_by_memory(const TopView& view, const std::vector<cv::Rotat
 
 const Segments& Segmenter::segment(const TopView& view, const std::vector<LabelMark>& marks,
                                    const std::vector<cv::RotatedRect>& known) {
-  find_cores(view);
+  both_([&] { find_cores(view); }, [&] { splitter_.prepare(view); });
   grow(view);
   collect();
   for (Region& region : segments_.regions) describe(view, region);

@@ -3,9 +3,13 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "pons/core/both.hpp"
+#include "pons/perception/plane.hpp"
 #include "pons/perception/splitter.hpp"
 #include "pons/perception/top_view.hpp"
 
@@ -22,7 +26,14 @@ struct Region {
   bool near_robot = false;       // beside or under the robot, or in its hand
   double border_share = 0;       // cut by the picture or the belt's limits
   std::vector<int> higher;       // labels of the higher neighbours, ascending
+  std::optional<Plane> plane;    // that fits the core, where that was asked for
 };
+
+// A core of fewer says nothing about its shape.
+inline constexpr std::size_t kFewestCells = 20;
+
+// Of the regions, how many from the first on hold half of the cells.
+[[nodiscard]] std::size_t half_of(const std::vector<Region>& regions);
 
 struct Segments {
   cv::Mat1i labels;             // 0: no object
@@ -37,6 +48,8 @@ struct LabelMark {
 
 class Segmenter {
  public:
+  explicit Segmenter(Both both) : both_(std::move(both)) {}
+
   // No region keeps two of `marks`: every object has one code. What was seen to end where one of `known` does (in
   // cells) still ends there. The result is good until the next call.
   const Segments& segment(const TopView& view, const std::vector<LabelMark>& marks = {},
@@ -48,6 +61,7 @@ class Segmenter {
   void find_cores(const TopView& view);
   void grow(const TopView& view);
   void collect();
+  void fit_planes(const TopView& view);
   void split(const TopView& view);
   void split_by_labels(const TopView& view, const std::vector<LabelMark>& marks);
   void split_by_memory(const TopView& view, const std::vector<cv::RotatedRect>& known);
@@ -55,6 +69,7 @@ class Segmenter {
   void cut(std::size_t region, const Line& line);
   void drop_small(const TopView& view);
 
+  Both both_;
   Splitter splitter_;
   cv::Mat1b foreground_, flat_;
   cv::Mat1w high_, low_;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "pons/core/both.hpp"
 #include "pons/core/image.hpp"
 #include "pons/model/robot_model.hpp"
 
@@ -38,8 +39,7 @@ class SelfFilter {
   static constexpr std::uint8_t kRobot = 255;  // sees the robot
   static constexpr std::uint8_t kNear = 128;   // within about 1.5 cm of such a pixel
 
-  // How far beyond its capsules the robot may reach: fingers of hoses, calibration, the bellows' play.
-  explicit SelfFilter(model::RobotModel model, double margin_m = 0.025);
+  explicit SelfFilter(model::RobotModel model, Both both = one_after_the_other);
   // Another robot that may be in the picture, at most kMaxArms in all; before the first frame.
   void add(model::RobotModel model) { models_.push_back(std::move(model)); }
 
@@ -47,12 +47,24 @@ class SelfFilter {
   const cv::Mat1b& mask(const RgbdFrame& frame, const Sampling& sampling, const ArmPositions& joint_position);
 
  private:
-  void paint(const RgbdFrame& frame, const Sampling& sampling, const model::PlacedCapsule& capsule);
+  // A capsule in the optical frame, and the samples that may see it.
+  struct Shape {
+    Eigen::Vector3f from, along;
+    float inverse_squared_length = 0, squared_radius = 0;
+    cv::Rect window;
+  };
 
+  [[nodiscard]] static Shape shape_of(const model::PlacedCapsule& capsule, const Pose& optical_from_world,
+                                      const Sampling& sampling);
+  static void paint_row(const Shape& s, const float* depth, int count, float first_x, float step_x, float y,
+                        std::uint8_t* robot);
+  // Of the rows from `begin` to `end`.
+  void paint(const RgbdFrame& frame, const Sampling& sampling, int begin, int end);
+
+  Both both_;
   std::vector<model::RobotModel> models_;
-  double margin_m_;
   std::vector<model::PlacedCapsule> capsules_;
-  std::vector<float> depth_row_;
+  std::vector<Shape> shapes_;
   cv::Mat1b robot_, mask_;
 };
 

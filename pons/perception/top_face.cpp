@@ -303,9 +303,9 @@ bool Sighting::covers(double x_m, double y_m, double margin_m) const {
 namespace {
 
 Sighting measure_one(const TopView& view, const Region& region) {
-  const std::vector<cv::Point>& core = region.core.size() >= 20 ? region.core : region.cells;
-  const Plane plane = fit_plane(view, core);
-  const bool curved = plane.curved() && region.core.size() >= 20;
+  const bool has_core = region.core.size() >= kFewestCells;
+  const Plane plane = region.plane ? *region.plane : fit_plane(view, has_core ? region.core : region.cells);
+  const bool curved = plane.curved() && has_core;
   Sighting sighting = curved ? measure_curved(view, region, plane) : measure_flat(view, region, plane);
   sighting.label = region.label;
   sighting.flatness_m = plane.rms_m;
@@ -320,14 +320,6 @@ Sighting measure_one(const TopView& view, const Region& region) {
   sighting.sliver = sighting.size_m.y() < kNarrowest_m;
   sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
   return sighting;
-}
-
-// Of the regions, how many from the first on hold half of the cells.
-std::size_t half_of(const std::vector<Region>& regions) {
-  std::size_t all = 0, taken = 0, count = 0;
-  for (const Region& region : regions) all += region.cells.size();
-  while (count < regions.size() && 2 * taken < all) taken += regions[count++].cells.size();
-  return count;
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ class Photographer {
   Photographer& operator=(const Photographer&) = delete;
 
   // On the thread that advances the body, after each advance. A camera that reads labels skips its turn while nothing
-  // that it could read is known to lie unread.
+  // that it could read is known to lie unread. Another that hangs in the same place skips the turns that both have and
+  // the reading one takes: they are one camera, which takes one picture at a time.
   // `sensors` are those of each robot, at least one.
   void open_shutters(Time now, std::span<const body::Sensors> sensors);
 
@@ -43,6 +44,7 @@ class Photographer {
   [[nodiscard]] Expected<void> health() const;
 
  private:
+  [[nodiscard]] bool wants(std::size_t camera, Time now) const;
   void develop(const std::stop_token& stop);
   // False: a camera failed.
   [[nodiscard]] bool wait_for_place(std::size_t camera);
@@ -53,7 +55,9 @@ class Photographer {
   Pace pace_;
   bool finds_ = false;              // what lies on the belt, some camera that reads no labels
   bool looked_at_ = true;           // the body's thread only
-  std::vector<Time> next_shutter_;  // a camera; the body's thread only
+  std::vector<Time> next_shutter_;  // a camera; the body's thread only, as are
+  std::vector<std::size_t> turn_;   // the cameras, in the order in which they take their turns,
+  std::vector<Time> opened_;        // and when each last opened its shutter
   std::vector<RgbdFrame> frames_;   // a camera; the developer's only
 
   mutable std::mutex mutex_;

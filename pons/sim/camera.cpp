@@ -1,7 +1,6 @@
 #include "pons/sim/camera.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "pons/core/random.hpp"
@@ -22,44 +21,48 @@ inline std::uint64_t mix(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-// What chance does to one row: in pieces that stay in the cache, numbers first, then a loop without branches that the
-// compiler turns into vector code.
+// Numbers drawn once. Each row of each frame reads them from another place on: a million pixels a picture are too many
+// to draw for each one.
+class Sheet {
+ public:
+  Sheet() : normal_(kSize), uniform_(kSize) {
+    Random random(0);
+    for (float& number : normal_) number = static_cast<float>(random.normal());
+    for (std::uint32_t& number : uniform_) number = static_cast<std::uint32_t>(random.next() >> 32);
+  }
+  // For a row of so many pixels.
+  [[nodiscard]] std::pair<const float*, const std::uint32_t*> from(std::uint64_t chance, std::size_t count) const {
+    const std::size_t at = chance % (kSize - count);
+    return {normal_.data() + at, uniform_.data() + at};
+  }
+
+ private:
+  static constexpr std::size_t kSize = 1 << 16;  // both lie in a cache of 512 KiB; many times the widest picture
+  std::vector<float> normal_;
+  std::vector<std::uint32_t> uniform_;
+};
+
 struct Chance {
   std::uint64_t seed = 0;                 // of the frame
   float sigma = 0;                        // at 1 m
   std::uint32_t drop = 0, edge_drop = 0;  // of 2^32
 
-  // True depths of a row and of the next one to measured ones; `first` is the index of the row's first pixel.
-  void disturb(const std::vector<float>& row, const std::vector<float>& below, std::uint64_t first, float* to) const {
-    constexpr std::size_t kPiece = 256;
-    std::array<std::uint32_t, kPiece> chance;
-    std::array<int, kPiece> sum;
+  // True depths of a row and of the next one to measured ones. A loop without branches, which the compiler turns into
+  // vector code.
+  void disturb(const std::vector<float>& row, const std::vector<float>& below, std::uint64_t index, float* to) const {
+    static const Sheet sheet;
+    const auto [normal, uniform] = sheet.from(mix(seed + index * 0x9e3779b97f4a7c15ULL), row.size());
     const Chance own = *this;  // as a copy it cannot change with `to`
+    const auto measure = [&](std::size_t i, float right) {
+      const float z = row[i];
+      const bool edge = (std::abs(right - z) > kEdge_m) | (std::abs(below[i] - z) > kEdge_m);
+      const float measured = z + own.sigma * z * z * normal[i];
+      to[i] = uniform[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
+    };
     const std::size_t last = row.size() - 1;
-    for (std::size_t at = 0; at < row.size(); at += kPiece) {
-      const std::size_t count = std::min(kPiece, row.size() - at);
-      for (std::size_t i = 0; i < count; ++i) {
-        asm volatile("");  // keeps this loop scalar: emulated vector products of 64 bits are slower
-        const std::uint64_t bits = mix(own.seed + (first + at + i) * 0x9e3779b97f4a7c15ULL);
-        chance[i] = static_cast<std::uint32_t>((bits * 0xd1342543de82ef95ULL) >> 32);
-        sum[i] = static_cast<int>((bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48));
-      }
-      const auto measure = [&](std::size_t i, float right) {
-        const float z = row[at + i];
-        const bool edge = (std::abs(right - z) > kEdge_m) | (std::abs(below[at + i] - z) > kEdge_m);
-        const float measured = z + own.sigma * z * z * rough_normal(sum[i]);
-        to[at + i] = chance[i] < (edge ? own.edge_drop : own.drop) ? 0.0F : measured;
-      };
-      const std::size_t beside = std::min(count, last - at);  // those that have a neighbour
-      for (std::size_t i = 0; i < beside; ++i) measure(i, row[at + i + 1]);
-      if (beside < count) measure(beside, row[last]);
-    }
+    for (std::size_t i = 0; i < last; ++i) measure(i, row[i + 1]);
+    measure(last, row[last]);
   }
-
- private:
-  // The sum of four uniform numbers, scaled to unit variance: near enough to a normal one, and cheap enough for a
-  // million pixels.
-  static float rough_normal(int sum) { return static_cast<float>(sum - 131070) * (1.7320508f / 65536.0f); }
 };
 
 }  // namespace
@@ -148,7 +151,7 @@ void SimCamera::measure_depth(std::size_t begin, std::size_t end, PixelArray<flo
   true_depths(begin, line);
   for (std::size_t row = begin; row < end; ++row) {
     if (row + 1 < rows) true_depths(row + 1, below);
-    chance.disturb(line, row + 1 < rows ? below : line, row * columns, depth_m.data() + row * columns);
+    chance.disturb(line, row + 1 < rows ? below : line, row, depth_m.data() + row * columns);
     line.swap(below);
   }
 }

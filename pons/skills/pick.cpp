@@ -37,6 +37,7 @@ constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a 
 constexpr double kRetreat_m = 0.08;
 constexpr double kDragged_m = 0.006;  // behind the belt; further, the cups slide over what they touch
 constexpr double kPutBack_m = 0.02;   // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
+constexpr double kHangsLow_m = 0.05;  // likewise what is too heavy: it hangs askew, a corner up to 35 mm lower
 constexpr double kPutAside = 2.5;     // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;  // felt while it is lifted, over what it was taken for
 constexpr double kUnweighable = 2.0;                 // times the mass limit
@@ -103,9 +104,7 @@ class Pick final : public ArmSkill {
   bool may_rest(Time now, task::Pause) override {
     const bool on_the_way = phase_ == Phase::kApproach && now + kNoReplanBefore < grasp_.hover;
     if (stopped_ || (phase_ != Phase::kFind && !on_the_way) || cell_.held) return false;
-    phase_ = Phase::kFind;
-    search_ = {};
-    waiting_ = aside_ = false;
+    look_afresh(now);
     return true;
   }
   void go_on(Time now, Duration) override {
@@ -221,7 +220,7 @@ class Pick final : public ArmSkill {
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
     to.x() -= lift_travel_m_;
-    to.z() = lift_from_.z() + kPutBack_m;
+    to.z() = lift_from_.z() + (cell_.held->mass_kg > cell_.world.rules.max_mass_kg ? kHangsLow_m : kPutBack_m);
     if (auto begun = set_down_.begin_back(now, to, grasp_.orientation); !begun)
       return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
@@ -243,13 +242,18 @@ class Pick final : public ArmSkill {
     if (!laid) return {Status::kRetry, laid.error().line(), {}};
     if (!*laid) return {};
     if (verdict_.status == Status::kRetry) cell_.missed = Miss{code_, now};
-    if (verdict_.status == Status::kRunning) {
-      phase_ = Phase::kFind;
-      seen_ = now;
-      return {};
-    }
-    begin_retreat(now, verdict_);
+    if (verdict_.status == Status::kRunning)
+      look_afresh(now);
+    else
+      begin_retreat(now, verdict_);
     return {};
+  }
+
+  void look_afresh(Time now) {
+    phase_ = Phase::kFind;
+    seen_ = now;
+    search_ = {};
+    waiting_ = aside_ = false;
   }
 
   // The parcel is still too far upstream: hang over the place where it will come within reach.
@@ -312,7 +316,11 @@ class Pick final : public ArmSkill {
     const auto better = plan_grasp(cell_, cell_.arm.planned(from), from, object,
                                    Eigen::AngleAxisd(turn, Vector3::UnitZ()) * grasp_.orientation, search_);
     planned_ = now;
-    if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) (void)start(*better, object, now);
+    if (better && better->contact_point.x() < cell_.world.belt.pick_x_max_m) {
+      (void)start(*better, object, now);
+    } else if (!better && moved_m > kElsewhere_m && !cell_.router.spent()) {
+      begin_retreat(now, {});  // it will not come there, and what was to ride on by then may stand in the way
+    }
   }
 
   Progress grip(Time now) {
@@ -435,6 +443,7 @@ class Pick final : public ArmSkill {
   Progress retreat(Time now) {
     if (now < retreated_at_) return {};
     cell_.arm.expect_contact(0);
+    if (verdict_.status == Status::kRunning) look_afresh(now);
     return verdict_;
   }
 

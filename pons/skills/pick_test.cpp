@@ -355,7 +355,43 @@ TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
   EXPECT_THAT(progress.reason, HasSubstr("overweight"));
   EXPECT_NEAR(let_go.x(), 0.05, 0.012);
   EXPECT_NEAR(let_go.y(), 0, 0.005);
-  EXPECT_LT(let_go.z(), 0.03);
+  EXPECT_NEAR(let_go.z(), 0.045, 0.01) << "a corner of it hangs low";
+}
+
+// It sets out for where the parcel will come within reach; then the belt stops, and what was to have ridden on by then
+// stands there.
+TEST_F(PickTest, WhenTheBeltStopsItComesNoFurtherThanIsClear) {
+  const Vector3 size_m{0.2, 0.15, 0.06}, tall_m{0.25, 0.2, 0.19};
+  const auto all = [&] {
+    return std::vector{parcel(1, -0.85 + belt_travel_m_, 0, size_m), parcel(2, -0.5 + belt_travel_m_, 0, tall_m)};
+  };
+  const auto tip = [&]() -> Vector3 { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); };
+  const auto skill = start("P1");
+  bool set_out = false;
+  const auto tick = [&] {
+    tick_with(all());
+    const Progress progress = skill->tick(now_);
+    ASSERT_EQ(progress.status, Status::kRunning) << progress.reason;
+    set_out =
+        set_out || std::ranges::any_of(progress.notes, [](const task::Note& note) { return note.kind == "plan"; });
+  };
+  belt_m_s_ = 0.22;
+  for (int i = 0; i < 200 && !set_out; ++i) tick();
+  ASSERT_TRUE(set_out);
+  for (int i = 0; i < 20; ++i) tick();
+  belt_m_s_ = 0;
+  for (int i = 0; i < 200; ++i) {
+    tick();
+    EXPECT_GT(tip().z(), all()[1].world_from_top.translation().z());
+  }
+  EXPECT_FALSE(cell_.missed);
+  double nearest_m = 1;
+  for (int i = 0; i < 400 && nearest_m > 0.01; ++i) {
+    belt_m_s_ = std::min(0.22, belt_m_s_ + 0.001);
+    tick();
+    nearest_m = std::min(nearest_m, (tip() - all()[0].world_from_top.translation()).norm());
+  }
+  EXPECT_LE(nearest_m, 0.01);
 }
 
 // Lifted, it carries another along; both go back, and the arm looks again.

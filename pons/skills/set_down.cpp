@@ -10,8 +10,9 @@
 namespace pons::skills {
 namespace {
 
-// Over the belt, when let go: a heavy load hangs lower than its size says. Higher when that is blocked.
-constexpr std::array kOverBelt_m = {0.03, 0.10, 0.20};
+// Over the belt, when let go. Higher when that is blocked, or the load heavy: it hangs askew from bellows that give.
+constexpr std::array kOverBelt_m = {0.03, 0.08, 0.20};
+constexpr std::size_t kHeavyFrom = 1;
 constexpr double kBeyond_m = 0.15;  // past the pick zone the arm still reaches down
 constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                              // to the next parcel is enough
@@ -27,6 +28,7 @@ constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid 
 
 Expected<void> SetDown::begin(Time now) {
   back_.reset();
+  if (cell_.held->mass_kg > cell_.world.rules.max_mass_kg) height_ = std::max(height_, kHeavyFrom);
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (; height_ < kOverBelt_m.size() && !way; ++height_) {
     way = way_to_belt(now, kOverBelt_m[height_]);

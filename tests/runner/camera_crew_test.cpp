@@ -38,10 +38,12 @@ class CountingCamera final : public body::Camera {
   [[nodiscard]] const Intrinsics& intrinsics() const override { return camera_.intrinsics(); }
   void begin(Time now) override {
     ++shutters;
+    opened.insert(now);
     camera_.begin(now);
   }
   [[nodiscard]] Expected<void> finish(RgbdFrame& frame) override { return camera_.finish(frame); }
   int shutters = 0;
+  std::set<Time> opened;
 
  private:
   body::Camera& camera_;
@@ -49,7 +51,7 @@ class CountingCamera final : public body::Camera {
 
 // A cell whose parcels ride by; the arm stands.
 struct Scene {
-  explicit Scene(Pace pace = Pace::kLockstep) {
+  explicit Scene(world::World the_world = load()) : world(std::move(the_world)) {
     const auto manifest = world::draw_manifest(world, 4, 1);
     EXPECT_TRUE(manifest) << manifest.error().line();
     auto created = sim::Simulation::create(world, *manifest, 1);
@@ -60,8 +62,8 @@ struct Scene {
     for (body::Camera* const camera : simulation->cameras()) cameras.emplace_back(*camera);
     std::vector<body::Camera*> counted;
     for (CountingCamera& camera : cameras) counted.push_back(&camera);
-    photographer.emplace(world, counted, room.frames, room.pages, room.memory(), pace);
-    observer.emplace(world, *perception, room.frames, room.pages, room.memory(), pace);
+    photographer.emplace(world, counted, room.frames, room.pages, room.memory(), Pace::kLockstep);
+    observer.emplace(world, *perception, room.frames, room.pages, room.memory(), Pace::kLockstep);
   }
 
   // A bridge period of physics and shutters, then what the crew has to say.
@@ -77,7 +79,7 @@ struct Scene {
     return observer->collect(now, forgotten);
   }
 
-  world::World world = load();
+  world::World world;
   std::unique_ptr<sim::Simulation> simulation;
   std::optional<perception::Perception> perception;
   std::deque<CountingCamera> cameras;  // in the world's order
@@ -133,6 +135,26 @@ TEST(CameraCrew, LabelsArePhotographedOnlyWhileSomethingLiesUnread) {
   const auto turns = static_cast<int>(to_s(until - found) / reads->period_s);
   EXPECT_GE(label.shutters, static_cast<int>(codes.size()));
   EXPECT_LT(label.shutters, turns) << "what is read twice is sure";
+}
+
+// Both hang in one place. In that cell their turns are apart, so both take each of theirs.
+TEST(CameraCrew, OfTwoStreamsOfOneCameraWithOneTurnTheOneThatReadsTakesIt) {
+  world::World world = load();
+  const auto place = [&](bool reads) {
+    return std::ranges::find(world.cameras, reads, &world::CameraSpec::reads_labels) - world.cameras.begin();
+  };
+  const auto finds = static_cast<std::size_t>(place(false)), reads = static_cast<std::size_t>(place(true));
+  world.cameras[reads].phase_s = world.cameras[finds].phase_s;
+  const Duration period = from_s(world.cameras[finds].period_s);
+  for (const double off_m : {0.0, 0.01}) {
+    world.cameras[reads].world_from_optical.translation().x() += off_m;
+    Scene scene(world);
+    while (scene.now < Time(std::chrono::seconds(12))) (void)scene.period();
+    const std::set<Time>&found = scene.cameras[finds].opened, &read = scene.cameras[reads].opened;
+    ASSERT_GT(read.size(), 2U);
+    for (Time turn(period); turn < scene.now; turn += period)
+      EXPECT_TRUE(found.contains(turn) != (off_m == 0 && read.contains(turn))) << to_s(turn - Time{}) << " s";
+  }
 }
 
 TEST(CameraCrew, TheSameSceneGivesTheSameBeliefsWheneverTheThreadRuns) {
