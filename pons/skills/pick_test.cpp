@@ -64,7 +64,7 @@ class PickTest : public ::testing::Test {
     const AxisVector still = AxisVector::Zero(world_.robot.home.size());
     return {world_.robot.home, still, still};
   }
-  Vector3 tip() const { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
+  Vector3 tip() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
   std::unique_ptr<task::Skill> start(const std::string& code) {
     return type_.start(task::Json{{"object", code}}, now_);
   }
