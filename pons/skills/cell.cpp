@@ -191,9 +191,9 @@ std::vector<task::Note> Cell::take_notes() {
   return std::exchange(notes_, {});
 }
 
-void Cell::left_on_belt(const Pose& world_from_tip) {
+void Cell::left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_m) {
   ObjectBelief object = held_at(*held, world_from_tip);
-  object.world_from_top.translation().z() = world.belt.surface_z_m + object.size_m.z();
+  object.world_from_top.translation().z() = top_z_m.value_or(world.belt.surface_z_m + object.size_m.z());
   object.track = kFirstLeft + lefts_++;
   object.frames_seen = kSeenBefore;
   object.stamp = object.last_seen = now_;

@@ -116,7 +116,8 @@ class Cell {
 
   // What is held was put back on the belt, with the tip there. Until a camera sees it, it is known from that, riding
   // with the belt; then it keeps its label, which no camera may be able to read any more.
-  void left_on_belt(const Pose& world_from_tip);
+  // `top_z_m`: its top, world, where it does not stand on the belt itself.
+  void left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_m = {});
   // What was put back and no camera has seen since.
   [[nodiscard]] const std::vector<ObjectBelief>& left() const { return left_; }
   // Gives the codes to those unread that it knows from what was put back or has fallen.

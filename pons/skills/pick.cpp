@@ -214,14 +214,16 @@ class Pick final : public ArmSkill {
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
 
   // To where it was lifted from, which has moved on with the belt: what cannot be sorted so much farther from its
-  // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place.
+  // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place,
+  // on what it lay on.
   Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
     Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
     to.x() -= lift_travel_m_;
     to.z() = lift_from_.z() + (cell_.held->mass_kg > cell_.world.rules.max_mass_kg ? kHangsLow_m : kPutBack_m);
-    if (auto begun = set_down_.begin_back(now, to, grasp_.orientation); !begun)
+    const auto top_z_m = aside == 0 ? std::optional(target_.world_from_top.translation().z()) : std::nullopt;
+    if (auto begun = set_down_.begin_back(now, to, grasp_.orientation, top_z_m); !begun)
       return begin_set_down(now, std::move(verdict));
     verdict_ = std::move(verdict);
     phase_ = Phase::kSetDown;
@@ -242,10 +244,7 @@ class Pick final : public ArmSkill {
     if (!laid) return {Status::kRetry, laid.error().line(), {}};
     if (!*laid) return {};
     if (verdict_.status == Status::kRetry) cell_.missed = Miss{code_, now};
-    if (verdict_.status == Status::kRunning)
-      look_afresh(now);
-    else
-      begin_retreat(now, verdict_);
+    verdict_.status == Status::kRunning ? look_afresh(now) : begin_retreat(now, verdict_);
     return {};
   }
 

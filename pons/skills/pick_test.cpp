@@ -268,8 +268,7 @@ TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
   const Vector3 top = parcel(1, 0.1, 0, {0.2, 0.11, 0.11}).world_from_top.translation();
   Progress progress;
   for (int i = 0; i < 400 && progress.status == Status::kRunning; ++i) {
-    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-    const bool late = (tip - top).norm() < 0.06;
+    const bool late = (tip() - top).norm() < 0.06;
     tick_with({parcel(1, late ? 0.13 : 0.1, 0, {0.2, 0.11, 0.11})});
     progress = skill->tick(now_);
   }
@@ -289,8 +288,7 @@ TEST_F(PickTest, WhatLiesLowerThanItSeemedIsFoundFurtherDown) {
     for (int i = 0; i < 600 && progress.status == Status::kRunning; ++i) {
       tick_with({parcel(1, 0.1, 0, {0.2, 0.11, size_z_m})});
       progress = skill->tick(now_);
-      const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
-      lowest_m = std::min(lowest_m, tip_z - world_.belt.surface_z_m);
+      lowest_m = std::min(lowest_m, tip().z() - world_.belt.surface_z_m);
       if (lowest_m < really_m) grips_kg_ = 0.5;
     }
     return std::pair(progress.status, lowest_m);
@@ -391,9 +389,13 @@ TEST_F(PickTest, WhenTheBeltStopsItComesNoFurtherThanIsClear) {
   EXPECT_LE(nearest_m, 0.01);
 }
 
-// Lifted, it carries another along; both go back, and the arm looks again.
+// Lifted from another, it carries something along; all go back, and the arm looks again.
 TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
-  const auto all = [&] { return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1})}; };
+  const auto all = [&] {
+    ObjectBelief on_another = parcel(1, 0.1, 0, {0.2, 0.15, 0.1});
+    on_another.world_from_top.translation().z() += 0.05;
+    return std::vector{on_another};
+  };
   for (const double beside_m : {0.02, 0.16}) {
     tick_with(all());
     const auto skill = start("P1");
@@ -402,9 +404,11 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
       const bool held = cell_.held.has_value();
       tick_with(all());
       progress = skill->tick(now_);
-      const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
-      if (tip_z < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, beside_m, 0.05};
-      if (held && !cell_.held) grips_kg_.reset();
+      if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, beside_m, 0.05};
+      if (!held || cell_.held) continue;
+      grips_kg_.reset();
+      ASSERT_EQ(cell_.left().size(), 1U);
+      EXPECT_NEAR(cell_.left()[0].world_from_top.translation().z(), all()[0].world_from_top.translation().z(), 1e-9);
     }
     const bool beside = beside_m > 0.5 * all()[0].size_m.y();
     EXPECT_EQ(progress.status, beside ? Status::kRetry : Status::kSucceeded) << progress.reason;
@@ -429,10 +433,9 @@ TEST_F(PickTest, WhatGoesBackComesDownStraight) {
   for (int i = 0; i < 300 && laid && !*laid; ++i) {
     tick_with({});
     laid = set_down.tick(now_);
-    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-    if (cell_.held && tip.z() < from.translation().z() - 0.01)
-      most_aside_m = std::max(most_aside_m, (tip - to).head<2>().norm());
-    if (cell_.held) lowest_m = std::min(lowest_m, tip.z());
+    if (cell_.held && tip().z() < from.translation().z() - 0.01)
+      most_aside_m = std::max(most_aside_m, (tip() - to).head<2>().norm());
+    if (cell_.held) lowest_m = std::min(lowest_m, tip().z());
     if (!cell_.held) grips_kg_.reset();
   }
   ASSERT_TRUE(laid && *laid);
@@ -450,8 +453,7 @@ TEST_F(PickTest, WhatSomethingBearsGoesBack) {
     const bool held = cell_.held.has_value();
     tick_with(all());
     progress = skill->tick(now_);
-    const double tip_z = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
-    if (tip_z < all()[0].world_from_top.translation().z()) grips_kg_ = -0.5;
+    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = -0.5;
     if (held && !cell_.held) grips_kg_.reset();
   }
   EXPECT_EQ(progress.status, Status::kRetry) << progress.reason;
@@ -471,8 +473,7 @@ TEST_P(HeldSize, IsPutOnTheBeltFirst) {
   Vector3 lowest = Vector3::Constant(9);
   for (int i = 0; i < 600 && cell_.held; ++i) {
     ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
-    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-    if (tip.z() < lowest.z()) lowest = tip;
+    if (tip().z() < lowest.z()) lowest = tip();
     tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
   }
   EXPECT_FALSE(cell_.held);
@@ -488,8 +489,7 @@ TEST_F(PickTest, WhatNobodyAsksForIsLaidOnTheBelt) {
   for (; ticks < 600 && cell_.held; ++ticks) {
     tick_with({});
     rest.tick(now_);
-    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
-    if (tip.z() < lowest.z()) lowest = tip;
+    if (tip().z() < lowest.z()) lowest = tip();
   }
   EXPECT_FALSE(cell_.held);
   EXPECT_GT(ticks, 50) << "the next task may still want it";

@@ -23,22 +23,28 @@ constexpr double kFellOff = 1.5;                 // of the mass of the latest re
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
 
-// What pulls the wrist down.
-double pull_n(Cell& cell) {
-  const link::State& state = cell.arm.state();
-  const Pose world_from_flange =
-      cell.model.world_from_tip(state.position) * cell.world.robot.tool.flange_from_tip.inverse();
-  const auto& force = state.wrist_force_n;
-  return -(world_from_flange.linear() * Vector3(force[0], force[1], force[2])).z();
+Eigen::Matrix3d world_from_flange(Cell& cell) {
+  const Pose tip = cell.model.world_from_tip(cell.arm.state().position);
+  return tip.linear() * cell.world.robot.tool.flange_from_tip.linear().transpose();
 }
 
-// About the tip, across its axis, tip frame.
-Eigen::Vector2d moment_nm(const Cell& cell) {
+// What pulls the wrist down.
+double pull_n(Cell& cell) {
+  const auto& force = cell.arm.state().wrist_force_n;
+  return -(world_from_flange(cell) * Vector3(force[0], force[1], force[2])).z();
+}
+
+// Of the load, at half its height, across the tip's axis, tip frame: where it hangs straight below the tip, there is
+// none however the tool leans. The tool's own is taken off, which leans as far and may be heavier than the load.
+Eigen::Vector2d moment_nm(Cell& cell) {
   const link::State& state = cell.arm.state();
+  const world::Tool& tool = cell.world.robot.tool;
   const Eigen::Map<const Vector3> force(state.wrist_force_n.data()), torque(state.wrist_torque_nm.data());
-  const Pose& flange_from_tip = cell.world.robot.tool.flange_from_tip;
-  const Vector3 about_tip = torque - flange_from_tip.translation().cross(force);
-  return (flange_from_tip.linear().transpose() * about_tip).head<2>();
+  const Vector3 tool_n = world_from_flange(cell).transpose() * Vector3(0, 0, -kGravity_m_s2 * tool.mass_kg);
+  const double middle_m = cell.held ? 0.5 * cell.held->load.size_m.z() : 0;
+  const Vector3 middle = tool.flange_from_tip * Vector3(0, 0, middle_m);
+  const Vector3 about_middle = torque - tool.com_m.cross(tool_n) - middle.cross(force - tool_n);
+  return (tool.flange_from_tip.linear().transpose() * about_middle).head<2>();
 }
 
 constexpr double kFree_m = 0.06;     // between a load and the belt: it may hang lower than its size says
@@ -109,8 +115,7 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   const double change_kg = std::abs(mass_kg(first, middle) - mass_kg(middle, last));
   if (change_kg > std::max(kAgreeLeast_kg, kAgreeShare * whole_kg)) return std::nullopt;
   // What hangs beside the cups tilts them, and swings far more slowly than up and down: over a part of that the moment
-  // is anything from none to twice its mean. The tool hangs straight below the flange, so its own weight has no moment.
-  // But what has fallen off meanwhile is felt no more.
+  // is anything from none to twice its mean. But what has fallen off meanwhile is felt no more.
   const std::size_t since_then = mass_kg(0, last) - tool_kg > kFellOff * whole_kg + kAgreeLeast_kg ? first : 0;
   const double pull_ns = impulse(&Reading::force_n, since_then, last) * whole_kg / (whole_kg + tool_kg);
   if (pull_ns <= 0) return Weight{whole_kg};

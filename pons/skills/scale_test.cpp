@@ -53,7 +53,9 @@ class ScaleTest : public ::testing::Test {
     const auto path = [&](double t_s) {
       const double u = std::min(1.0, t_s / kDuration_s);
       const double rise_m = height_m * u * u * u * (10 - 15 * u + 6 * u * u);
-      return cell_.model.inverse(Cell::tip_down({0.1, 0, 1.0 + rise_m}, 0.3), world_.robot.home);
+      Pose tip = Cell::tip_down({0.1, 0, 1.0 + rise_m}, 0.3);
+      tip.linear() = Eigen::AngleAxisd(leans_rad_, Vector3(0.6, 0.8, 0)) * tip.linear();
+      return cell_.model.inverse(tip, world_.robot.home);
     };
     const auto q = path(0);
     EXPECT_TRUE(q) << q.error().line();
@@ -128,12 +130,25 @@ class ScaleTest : public ::testing::Test {
   }
 
   const Time begin_ = Time(from_s(4));
+  double leans_rad_ = 0;  // the tool
   const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
   link::CerebellumEnd cerebellum_{*link_};
   Cell cell_{bridge_, world_, model::RobotModel::load(world_.robot).value()};
 };
+
+// A light one, taken from where it leant on another: the tool is heavier than it is.
+TEST_F(ScaleTest, WhereALoadHangsIsFeltWithALeaningTool) {
+  cell_.held = Held{"P1", {.size_m = {0.2, 0.15, 0.06}}, 0};
+  for (const double leans_rad : {0.0, 0.25, -0.25}) {
+    leans_rad_ = leans_rad;
+    const auto readings = weigh({0.12, 1, kDamping_n_s_m}, lift(0.1), 0, {0.02, -0.01, 0.03});
+    ASSERT_TRUE(readings.back().weight);
+    const Eigen::Vector2d off_m = readings.back().weight->beside_tip_m - Eigen::Vector2d(0.02, -0.01);
+    EXPECT_LT(off_m.norm(), 0.003) << leans_rad;
+  }
+}
 
 TEST_F(ScaleTest, HeldStillALoadThatSwingsIsWeighedOverTheSwing) {
   for (const double mass_kg : {0.5, 2.0, 3.5}) {

@@ -28,6 +28,7 @@ constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid 
 
 Expected<void> SetDown::begin(Time now) {
   back_.reset();
+  top_z_m_.reset();
   if (cell_.held->mass_kg > cell_.world.rules.max_mass_kg) height_ = std::max(height_, kHeavyFrom);
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (; height_ < kOverBelt_m.size() && !way; ++height_) {
@@ -41,8 +42,10 @@ Expected<void> SetDown::begin(Time now) {
   return {};
 }
 
-Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation) {
+Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation,
+                                   std::optional<double> top_z_m) {
   back_ = Back{tip_m, orientation};
+  top_z_m_ = top_z_m;
   return go_back(now);
 }
 
@@ -130,7 +133,7 @@ Expected<bool> SetDown::tick(Time now) {
   cell_.arm.vacuum(false);
   cell_.arm.expect_contact(kHandling_n);
   if (!cell_.arm.cups().open && now < released_at_ + kOpensWithin) return false;
-  cell_.left_on_belt(cell_.model.world_from_tip(cell_.arm.state().position));
+  cell_.left_on_belt(cell_.model.world_from_tip(cell_.arm.state().position), top_z_m_);
   cell_.holds_nothing();
   emptied_at_ = now;
   return false;

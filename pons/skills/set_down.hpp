@@ -16,8 +16,10 @@ class SetDown {
   // there now; what is in it rides on.
   [[nodiscard]] Expected<void> begin(Time now);
   // Sets out for a place on the belt beside others: to over it first, and straight down from there. `tip_m`: where the
-  // tip is to be, relative to the belt (world x less its travel). Error: out of reach.
-  [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation);
+  // tip is to be, relative to the belt (world x less its travel). `top_z_m`: where its top will be, world, if that is
+  // known: it may lie on another. Error: out of reach.
+  [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation,
+                                          std::optional<double> top_z_m = {});
   // Once a period after that: true when the cups are empty. Error: the arm does not obey, or down is out of reach.
   [[nodiscard]] Expected<bool> tick(Time now);
 
@@ -38,6 +40,7 @@ class SetDown {
     bool over = false;  // it, when the present way ends; the way down is found only then
   };
   std::optional<Back> back_;
+  std::optional<double> top_z_m_;
   Time released_at_;
   std::optional<Time> emptied_at_;
 };
