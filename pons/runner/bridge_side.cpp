@@ -1,5 +1,7 @@
 #include "pons/runner/bridge_side.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -36,6 +38,12 @@ BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<
 }
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
+  auto taken = recall(journal, now);
+  malloc_trim(0);  // what reading a long day takes is not needed again, and would stay with the process
+  return taken;
+}
+
+Expected<void> BridgeSide::recall(const bridge::Journal& journal, Time now) {
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   decided_ = brain_heard_ = now;  // nobody was there to hear it

@@ -70,6 +70,7 @@ class BridgeSide {
   [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:
+  [[nodiscard]] Expected<void> recall(const bridge::Journal& journal, Time now);
   void take_in(const Snapshot& snapshot, Time now);
   void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,

@@ -385,6 +385,7 @@ class Pick final : public ArmSkill {
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.dropped();
       cell_.strays->put_back(code_);
+      cell_.strays->dropped(cell_.world.arm, code_, now);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }

@@ -21,6 +21,7 @@ void forget_oldest(auto& list) {
 
 void Strays::lifted(const std::string& arm, const std::string& load, const Company& company) {
   put_back(load);  // as somebody else may have, of whom nobody told
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.track == kNoTrack && one.stray.code == load; });
   for (const Companion& companion : company) {
     Doubted one;
     one.track = companion.track;

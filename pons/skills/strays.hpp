@@ -33,7 +33,8 @@ class Strays {
   void put_back(const std::string& load);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
-  // The arm lost it on its way, and nobody knows where to; it may lie on a rim, off which it falls later.
+  // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
+  // load. Once it is lifted again, it is not astray.
   void dropped(const std::string& arm, const std::string& load, Time now);
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
   // moment, or is what was dropped.

@@ -170,6 +170,10 @@ TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
   loses("C");
   strays_.fell("arm", "chute_5", at(50));
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "one was seen again, and for the other it is too late";
+
+  strays_.lifted("arm", "C", {});
+  strays_.fell("arm", "chute_5", at(12));
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "it was found";
 }
 
 // Out of the cameras' view what should have ridden off and did not is not on the belt any more.
