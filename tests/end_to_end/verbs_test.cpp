@@ -206,7 +206,10 @@ TEST(Verbs, HaltedAtAnyMomentOfLettingGoItKnowsWhatItPlaced) {
     TaskRun cell(world());
     while (cell.now() < undisturbed.now() + std::chrono::milliseconds(ms)) cell.step();
     SCOPED_TRACE(fmt::format("{} ms after the cups were opened", ms));
-    ASSERT_TRUE(cell.bridge().halt("P000001", cell.now(), "test"));
+    if (!cell.bridge().halt("P000001", cell.now(), "test")) {
+      EXPECT_GE(ms, 60) << "it has ended, and not sooner";
+      break;
+    }
     cell.await("P000001", 3s, [](Time) {});
     EXPECT_EQ(cell.detail.at("stop"), "CONFIRMED");
     placed += cell.outcome == Outcome::kSucceeded ? 1 : 0;
