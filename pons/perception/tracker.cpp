@@ -305,12 +305,14 @@ bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, doubl
   return true;
 }
 
-// True when a camera looked at the place where it should be and saw the belt, or something known to be another.
+// True when a camera looked at the place where it should be and saw the belt, something lower than its top, or
+// something known to be another.
 bool Tracker::visibly_gone(const Track& track, const TopView& view, const Segments& segments,
                            const std::vector<bool>& known, Time stamp, double travel_m) const {
   const Eigen::Vector2d middle = track.estimate.at(stamp) + Eigen::Vector2d(travel_m, 0);
   const double c = std::cos(track.estimate.yaw_rad), s = std::sin(track.estimate.yaw_rad);
-  const std::uint16_t bare = TopView::steps(0.008);
+  const double height_m = track.estimate.z_m - belt_.surface_z_m;
+  const std::uint16_t bare = TopView::steps(0.008), lower = TopView::steps(std::max(0.0, height_m - kAsHigh_m));
   constexpr int kSteps = 5;
   int gone = 0, total = 0;
   for (int i = -kSteps; i <= kSteps; ++i) {
@@ -321,7 +323,8 @@ bool Tracker::visibly_gone(const Track& track, const TopView& view, const Segmen
       if (!view.contains(cell) || view.height(cell) == TopView::kUnknown) continue;
       if ((view.flags(cell) & TopView::kNearRobot) != 0) continue;
       const int label = segments.labels(cell);
-      if (label > 0 ? known[static_cast<std::size_t>(label - 1)] : view.height(cell) < bare) ++gone;
+      const bool other = label > 0 ? known[static_cast<std::size_t>(label - 1)] : view.height(cell) < bare;
+      if (other || view.height(cell) < lower) ++gone;
     }
   }
   return gone * 10 >= total * 6;

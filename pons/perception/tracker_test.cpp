@@ -139,6 +139,26 @@ TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   EXPECT_NEAR(beliefs[0].size_m.x(), 0.2, 2e-3);
 }
 
+// Something came along with a load, was seen in the air over a third, and fell back; of that one, a load hides a part.
+TEST(TrackerTest, WhatNoLongerHangsWhereLowerThingsShowIsGone) {
+  Bench bench;
+  const auto show = [&](double top_m) {
+    const cv::Rect there{255, 120, 90, 60};
+    bench.segments.labels(there).setTo(1);
+    bench.view.height(there).setTo(TopView::steps(top_m));
+    Sighting part = Bench::sighting(-0.5, 0, 0, {0.18, 0.12, top_m});
+    part.complete = false;
+    bench.update({part});
+    return bench.tracker.beliefs(bench.now, 0).size();
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(show(0.09), 1U);
+  EXPECT_EQ(show(0.12), 2U);
+  EXPECT_EQ(show(0.11), 2U) << "as high as it was, all but";
+  EXPECT_EQ(show(0.09), 2U) << "once may be a bad reading";
+  EXPECT_EQ(show(0.09), 1U);
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.z(), 0.09, 1e-9);
+}
+
 // Two side by side that were taken for one, with the label of the one that the track does not become.
 TEST(TrackerTest, ALabelThatTurnsOutToLieBesideItIsNotIts) {
   for (const bool beside : {true, false}) {

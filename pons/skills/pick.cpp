@@ -46,7 +46,6 @@ constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a li
 constexpr Duration kUntangles = std::chrono::milliseconds(2000);
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
-constexpr double kNearEnd_m = 0.25;    // of the pick zone: what is lifted there has to be put back soon
 constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
 
 Progress overweight(double mass_kg) {
@@ -384,11 +383,12 @@ class Pick final : public ArmSkill {
     const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.dropped();
-      cell_.strays->put_back(code_);
       cell_.strays->dropped(cell_.world.arm, code_, now);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }
+    const double back_to_m = lift_from_.x() + cell_.belt_travel_m(now) - lift_travel_m_;
+    if (cell_.world.belt.must_wait_for(back_to_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
     bear_at_least(std::min(cell_.world.rules.max_mass_kg, weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2)));
     if (height < kLifted_m) return {};
     scale_.add(cell_);
@@ -400,8 +400,7 @@ class Pick final : public ArmSkill {
     const Company& company = cell_.held->company;
     const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
     const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked) : std::nullopt;
-    const bool near_end = lift_from_.x() > cell_.world.belt.pick_x_max_m - kNearEnd_m;  // put back, it must be in reach
-    if (beside || (near_end && !company.empty())) cell_.hold_belt(now);
+    if (beside) cell_.hold_belt(now);
     if ((!weighed || odd || beside || hooked) && !at_rest) return {};
     if ((target_.crowded || !company.empty()) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.

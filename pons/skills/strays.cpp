@@ -20,9 +20,12 @@ void forget_oldest(auto& list) {
 }  // namespace
 
 void Strays::lifted(const std::string& arm, const std::string& load, const Company& company) {
-  put_back(load);  // as somebody else may have, of whom nobody told
+  // Somebody may have put it back, of whom nobody told.
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go; });
+  std::erase_if(torn_, [&](const Torn& torn) { return torn.load == load; });
   std::erase_if(doubted_, [&](const Doubted& one) { return one.track == kNoTrack && one.stray.code == load; });
   for (const Companion& companion : company) {
+    std::erase_if(doubted_, [&](const Doubted& one) { return one.put_back && one.stray.code == companion.code; });
     Doubted one;
     one.track = companion.track;
     one.arm = arm;
@@ -33,9 +36,18 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
   forget_oldest(doubted_);
 }
 
-void Strays::put_back(const std::string& load) {
-  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go; });
-  std::erase_if(torn_, [&](const Torn& torn) { return torn.load == load; });
+void Strays::put_back(const std::string& load, Time now) {
+  const auto torn = std::ranges::find(torn_, load, &Torn::load);
+  std::erase_if(doubted_,
+                [&](const Doubted& one) { return one.load == load && !one.let_go && one.stray.code.empty(); });
+  for (Doubted& one : doubted_) {
+    if (one.load != load || one.let_go) continue;
+    one.let_go = now;
+    one.put_back = true;
+    one.gone = false;
+    if (torn != torn_.end()) one.stray.place = torn->place;
+  }
+  std::erase_if(torn_, [&](const Torn& each) { return each.load == load; });
 }
 
 void Strays::let_go(const std::string& load, const std::string& place, Time now) {
@@ -56,7 +68,8 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 }
 
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
-  std::erase_if(doubted_, [&](const Doubted& one) { return one.load == load || one.stray.code == load; });
+  put_back(load, now);
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.stray.code == load; });
   Doubted one;
   one.track = kNoTrack;
   one.arm = arm;
@@ -68,16 +81,29 @@ void Strays::dropped(const std::string& arm, const std::string& load, Time now) 
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   const auto torn = std::ranges::find_if(doubted_.rbegin(), doubted_.rend(), [&](const Doubted& one) {
-    const bool told = one.gone && one.let_go;
+    const bool told = one.let_go && (one.gone || (one.put_back && !one.stray.place.empty()));
     const Duration within = one.stray.place.empty() ? kAstray : kTornOff;
     return one.arm == arm && !told && !(one.let_go && now > *one.let_go + within);
   });
   if (torn == doubted_.rend()) return;
+  if (torn->put_back) return fell_beside(torn->load, place);
   torn_.push_back({torn->load, place});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
   found_gone(*torn);
+}
+
+// Who of the company of a load that was put back is not known; who is seen again is not in doubt.
+void Strays::fell_beside(const std::string& load, const std::string& place) {
+  const auto may_have = [&](const Doubted& one) { return one.put_back && one.load == load && one.stray.place.empty(); };
+  const bool alone = std::ranges::count_if(doubted_, may_have) == 1;
+  for (Doubted& one : doubted_) {
+    if (!may_have(one)) continue;
+    one.stray.place = place;
+    one.gone = alone;
+    if (alone) found_gone_.push_back(one.stray);
+  }
 }
 
 // As many of a load's company as were counted were torn off; the others, if they are gone, went with it.
@@ -122,7 +148,7 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
       one.ends_m = belt.travel_m + belt.end_m - *one.at_m;
       if (one.stray.code.empty()) one.stray.code = object->code;
     }
-    if (one.gone || !one.at_m) continue;
+    if (one.gone || one.put_back || !one.at_m) continue;
     const bool unseen = !believed && *one.at_m < belt.view_end_m;
     if (!unseen && !(is_over(one, belt) && !has_ridden_off(one))) continue;
     one.gone = true;
@@ -151,7 +177,8 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
 
 bool Strays::missed_twice(const std::string& code) {
   const Doubted* const found = of(code);
-  return found != nullptr && std::exchange(doubted_[static_cast<std::size_t>(found - doubted_.data())].missed, true);
+  return found != nullptr && !found->put_back &&
+         std::exchange(doubted_[static_cast<std::size_t>(found - doubted_.data())].missed, true);
 }
 
 const std::string* Strays::place_of(const std::string& code) const {

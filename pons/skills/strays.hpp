@@ -29,8 +29,9 @@ class Strays {
  public:
   // A load with that company hangs on the arm's cups.
   void lifted(const std::string& arm, const std::string& load, const Company& company);
-  // It lies on the belt again, and who came along, too.
-  void put_back(const std::string& load);
+  // It lies on the belt again, and who came along most likely, too: unless a light curtain tells otherwise, of then or
+  // soon after.
+  void put_back(const std::string& load, Time now);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
   // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
@@ -58,12 +59,12 @@ class Strays {
   struct Doubted {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along
-    Stray stray;                 // the place is the load's; empty while that hangs on the cups, and of what was dropped
+    Stray stray;                 // the place is the load's; empty while that hangs on the cups, and when it has none
     std::optional<Time> let_go;  // of the load
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
     std::optional<double> at_m = {};
     double half_m = 0, ends_m = 0;
-    bool missed = false, gone = false;
+    bool missed = false, gone = false, put_back = false;
   };
   // One of a load's company, where a light curtain has told.
   struct Torn {
@@ -71,6 +72,7 @@ class Strays {
   };
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
+  void fell_beside(const std::string& load, const std::string& place);
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
   [[nodiscard]] static bool is_over(const Doubted& one, const BeltAt& belt);
   [[nodiscard]] bool has_ridden_off(const Doubted& one) const;

@@ -60,7 +60,7 @@ TEST_F(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
 TEST_F(StraysTest, WhatIsPutBackTookNobodyAnywhere) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
   look({box(2, "B", 0)});
-  strays_.put_back("A");
+  strays_.put_back("A", at(11));
   look({});
   strays_.let_go("A", "chute_1", at(11));
   EXPECT_EQ(place_of("B"), "");
@@ -139,9 +139,38 @@ TEST_F(StraysTest, OfTwoOneIsTornOff) {
 TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
   strays_.fell("arm", "chute_7", at(10.5));
-  strays_.put_back("A");
+  strays_.put_back("A", at(11));
   carry();
   EXPECT_EQ(place_of("B"), "chute_1");
+}
+
+// It fell off sideways while its load was put back, or soon after; the next lift of the load is none of its.
+TEST_F(StraysTest, WhoFellWhenItsLoadWasPutBackIsNamedWhereACurtainTells) {
+  for (const bool before : {true, false}) {
+    strays_ = {};
+    strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}, {3, "C", {0, 0.2}}});
+    look({box(2, "B", 0), box(3, "C", 0)});
+    if (before) strays_.fell("arm", "chute_7", at(10.5));
+    strays_.put_back("A", at(11));
+    if (!before) strays_.fell("arm", "chute_7", at(12));
+    look({box(3, "C", 0, 11.5)});
+    strays_.lifted("arm", "A", {{3, "C", {0, 0.2}}});
+    strays_.let_go("A", "chute_1", at(15));
+    look({box(3, "C", 0, 15.5)});
+    strays_.fell("arm", "chute_2", at(16));
+    EXPECT_EQ(place_of("B"), "chute_7");
+    EXPECT_EQ(place_of("C"), "");
+  }
+  strays_ = {};
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.put_back("A", at(11));
+  strays_.fell("arm", "chute_7", at(12));
+  EXPECT_EQ(place_of("B"), "chute_7");
+  ASSERT_EQ(strays_.take_found_gone().size(), 1U);
+  strays_.lifted("arm", "A", {{3, "C", {0, 0.2}}});
+  strays_.put_back("A", at(13));
+  strays_.fell("arm", "chute_7", at(50));
+  EXPECT_EQ(place_of("C"), "") << "that was long ago";
 }
 
 // A load that was lost on its way, and lies on a rim, or on the belt with its label below.

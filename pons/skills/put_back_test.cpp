@@ -1,0 +1,175 @@
+// What pick lifts and cannot keep, and what others left on the cups.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "pons/skills/pick_kit.hpp"
+#include "pons/skills/rest.hpp"
+#include "pons/skills/set_down.hpp"
+
+namespace pons::skills {
+namespace {
+
+using task::Progress;
+using task::Status;
+using ::testing::HasSubstr;
+
+// Weighed too heavy, it goes back beside the neighbour that it lay close to, on a belt that gains speed.
+TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
+  belt_m_s_ = 0.15;
+  const Vector3 size_m{0.2, 0.15, 0.1};
+  const auto all = [&] {
+    return std::vector{parcel(1, -0.4 + belt_travel_m_, 0, size_m), parcel(2, -0.58 + belt_travel_m_, 0, size_m)};
+  };
+  for (int i = 0; i < 50; ++i) belt_m_s_ += 0.001, tick_with(all());
+  const auto skill = start("P1");
+  Progress progress;
+  Vector3 let_go = Vector3::Zero();
+  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+    belt_m_s_ += 0.001;
+    const bool held = cell_.held.has_value();
+    tick_with(all());
+    progress = skill->tick(now_);
+    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 6;
+    if (held && !cell_.held) let_go = tip() - all()[0].world_from_top.translation(), grips_kg_.reset();
+  }
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_THAT(progress.reason, HasSubstr("overweight"));
+  EXPECT_NEAR(let_go.x(), 0.05, 0.012);
+  EXPECT_NEAR(let_go.y(), 0, 0.005);
+  EXPECT_NEAR(let_go.z(), 0.045, 0.01) << "a corner of it hangs low";
+}
+
+// Lifted from another, it carries something along; all go back, and the arm looks again.
+TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
+  const auto all = [&] {
+    ObjectBelief on_another = parcel(1, 0.1, 0, {0.2, 0.15, 0.1});
+    on_another.world_from_top.translation().z() += 0.05;
+    return std::vector{on_another};
+  };
+  for (const double beside_m : {0.02, 0.16}) {
+    tick_with(all());
+    const auto skill = start("P1");
+    Progress progress;
+    for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+      const bool held = cell_.held.has_value();
+      tick_with(all());
+      progress = skill->tick(now_);
+      if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, beside_m, 0.05};
+      if (!held || cell_.held) continue;
+      grips_kg_.reset();
+      ASSERT_EQ(cell_.left().size(), 1U);
+      EXPECT_NEAR(cell_.left()[0].world_from_top.translation().z(), all()[0].world_from_top.translation().z(), 1e-9);
+    }
+    const bool beside = beside_m > 0.5 * all()[0].size_m.y();
+    EXPECT_EQ(progress.status, beside ? Status::kRetry : Status::kSucceeded) << progress.reason;
+    EXPECT_THAT(progress.reason, HasSubstr(beside ? "another hangs on it" : ""));
+    EXPECT_EQ(cell_.held.has_value(), !beside);
+    grips_kg_.reset();
+    cell_.held.reset();
+  }
+}
+
+// What stands beside its place is no lower than the load was lifted. The belt has come to rest just now.
+TEST_F(PickTest, WhatGoesBackComesDownStraight) {
+  for (int i = 20; i >= 0; --i) belt_m_s_ = 0.01 * i, tick_with({});
+  const Pose from = cell_.model.world_from_tip(cell_.arm.planned(now_).position);
+  const Vector3 to = from.translation() + Vector3(-0.05, 0.02, -0.15);
+  cell_.held = Held{.code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}};
+  grips_kg_ = 1;
+  SetDown set_down(cell_);
+  ASSERT_TRUE(set_down.begin_back(now_, to - belt_travel_m_ * Vector3::UnitX(), from.linear()));
+  double lowest_m = from.translation().z(), most_aside_m = 0;
+  Expected<bool> laid = false;
+  for (int i = 0; i < 300 && laid && !*laid; ++i) {
+    tick_with({});
+    laid = set_down.tick(now_);
+    if (cell_.held && tip().z() < from.translation().z() - 0.01)
+      most_aside_m = std::max(most_aside_m, (tip() - to).head<2>().norm());
+    if (cell_.held) lowest_m = std::min(lowest_m, tip().z());
+    if (!cell_.held) grips_kg_.reset();
+  }
+  ASSERT_TRUE(laid && *laid);
+  EXPECT_NEAR(lowest_m, to.z(), 0.002);
+  EXPECT_LT(most_aside_m, 0.01);
+}
+
+// Where the belt has waited for it there is no way on: a belt that ran while it was weighed would have carried its
+// place out of reach.
+TEST_F(PickTest, WhatGoesBackAtTheEndOfTheZoneStaysInReach) {
+  const auto x_m = [&] { return world_.belt.waits_at_m() + belt_travel_m_; };
+  std::optional<double> lies_at_m;
+  const auto all = [&] { return std::vector{parcel(1, x_m(), 0, {0.2, 0.15, 0.1})}; };
+  tick_with(all());
+  const auto skill = start("P1");
+  Progress progress;
+  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+    const bool held = cell_.held.has_value();
+    const bool waits = cell_.holds_belt(now_) || (!held && world_.belt.must_wait_for(x_m(), belt_m_s_));
+    belt_m_s_ = std::clamp(belt_m_s_ + (waits ? -0.01 : 0.01), 0.0, 0.26);
+    tick_with(all());
+    progress = skill->tick(now_);
+    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, 0.16, 0.05};
+    if (held && !cell_.held) grips_kg_.reset(), lies_at_m = x_m();
+  }
+  EXPECT_THAT(progress.reason, HasSubstr("another hangs on it"));
+  ASSERT_TRUE(lies_at_m);
+  EXPECT_LT(*lies_at_m, world_.belt.pick_x_max_m);
+}
+
+// It is wedged in, or stands on something that came up with it: carried off, it would strike something.
+TEST_F(PickTest, WhatSomethingBearsGoesBack) {
+  const auto all = [&] { return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1})}; };
+  tick_with(all());
+  const auto skill = start("P1");
+  Progress progress;
+  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+    const bool held = cell_.held.has_value();
+    tick_with(all());
+    progress = skill->tick(now_);
+    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = -0.5;
+    if (held && !cell_.held) grips_kg_.reset();
+  }
+  EXPECT_EQ(progress.status, Status::kRetry) << progress.reason;
+  EXPECT_THAT(progress.reason, HasSubstr("something bears it"));
+  EXPECT_FALSE(cell_.held);
+}
+
+// What an earlier task could not place must not stay on the cups, however large it is.
+class HeldSize : public PickTest, public ::testing::WithParamInterface<Vector3> {};
+INSTANTIATE_TEST_SUITE_P(SmallAndLarge, HeldSize, ::testing::Values(Vector3(0.1, 0.1, 0.1), Vector3(0.40, 0.34, 0.18)));
+
+TEST_P(HeldSize, IsPutOnTheBeltFirst) {
+  const Vector3 size_m = GetParam();
+  cell_.held = Held{"P9", {.size_m = size_m}, 1.0};
+  tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
+  const auto skill = start("P1");
+  Vector3 lowest = Vector3::Constant(9);
+  for (int i = 0; i < 600 && cell_.held; ++i) {
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+    if (tip().z() < lowest.z()) lowest = tip();
+    tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
+  }
+  EXPECT_FALSE(cell_.held);
+  EXPECT_LT(lowest.z() - size_m.z(), world_.belt.surface_z_m + 0.05);
+  EXPECT_NEAR(lowest.y(), world_.belt.y_center_m, 0.05);
+}
+
+TEST_F(PickTest, WhatNobodyAsksForIsLaidOnTheBelt) {
+  cell_.held = Held{"P9", {.size_m = {0.2, 0.15, 0.1}}, 1.0};
+  Rest rest(cell_);
+  Vector3 lowest = Vector3::Constant(9);
+  int ticks = 0;
+  for (; ticks < 600 && cell_.held; ++ticks) {
+    tick_with({});
+    rest.tick(now_);
+    if (tip().z() < lowest.z()) lowest = tip();
+  }
+  EXPECT_FALSE(cell_.held);
+  EXPECT_GT(ticks, 50) << "the next task may still want it";
+  EXPECT_LT(lowest.z() - 0.1, world_.belt.surface_z_m + 0.05);
+}
+
+}  // namespace
+}  // namespace pons::skills
