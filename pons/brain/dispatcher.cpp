@@ -14,7 +14,11 @@ namespace {
 constexpr int kFramesToTrust = 3;
 constexpr int kMostTries = 3;
 constexpr Duration kAskAgainAfter = std::chrono::milliseconds(800);
-constexpr double kBeltStands_s = 3600;                    // for so long at most, altogether, while a task waits
+constexpr double kBeltStands_s = 3600;                      // for so long at most, altogether, while a task waits
+constexpr int kLooks = 2;                                   // at a bare label: it cannot be read
+constexpr Duration kWaitsToRead = std::chrono::seconds(6);  // for one to be taken that lies on another, and to look
+constexpr double kNearBorder_m = 0.04;  // of the view: what stands on the belt leaves it sooner than its surface
+constexpr double kStopsShort_m = 0.01;  // of that
 constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
 
 double label_view_end_m(const world::World& world) {
@@ -92,6 +96,7 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
+    if (!decisions.belt_waits) decisions.belt_waits = is_to_be_read(belief, beliefs, now, set_aside);
     if (decisions.belt_waits || !would_ride_past(belief)) continue;
     const bool may_be_asked_for = !decided_.contains(belief.track) && orders_.contains(belief.code);
     decisions.belt_waits =
@@ -205,6 +210,20 @@ bool Dispatcher::will_be_bare(const ObjectBelief& belief, const std::vector<Obje
                               const std::set<std::string>& set_aside) const {
   return std::ranges::any_of(
       all, [&](const ObjectBelief& other) { return covers(other, belief) && is_waited_for(other, now, set_aside); });
+}
+
+bool Dispatcher::is_to_be_read(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
+                               const std::set<std::string>& set_aside) {
+  const bool unread = belief.code.empty() && belief.disputed.empty() && belief.label_attempts < kLooks;
+  if (!unread || decided_.contains(belief.track)) return false;
+  const Eigen::Vector2d along = belief.world_from_top.linear().row(0).head<2>().cwiseAbs();
+  const double front_m = belief.world_from_top.translation().x() + 0.5 * along.dot(belief.size_m.head<2>());
+  const double stops_m = belt_.stops_within_m(std::max(belief.velocity_m_s.x(), 0.0));
+  const double end_m = label_view_end_m_ - kNearBorder_m;
+  if (front_m > end_m || front_m + stops_m < end_m - kStopsShort_m) return false;
+  if (will_be_bare(belief, all, now, set_aside)) waits_to_read_.try_emplace(belief.track, now);
+  const auto since = waits_to_read_.find(belief.track);
+  return since != waits_to_read_.end() && now - since->second < kWaitsToRead;
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {

@@ -340,6 +340,30 @@ TEST_F(DispatcherTest, WhatLiesUnderOneThatIsAskedForIsWaitedFor) {
   EXPECT_EQ(bare.tasks[0].at("id"), "P1");
 }
 
+// Its label lies below another's edge: once that is taken, the camera must still see it.
+TEST_F(DispatcherTest, TheBeltWaitsForWhatIsReadOnceTheUpperOneIsTaken) {
+  const auto at_m = [](double x_m) {
+    ObjectBelief lower = parcel(1, x_m);
+    lower.confidence = 0.3;
+    return lower;
+  };
+  ObjectBelief upper = parcel(2, 0.1, "P2");
+  upper.world_from_top.translation().z() = 0.7;
+  (void)dispatcher_.observe({upper}, at(0));
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.0), upper}, at(0.1)).belt_waits) << "there is time";
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.24)}, at(0.1)).belt_waits) << "nothing is known to have covered it";
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.24), upper}, at(0.1), {"P2"}).belt_waits) << "nobody takes that now";
+  EXPECT_TRUE(dispatcher_.observe({at_m(0.24), upper}, at(0.1)).belt_waits);
+  EXPECT_TRUE(dispatcher_.observe({at_m(0.26)}, at(2)).belt_waits) << "bare, and not looked at yet";
+  ObjectBelief blank = at_m(0.26), read = at_m(0.26);
+  blank.label_attempts = 2;
+  read.code = "P1";
+  EXPECT_FALSE(dispatcher_.observe({blank}, at(2)).belt_waits);
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.26)}, at(9)).belt_waits) << "it has waited long enough";
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.40)}, at(2)).belt_waits) << "the view's border cuts it";
+  EXPECT_FALSE(dispatcher_.observe({read}, at(2)).belt_waits);
+}
+
 TEST_F(DispatcherTest, WhatLiesUnderOneThatIsGivenUpRides) {
   ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1");
   ObjectBelief upper = parcel(2, lower.world_from_top.translation().x() - 0.1, "P2");

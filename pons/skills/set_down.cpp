@@ -19,6 +19,8 @@ constexpr double kRoom_m = 0.02;                              // to the next par
 constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kRounds = 3;
 constexpr double kBack_m_s2 = 2.5;       // the less, the softer it is lowered
+constexpr double kHeavyBack_m_s2 = 0.8;  // sideways, where bellows let what is heavy swing like a pendulum,
+constexpr Duration kSwingsOut = std::chrono::milliseconds(350);  // before that, and after it
 constexpr double kBeside_m = 0.01;       // from over its place, coming down would bring it against what stands there
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
@@ -29,7 +31,7 @@ constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid 
 Expected<void> SetDown::begin(Time now) {
   back_.reset();
   top_z_m_.reset();
-  if (cell_.held->mass_kg > cell_.world.rules.max_mass_kg) height_ = std::max(height_, kHeavyFrom);
+  if (heavy()) height_ = std::max(height_, kHeavyFrom);
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (; height_ < kOverBelt_m.size() && !way; ++height_) {
     way = way_to_belt(now, kOverBelt_m[height_]);
@@ -46,7 +48,10 @@ Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::
                                    std::optional<double> top_z_m) {
   back_ = Back{tip_m, orientation};
   top_z_m_ = top_z_m;
-  return go_back(now);
+  if (!heavy()) return go_back(now);
+  if (auto stopped = cell_.stop(now); !stopped) return stopped;
+  begin_at(cell_.arm.motion_end() + kSwingsOut);
+  return {};
 }
 
 Expected<void> SetDown::go_back(Time now) {
@@ -56,14 +61,15 @@ Expected<void> SetDown::go_back(Time now) {
   Vector3 offset = back_->tip_m + cell_.belt_travel_m(from) * Vector3::UnitX() - tip;
   const bool aside = !back_->over && offset.head<2>().norm() > kBeside_m;
   if (aside) offset.z() = 0;
-  const auto way = lift(cell_, start, from, back_->orientation, offset, kBack_m_s2);
+  const bool softly = aside && heavy();
+  const auto way = lift(cell_, start, from, back_->orientation, offset, softly ? kHeavyBack_m_s2 : kBack_m_s2);
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(way->trajectory); !sent) return sent;
   if (aside)
     back_->over = true;
   else
     back_.reset();
-  begin_at(way->top);
+  begin_at(way->top + (softly ? kSwingsOut : Duration{0}));
   return {};
 }
 

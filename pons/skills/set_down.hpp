@@ -15,7 +15,8 @@ class SetDown {
   // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. Error: no way
   // there now; what is in it rides on.
   [[nodiscard]] Expected<void> begin(Time now);
-  // Sets out for a place on the belt beside others: to over it first, and straight down from there. `tip_m`: where the
+  // Sets out for a place on the belt beside others: to over it first, and straight down from there; what is heavy not
+  // before the belt, which has to be held, and it have come to rest. `tip_m`: where the
   // tip is to be, relative to the belt (world x less its travel). `top_z_m`: where its top will be, world, if that is
   // known: it may lie on another. Error: out of reach.
   [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation,
@@ -27,6 +28,7 @@ class SetDown {
   // To over the place if it is not there yet, else down.
   [[nodiscard]] Expected<void> go_back(Time now);
   void begin_at(Time released_at);
+  [[nodiscard]] bool heavy() const { return cell_.held->mass_kg > cell_.world.rules.max_mass_kg; }
   [[nodiscard]] Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m);
   [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const;
 

@@ -35,5 +35,35 @@ TEST_F(SetDownTest, WhatIsTooHeavyIsLetGoOfHigherForACornerOfItHangsLow) {
   EXPECT_NEAR(let_go_over_belt_m(5.5), 0.08, 0.005);
 }
 
+// On a belt that comes to rest meanwhile: what swings out beside its place comes down on its neighbour.
+TEST_F(SetDownTest, WhatIsTooHeavyIsBroughtBackSoftly) {
+  const auto hardest_m_s2 = [&](double mass_kg) {
+    opened_ = false;
+    is_stopped_at({0.1, 0, 1.2});
+    cell_.held = held_;
+    cell_.weighs(mass_kg);
+    SetDown set_down(cell_);
+    belt_m_s_ = 0.22;
+    pass();
+    EXPECT_TRUE(set_down.begin_back(now_, {0.02, 0.03, 1.08}, Cell::tip_down({}, 0).linear()));
+    double most_m_s2 = 0;
+    Vector3 last_m = tip_now(), last_m_s = Vector3::Zero();
+    for (int i = 0; i < 1000 && cell_.held; ++i) {
+      belt_m_s_ = std::max(0.0, belt_m_s_ - 0.01);
+      pass();
+      const auto laid = set_down.tick(now_);
+      EXPECT_TRUE(laid) << laid.error().line();
+      const Vector3 now_m_s = (tip_now() - last_m) / 0.01;
+      if (i > 1) most_m_s2 = std::max(most_m_s2, (now_m_s - last_m_s).head<2>().norm() / 0.01);
+      last_m = tip_now(), last_m_s = now_m_s;
+    }
+    EXPECT_FALSE(cell_.held);
+    EXPECT_NEAR(tip_now().y(), 0.03, 0.01);
+    return most_m_s2;
+  };
+  EXPECT_GT(hardest_m_s2(1.2), 1.5);
+  EXPECT_LT(hardest_m_s2(5.5), 1.0);
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -88,11 +88,14 @@ struct Belt {
 
   // Where it brings to rest what is asked for and was not taken by then.
   [[nodiscard]] double waits_at_m() const { return pick_x_max_m - 0.02; }
+  // How far it still runs at that speed, once it is told to wait.
+  [[nodiscard]] double stops_within_m(double speed) const {
+    constexpr double kHeard_s = 0.02;  // from a decision to its drive
+    return speed * (kHeard_s + speed / (2 * ramp_m_s2));
+  }
   // Whether it must be told now to wait for something at `x_m`, which rides at that speed, or it leaves the pick zone.
   [[nodiscard]] bool must_wait_for(double x_m, double speed) const {
-    constexpr double kHeard_s = 0.02;  // from a decision to its drive
-    const double stops_m = speed * (kHeard_s + speed / (2 * ramp_m_s2));
-    return x_m + stops_m > waits_at_m() && x_m < pick_x_max_m;
+    return x_m + stops_within_m(speed) > waits_at_m() && x_m < pick_x_max_m;
   }
 };
 
