@@ -108,7 +108,7 @@ TEST_F(DispatcherTest, TheBeltWaitsForWhatIsAskedForAndForNothingElse) {
 }
 
 TEST_F(DispatcherTest, ExpressGoesFirst) {
-  const Decisions decisions = dispatcher_.observe({parcel(1, 0.2, "P1"), parcel(2, 0, "P2")}, at(0));
+  const Decisions decisions = dispatcher_.observe({parcel(1, 0.35, "P1"), parcel(2, 0, "P2")}, at(0));
   ASSERT_EQ(decisions.tasks.size(), 2u);
   EXPECT_EQ(decisions.tasks[1].at("priority"), 90);
 }
@@ -382,6 +382,7 @@ TEST_F(DispatcherTest, WhatMayBeTwoIsNotAskedFor) {
   whole.size_m = Vector3(0.17, 0.09, 0.1);
   ObjectBelief part = parcel(2, 0.25, "P2");
   part.size_m = Vector3(0.08, 0.08, 0.1);
+  part.world_from_top.translation().z() -= 0.015;
   const Decisions doubtful = dispatcher_.observe({whole, part}, at(0));
   ASSERT_EQ(doubtful.tasks.size(), 1U);
   EXPECT_EQ(doubtful.tasks[0].at("id"), "P2");
@@ -394,7 +395,7 @@ TEST_F(DispatcherTest, WhatDoesNotPassItsChuteRides) {
   world::World world = small_world();
   world.places.push_back({.name = "chute_1", .kind = world::PlaceKind::kChute, .size_m = {0.38, 0.38, 0.45}});
   Dispatcher dispatcher({{"P1", {.destination = "chute_1"}}, {"P2", {.destination = "chute_1"}}}, world);
-  ObjectBelief square = parcel(1, 0.55, "P1"), flat = parcel(2, 0.8, "P2");
+  ObjectBelief square = parcel(1, 0.55, "P1"), flat = parcel(2, 0.95, "P2");
   square.size_m = Vector3(0.39, 0.39, 0.05);
   flat.size_m = Vector3(0.39, 0.30, 0.05);
   const Decisions decided = dispatcher.observe({square, flat}, at(0));

@@ -12,8 +12,9 @@ constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
 constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
 constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
-constexpr double kUpright = 0.9986;  // cosine of 3 degrees
-constexpr int kGlimpses = 3;         // seen less often, and not read, it may have been a bad cut between two
+constexpr double kShared_m = 0.02, kLevel_m = 0.01;  // footprints share more, as high: one thing cut in two
+constexpr double kUpright = 0.9986;                  // cosine of 3 degrees
+constexpr int kGlimpses = 3;  // seen less often, and not read, it may have been a bad cut between two
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
 
@@ -52,8 +53,20 @@ bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
   return is_hidden && upper.world_from_top.translation().z() > lower.world_from_top.translation().z();
 }
 
+namespace {
+
+// Where one stands, no other does: a thing with two labels was cut between them.
+bool share_room(const ObjectBelief& a, const ObjectBelief& b) {
+  const double rise_m = b.world_from_top.translation().z() - a.world_from_top.translation().z();
+  const bool named = !a.code.empty() && !b.code.empty(), whole = std::min(a.confidence, b.confidence) >= kSure;
+  return named && whole && std::abs(rise_m) < kLevel_m && !leans(a) && !leans(b) && overlap(a, b, kShared_m);
+}
+
+}  // namespace
+
 bool is_part(const ObjectBelief& part, const ObjectBelief& whole) {
   if (part.track == whole.track || is_glimpse(part)) return false;
+  if (share_room(part, whole)) return true;
   if (part.size_m.head<2>().prod() > kLargerPart * whole.size_m.head<2>().prod()) return false;
   const Vector3 off = whole.world_from_top.inverse() * part.world_from_top.translation();
   return std::abs(off.x()) < 0.5 * whole.size_m.x() - kOverlap_m &&

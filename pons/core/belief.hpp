@@ -52,8 +52,8 @@ struct BaseBelief {
 // Whether `upper` lies or leans on `lower`, as far as can be told: lifted first, the lower one would carry it along.
 [[nodiscard]] bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower);
 
-// Whether the middle of `part` is within `whole`, as high as it: one of the two is not what it seems, and lifting
-// `whole` may lift two.
+// Whether the middle of `part` is within `whole`, as high as it, or both have a label and share so much room that they
+// cannot be two: one of the two is not what it seems, and lifting `whole` may lift two.
 [[nodiscard]] bool is_part(const ObjectBelief& part, const ObjectBelief& whole);
 
 }  // namespace pons

@@ -88,6 +88,20 @@ TEST(Belief, APartIsWithinAndAsHigh) {
   EXPECT_FALSE(is_part(larger, whole)) << "cut together with a neighbour";
 }
 
+TEST(Belief, OneWithTwoLabelsThatWasCutBetweenThemIsNotTwo) {
+  ObjectBelief one = box(1, 0, 0, 0.2), other = box(2, 0, 0.16, 0.205);
+  EXPECT_FALSE(is_part(one, other)) << "a neighbour, cut badly";
+  one.code = "P1", other.code = "P2";
+  EXPECT_TRUE(is_part(one, other) && is_part(other, one));
+  other.world_from_top.translation().y() = 0.185;
+  EXPECT_FALSE(is_part(one, other)) << "so far they may seem to overlap";
+  other.world_from_top.translation() = Vector3(0, 0.16, 0.22);
+  EXPECT_FALSE(is_part(one, other)) << "it may lie on it";
+  other.world_from_top.translation().z() = 0.2;
+  other.confidence = 0.3;
+  EXPECT_FALSE(is_part(one, other)) << "partly hidden, it may end elsewhere";
+}
+
 TEST(Belief, AGlimpseOfWhatNobodyHasReadIsNothing) {
   ObjectBelief lower = box(1, 0, 0, 0.1), upper = box(2, 0.1, 0.05, 0.2), part = box(3, 0.08, 0.05, 0.1);
   lower.confidence = 0.3;

@@ -28,13 +28,14 @@ constexpr int kHeights = 5;
 constexpr std::array kHeightsOverRim_m{kTipOverRim_m, kTipOverRim_m + 2 * kHigher_m, kTipOverRim_m + 4 * kHigher_m};
 constexpr double kSofter_m = 0.015;  // than the longest fall that is allowed: sizes are measured
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
-constexpr double kAside_m = 0.004;   // a load hangs beside where the cups were believed to hold it, at most
-constexpr double kCups_nm_rad = 10;  // of the cups together: the wrist's moment for a load's lean, measured
-constexpr double kSwings = 2.5;      // a lean when it is let go over the one it may fall in with
-constexpr double kStill_nm = 0.15;   // nothing hangs stiller than that
-constexpr double kTight_rad = 0.10;  // may it lean less than that, it jams easily
-constexpr double kFall_s = 0.1;      // from letting go to the rim
-constexpr double kFresh = 0.5;       // share of a tick's reading in the rate of the swing
+constexpr double kAside_m = 0.004;    // a load hangs beside where the cups were believed to hold it, at most
+constexpr double kCups_nm_rad = 10;   // of the cups together: the wrist's moment for a load's lean, measured
+constexpr double kSwings = 2.5;       // a lean when it is let go over the one it may fall in with,
+constexpr double kSwingsTight = 1.5;  // and of what would jam: the lean that it swings to
+constexpr double kStill_nm = 0.15;    // nothing hangs stiller than that
+constexpr double kTight_rad = 0.10;   // may it lean less than that, it jams easily
+constexpr double kFall_s = 0.1;       // from letting go to the rim
+constexpr double kFresh = 0.5;        // share of a tick's reading in the rate of the swing
 constexpr Duration kSwing = std::chrono::milliseconds(1500);       // at most,
 constexpr Duration kSwingTight = std::chrono::milliseconds(4000);  // and for what would jam in the mouth
 constexpr Duration kLetGoWithin = std::chrono::milliseconds(600);
@@ -221,9 +222,9 @@ class Place final : public ArmSkill {
   Progress carry(Time now) {
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now, *cell_.held);
     look_out(now);
-    const bool level = hangs_level(now);
-    if (now < (level ? arrives_ - kLetGoEarly : arrives_)) return {};
-    if (!level && now < arrives_ + (may_lean() < kTight_rad ? kSwingTight : kSwing)) return {};
+    const bool tight = may_lean() < kTight_rad, level = hangs_level(now, tight);
+    if (now < (level && !tight ? arrives_ - kLetGoEarly : arrives_)) return {};
+    if (!level && now < arrives_ + (tight ? kSwingTight : kSwing)) return {};
     cell_.arm.vacuum(false);
     let_go_ = cell_.held->code;
     cell_.strays->let_go(cell_.held->code, name_, now);
@@ -307,15 +308,18 @@ class Place final : public ArmSkill {
   }
 
   // The cups are springs, and the load swings on them: will it be level when it has fallen to the rim? It keeps turning
-  // as it turned when it was let go.
-  bool hangs_level(Time now) {
+  // as it turned when it was let go. What hardly passes must hang still, too: how it turns is known roughly.
+  bool hangs_level(Time now, bool tight) {
     const auto& torque = cell_.arm.state().wrist_torque_nm;
     const Eigen::Vector2d felt_nm(torque[0], torque[1]);
     if (now > felt_at_) turns_nm_s_ += kFresh * ((felt_nm - felt_nm_) / to_s(now - felt_at_) - turns_nm_s_);
     felt_nm_ = felt_nm;
     felt_at_ = now;
     const double may_nm = std::max(kStill_nm, kCups_nm_rad * may_lean());
-    return (felt_nm + kFall_s * turns_nm_s_).norm() <= may_nm && felt_nm.norm() <= kSwings * may_nm;
+    // kFall_s is about what a swing takes by one radian.
+    const bool still = tight ? std::hypot(felt_nm.norm(), kFall_s * turns_nm_s_.norm()) <= kSwingsTight * may_nm
+                             : felt_nm.norm() <= kSwings * may_nm;
+    return still && (felt_nm + kFall_s * turns_nm_s_).norm() <= may_nm;
   }
 
   Progress release(Time now) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -61,6 +62,36 @@ TEST_F(LostOverItsChuteTest, APictureOfTheNextMomentSaysNothing) {
   const Progress progress = ends(0.2, kThings);
   EXPECT_EQ(progress.status, Status::kSucceeded) << "the camera has failed since";
   EXPECT_GE(now_, fell_ + from_s(2));
+}
+
+// A load over chute_3 that swings, less and less.
+class SwingingTest : public ObedientArmTest {
+ protected:
+  // By what it still swings when it is let go of (Nm, as the wrist feels it).
+  double swings_nm_when_let_go(const Vector3& size_m) {
+    stands({0.4, -0.3, 1.4});
+    cell_.held = Held{"P1", {size_m, 0, {}}, 2.5};
+    const task::SkillType type = place(cell_);
+    const auto skill = type.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+    link::CerebellumEnd cerebellum(*link_);
+    link::Command command;
+    for (int i = 0; i < 600; ++i) {
+      const double swings_nm = 2.5 * std::exp(-i / 200.0);
+      wrist_nm_ = swings_nm * Eigen::Vector2d(std::sin(0.116 * i), std::cos(0.09 * i));
+      pass();
+      EXPECT_EQ(skill->tick(now_).status, Status::kRunning);
+      while (cerebellum.receive(command))
+        if (command.kind == link::CommandKind::kVacuum && command.vacuum_on == 0) return swings_nm;
+    }
+    ADD_FAILURE() << "never let go of";
+    return 0;
+  }
+};
+
+TEST_F(SwingingTest, WhatHardlyPassesItsMouthHangsStillFirst) {
+  EXPECT_LT(swings_nm_when_let_go({0.348, 0.343, 0.196}), 0.8);
+  now_ += from_s(10);
+  EXPECT_GT(swings_nm_when_let_go({0.2, 0.15, 0.1}), 1.1);
 }
 
 }  // namespace

@@ -58,6 +58,7 @@ class ObedientArmTest : public testing::Test {
   bool opened_ = false;
   std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
+  Eigen::Vector2d wrist_nm_ = Eigen::Vector2d::Zero();
   Falls falls_{};  // into each of the world's places
   std::vector<ObjectBelief> seen_;
   std::optional<Time> blind_since_;
@@ -72,6 +73,7 @@ class ObedientArmTest : public testing::Test {
     state.position = at.position, state.speed = at.speed;
     state.belt_speed_m_s = belt_m_s_;
     state.fallen_into = falls_;
+    std::ranges::copy(wrist_nm_, state.wrist_torque_nm.begin());
     if (!opened_) {
       state.vacuum_on = 15;
       state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
