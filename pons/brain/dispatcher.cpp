@@ -216,14 +216,17 @@ bool Dispatcher::is_to_be_read(const ObjectBelief& belief, const std::vector<Obj
                                const std::set<std::string>& set_aside) {
   const bool unread = belief.code.empty() && belief.disputed.empty() && belief.label_attempts < kLooks;
   if (!unread || decided_.contains(belief.track)) return false;
+  if (will_be_bare(belief, all, now, set_aside)) to_be_read_.try_emplace(belief.track);
+  const auto found = to_be_read_.find(belief.track);
+  if (found == to_be_read_.end()) return false;
   const Eigen::Vector2d along = belief.world_from_top.linear().row(0).head<2>().cwiseAbs();
   const double front_m = belief.world_from_top.translation().x() + 0.5 * along.dot(belief.size_m.head<2>());
   const double stops_m = belt_.stops_within_m(std::max(belief.velocity_m_s.x(), 0.0));
   const double end_m = label_view_end_m_ - kNearBorder_m;
   if (front_m > end_m || front_m + stops_m < end_m - kStopsShort_m) return false;
-  if (will_be_bare(belief, all, now, set_aside)) waits_to_read_.try_emplace(belief.track, now);
-  const auto since = waits_to_read_.find(belief.track);
-  return since != waits_to_read_.end() && now - since->second < kWaitsToRead;
+  std::optional<Time>& since = found->second;
+  if (!since) since = now;
+  return now - *since < kWaitsToRead;
 }
 
 Json Dispatcher::task_for(const ObjectBelief& belief, const Order& order, int tries, Time now) const {

@@ -83,7 +83,7 @@ class Dispatcher final : public Brain {
   // What lies on it is waited for.
   [[nodiscard]] bool will_be_bare(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                                   const std::set<std::string>& set_aside) const;
-  // Unread, with its label below what is asked for: as long as a camera could read it once that is taken.
+  // Unread, since its label lies or lay below what is asked for, and about to leave the view of whoever could read it.
   [[nodiscard]] bool is_to_be_read(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                                    const std::set<std::string>& set_aside);
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
@@ -98,7 +98,8 @@ class Dispatcher final : public Brain {
   std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
   std::map<std::string, std::string, std::less<>> asked_;  // code by task id
   std::set<std::uint32_t> decided_;                        // tracks
-  std::map<std::uint32_t, Time> waits_to_read_;            // since when, by track
+  // By track, what lay unread below what is asked for; and since when the belt waits for it at the end of the view.
+  std::map<std::uint32_t, std::optional<Time>> to_be_read_;
   Tally tally_;
 };
 

@@ -350,10 +350,10 @@ TEST_F(DispatcherTest, TheBeltWaitsForWhatIsReadOnceTheUpperOneIsTaken) {
   ObjectBelief upper = parcel(2, 0.1, "P2");
   upper.world_from_top.translation().z() = 0.7;
   (void)dispatcher_.observe({upper}, at(0));
-  EXPECT_FALSE(dispatcher_.observe({at_m(0.0), upper}, at(0.1)).belt_waits) << "there is time";
   EXPECT_FALSE(dispatcher_.observe({at_m(0.24)}, at(0.1)).belt_waits) << "nothing is known to have covered it";
   EXPECT_FALSE(dispatcher_.observe({at_m(0.24), upper}, at(0.1), {"P2"}).belt_waits) << "nobody takes that now";
-  EXPECT_TRUE(dispatcher_.observe({at_m(0.24), upper}, at(0.1)).belt_waits);
+  EXPECT_FALSE(dispatcher_.observe({at_m(0.0), upper}, at(0.1)).belt_waits) << "there is time";
+  EXPECT_TRUE(dispatcher_.observe({at_m(0.24)}, at(1.9)).belt_waits) << "though the other was taken before";
   EXPECT_TRUE(dispatcher_.observe({at_m(0.26)}, at(2)).belt_waits) << "bare, and not looked at yet";
   ObjectBelief blank = at_m(0.26), read = at_m(0.26);
   blank.label_attempts = 2;

@@ -26,7 +26,8 @@ constexpr double kHigher_m = 0.025;     // tried next when a mouth is out of rea
 constexpr int kHeights = 5;
 // Of the empty tool, for the question whether a mouth is within reach at all.
 constexpr std::array kHeightsOverRim_m{kTipOverRim_m, kTipOverRim_m + 2 * kHigher_m, kTipOverRim_m + 4 * kHigher_m};
-constexpr double kSofter_m = 0.015;  // than the longest fall that is allowed: sizes are measured
+constexpr double kOverBelt_m = 0.36;  // of the tip, on a way in two parts
+constexpr double kSofter_m = 0.015;   // than the longest fall that is allowed: sizes are measured
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;    // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;   // of the cups together: the wrist's moment for a load's lean, measured
@@ -108,6 +109,7 @@ class Place final : public ArmSkill {
 
   void move_along(Duration later) {
     arrives_ += later;
+    if (halfway_at_) *halfway_at_ += later;
     for (Segment& segment : way_) segment.start += later;
   }
 
@@ -119,15 +121,15 @@ class Place final : public ArmSkill {
     }
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
-    if (tried_ && now - *tried_ < kTryEvery) return {};
+    if ((tried_ && now - *tried_ < kTryEvery) || (halfway_at_ && now < *halfway_at_)) return {};
     if (const auto set_out = carry_to(*target, now); !set_out) {
       if (cell_.router.spent()) return {};
       tried_ = now;
       // Others may be in the way, and ride on.
       if (!blocked_since_) blocked_since_ = now;
       cell_.keep_clear(now);
-      return now < *blocked_since_ + kBlockedFor ? Progress{}
-                                                 : Progress{Status::kFailed, name_ + ": " + set_out.error().line(), {}};
+      if (now < *blocked_since_ + kBlockedFor || go_halfway(*target, now)) return {};
+      return {Status::kFailed, name_ + ": " + set_out.error().line(), {}};
     }
     blocked_since_.reset();
     looked_at_ = now;
@@ -148,6 +150,23 @@ class Place final : public ArmSkill {
     cell_.note("plan",
                {{"to", "carry"}, {"place", name_}, {"mass_kg", cell_.held->mass_kg}, {"arrives_s", arrives_.s()}});
     return {};
+  }
+
+  // Something wide comes by the arm's own links on a long way; from the middle of the belt there is another. Once.
+  bool go_halfway(const world::Place& target, Time now) {
+    if (halfway_at_) return false;
+    const world::Belt& belt = cell_.world.belt;
+    const auto halfway = [&](const AxisVector& from) -> Expected<AxisVector> {
+      const Pose tip = cell_.model.world_from_tip(from);
+      const Vector3 point(0.5 * (tip.translation().x() + target.center_m.x()), belt.y_center_m,
+                          std::max(tip.translation().z(), belt.surface_z_m + kOverBelt_m));
+      return cell_.model.inverse(Cell::tip_down(point, yaw_of(tip.linear())), from);
+    };
+    const auto way = cell_.carry(now, halfway, search_);
+    if (!way || !cell_.arm.stream(*way)) return cell_.router.spent();
+    halfway_at_ = way->back().end();
+    blocked_since_.reset();
+    return true;
   }
 
   // What was upstream of the cameras' view when the way was planned may stand in it.
@@ -350,7 +369,7 @@ class Place final : public ArmSkill {
   Phase phase_ = Phase::kPlan;
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
-  std::optional<Time> tried_, blocked_since_;
+  std::optional<Time> tried_, blocked_since_, halfway_at_;
   Cell::Search search_;
   world::Entry entry_;
   std::vector<Cell::Watched> watched_;  // when it fell

@@ -20,7 +20,7 @@ TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
   belt_m_s_ = 0.15;
   const Vector3 size_m{0.2, 0.15, 0.1};
   const auto all = [&] {
-    return std::vector{parcel(1, -0.4 + belt_travel_m_, 0, size_m), parcel(2, -0.58 + belt_travel_m_, 0, size_m)};
+    return std::vector{parcel(1, -0.4 + belt_travel_m_, 0, size_m), parcel(2, -0.59 + belt_travel_m_, 0, size_m)};
   };
   for (int i = 0; i < 50; ++i) belt_m_s_ += 0.001, tick_with(all());
   const auto skill = start("P1");
