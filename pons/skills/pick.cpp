@@ -39,8 +39,8 @@ constexpr double kDragged_m = 0.006;  // behind the belt; further, the cups slid
 constexpr double kPutBack_m = 0.02;   // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
 constexpr double kHangsLow_m = 0.05;  // likewise what is too heavy: it hangs askew, a corner up to 35 mm lower
 constexpr double kPutAside = 2.5;     // times as far from its neighbours as it was lifted: what is heavy swings,
-constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;  // felt while it is lifted, over what it was taken for
-constexpr double kUnweighable = 2.0;                 // times the mass limit
+constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;     // felt while it is lifted, over what it was taken for
+constexpr double kUnweighable = 2.0, kTogether = 1.35;  // times the mass limit: and what two may weigh
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kUntangles = std::chrono::milliseconds(2000);
@@ -407,13 +407,14 @@ class Pick final : public ArmSkill {
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(kLightest_kg, mass));
     if (mass < kLightest_kg) return begin_put_back(now, 0, {Status::kRetry, "something bears it", {}});
-    if (mass > limit) return begin_put_back(now, kPutAside, overweight(mass));
+    const bool alone = company.empty() || hooked || mass > kTogether * limit;
+    if (mass > limit && alone) return begin_put_back(now, kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
-    if (beside) {
-      cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
-      return begin_put_back(now, 0, {Status::kRetry, beside->whose + " hangs on it: its weight is felt beside it", {}});
-    }
-    return success(now);
+    if (!beside && mass <= limit) return success(now);
+    cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
+    const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
+                                   : fmt::format("{:.2f} kg: another may hang on it", mass);
+    return begin_put_back(now, 0, {Status::kRetry, why, {}});
   }
 
   // Small things may be heavy: drives that reckon with far less than they lift fall behind, and stop.

@@ -71,6 +71,40 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
   }
 }
 
+// Two that weigh too much together may be taken one by one.
+TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
+  for (const double again_kg : {3.0, 4.2}) {
+    const auto all = [&] {
+      return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1}), parcel(2, 0.32, 0, {0.2, 0.15, 0.1})};
+    };
+    cell_.hooked.reset();
+    std::vector<std::string> reasons;
+    for (int tries = 0; tries < 2; ++tries) {
+      tick_with(all());
+      const auto skill = start("P1");
+      Progress progress;
+      for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
+        const bool held = cell_.held.has_value();
+        tick_with(all());
+        for (link::Command command; cerebellum_.receive(command);) {
+        }
+        progress = skill->tick(now_);
+        if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = tries == 0 ? 4.2 : again_kg;
+        if (held && !cell_.held) grips_kg_.reset();
+      }
+      reasons.push_back(progress.reason);
+      EXPECT_EQ(progress.status, tries == 0       ? Status::kRetry
+                                 : again_kg < 3.6 ? Status::kSucceeded
+                                                  : Status::kException)
+          << progress.reason;
+    }
+    EXPECT_THAT(reasons[0], HasSubstr("another may hang on it"));
+    EXPECT_THAT(reasons[1], HasSubstr(again_kg < 3.6 ? "" : "overweight"));
+    grips_kg_.reset();
+    cell_.held.reset();
+  }
+}
+
 // What stands beside its place is no lower than the load was lifted. The belt has come to rest just now.
 TEST_F(PickTest, WhatGoesBackComesDownStraight) {
   for (int i = 20; i >= 0; --i) belt_m_s_ = 0.01 * i, tick_with({});
