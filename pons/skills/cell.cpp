@@ -37,6 +37,7 @@ constexpr double kUnsure_kg = 0.1;                 // the scale's
 constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
 constexpr int kSeenBefore = 3;                     // at least: whoever asked for it trusted them
 constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
+constexpr double kStoodUp_m = 0.10;                // of what leans, or lies on another, where that was not known
 constexpr double kBeside_m = 0.05;                 // its middle when a load falls that comes to lie on the belt
 constexpr double kInstant_s = 0.001;
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
@@ -203,6 +204,13 @@ void Cell::left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_
   objects_.push_back(object);
 }
 
+void Cell::struck(std::string_view code) {
+  const auto left = std::ranges::find(left_, code, &ObjectBelief::code);
+  if (left == left_.end()) return;
+  left->code.clear();
+  left->size_m.z() += kStoodUp_m, left->world_from_top.translation().z() += kStoodUp_m;
+}
+
 void Cell::lifted(const ObjectBelief& object) {
   forgotten_.push_back(object.track);
   strays->taken(object.track);
@@ -302,8 +310,7 @@ ObjectBelief Cell::across_belt(double from_m, double to_m, double width_m, doubl
 }
 
 const ObjectBelief* Cell::find(std::string_view code) const {
-  const auto found =
-      std::find_if(objects_.begin(), objects_.end(), [&](const ObjectBelief& o) { return o.code == code; });
+  const auto found = std::ranges::find(objects_, code, &ObjectBelief::code);
   return found == objects_.end() ? nullptr : &*found;
 }
 

@@ -118,6 +118,9 @@ class Cell {
   // with the belt; then it keeps its label, which no camera may be able to read any more.
   // `top_z_m`: its top, world, where it does not stand on the belt itself.
   void left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_m = {});
+  // The arm struck something on its way to that parcel: if it was put back and nobody has seen it since, it does not
+  // lie as it was put. It is no longer known, and its place an obstacle.
+  void struck(std::string_view code);
   // What was put back and no camera has seen since.
   [[nodiscard]] const std::vector<ObjectBelief>& left() const { return left_; }
   // Gives the codes to those unread that it knows from what was put back or has fallen.

@@ -226,6 +226,17 @@ TEST_F(FeltBySomeTest, CupsOfWhichNoneSealsTellNothing) {
   EXPECT_EQ(believed(), Vector3(0.3, 0, 1.0));
 }
 
+// It leans, or lies on another: there the arm would strike it again.
+TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
+  cell_.struck("P000002");
+  ASSERT_NE(cell_.find("P000001"), nullptr);
+  cell_.struck("P000001");
+  cell_.refresh(now_ + from_s(0.5), {seen(0.12, 0.05)});
+  EXPECT_EQ(cell_.find("P000001"), nullptr) << "what is seen there may be what it leans on";
+  ASSERT_EQ(cell_.objects().size(), 2U);
+  EXPECT_GT(cell_.objects()[1].world_from_top.translation().z(), world_.belt.surface_z_m + 0.19);
+}
+
 TEST_F(LeftOnBeltTest, WhatIsSeenElsewhereIsAnother) {
   cell_.refresh(now_ + from_s(0.5), {seen(0.2, 0.05)});
   ASSERT_EQ(cell_.objects().size(), 2U);

@@ -61,6 +61,7 @@ class Pick final : public ArmSkill {
     move_along(delay_.take());
     if (!cell_.arm.operational()) {
       stopped_ = true;
+      if (cell_.arm.state().cause == link::StopCause::kCollision) cell_.struck(code_);
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
     if (stopped_ && phase_ != Phase::kRetreat) {
@@ -211,7 +212,6 @@ class Pick final : public ArmSkill {
   }
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
-
   // To where it was lifted from, which has moved on with the belt: what cannot be sorted so much farther from its
   // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place,
   // on what it lay on.
