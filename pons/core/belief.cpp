@@ -12,8 +12,9 @@ constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
 constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
 constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
-constexpr double kShared_m = 0.02, kLevel_m = 0.01;  // footprints share more, as high: one thing cut in two
-constexpr double kUpright = 0.9986;                  // cosine of 3 degrees
+constexpr double kShared_m = 0.02, kLevel_m = 0.01;             // footprints share more, as high: one thing cut in two
+constexpr double kUpright = 0.9986;                             // cosine of 3 degrees
+constexpr Duration kTogether = std::chrono::milliseconds(700);  // seen last: two pictures
 constexpr int kGlimpses = 3;  // seen less often, and not read, it may have been a bad cut between two
 
 bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2, 2) < kUpright; }
@@ -59,7 +60,9 @@ namespace {
 bool share_room(const ObjectBelief& a, const ObjectBelief& b) {
   const double rise_m = b.world_from_top.translation().z() - a.world_from_top.translation().z();
   const bool named = !a.code.empty() && !b.code.empty(), whole = std::min(a.confidence, b.confidence) >= kSure;
-  return named && whole && std::abs(rise_m) < kLevel_m && !leans(a) && !leans(b) && overlap(a, b, kShared_m);
+  const bool together = a.last_seen <= b.last_seen + kTogether && b.last_seen <= a.last_seen + kTogether;
+  return named && whole && together && std::abs(rise_m) < kLevel_m && !leans(a) && !leans(b) &&
+         overlap(a, b, kShared_m);
 }
 
 }  // namespace

@@ -100,6 +100,9 @@ TEST(Belief, OneWithTwoLabelsThatWasCutBetweenThemIsNotTwo) {
   other.world_from_top.translation().z() = 0.2;
   other.confidence = 0.3;
   EXPECT_FALSE(is_part(one, other)) << "partly hidden, it may end elsewhere";
+  other.confidence = 0.97;
+  other.last_seen = one.last_seen + from_s(1);
+  EXPECT_FALSE(is_part(one, other)) << "where the first was, it may have been pushed";
 }
 
 TEST(Belief, AGlimpseOfWhatNobodyHasReadIsNothing) {

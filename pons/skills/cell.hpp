@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -122,7 +123,11 @@ class Cell {
   // lie as it was put. It is no longer known, and its place an obstacle.
   void struck(std::string_view code);
   // What was put back and no camera has seen since.
-  [[nodiscard]] const std::vector<ObjectBelief>& left() const { return left_; }
+  [[nodiscard]] std::vector<ObjectBelief> left() const {
+    std::vector<ObjectBelief> known;
+    std::ranges::copy_if(left_, std::back_inserter(known), [](const ObjectBelief& one) { return !one.code.empty(); });
+    return known;
+  }
   // Gives the codes to those unread that it knows from what was put back or has fallen.
   void label(std::vector<ObjectBelief>& objects) const;
   // No camera shows what stands on the belt under the arm: whatever is within `reach_m` of the tip along the belt

@@ -229,8 +229,9 @@ TEST_F(FeltBySomeTest, CupsOfWhichNoneSealsTellNothing) {
 // It leans, or lies on another: there the arm would strike it again.
 TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
   cell_.struck("P000002");
-  ASSERT_NE(cell_.find("P000001"), nullptr);
+  ASSERT_EQ(cell_.left().size(), 1U);
   cell_.struck("P000001");
+  EXPECT_TRUE(cell_.left().empty()) << "nobody asks for it";
   cell_.refresh(now_ + from_s(0.5), {seen(0.12, 0.05)});
   EXPECT_EQ(cell_.find("P000001"), nullptr) << "what is seen there may be what it leans on";
   ASSERT_EQ(cell_.objects().size(), 2U);

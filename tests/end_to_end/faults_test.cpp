@@ -62,7 +62,7 @@ TEST(Faults, WhatHangsOnAnotherIsPutBack) {
 
 // In this run some come along unfelt.
 TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
-  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 21);
+  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 25);
   const json reasons = run.report["parcels"]["exceptions"]["reasons"];
   EXPECT_GE(reasons.value("came along with another, into chute_#", json::object()).value("undeserved", 0), 1)
       << run.said;
@@ -71,7 +71,7 @@ TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
 // In this one an unreadable one does, which no task asks for: it is not missorted only because the journal says where
 // an unread one went.
 TEST(Faults, WhatNobodyAsksForIsNamedWhereItFell) {
-  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 41);
+  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 48);
   EXPECT_NE(run.said.find("of which the journal says that an unread one did"), std::string::npos) << run.said;
 }
 
