@@ -199,7 +199,7 @@ void Cell::left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_
   object.frames_seen = kSeenBefore;
   object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
-  strays->put_back(held->code, now_);
+  strays->put_back(world.arm, held->code, now_);
   left_.push_back(object);
   objects_.push_back(object);
 }

@@ -36,7 +36,7 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
   forget_oldest(doubted_);
 }
 
-void Strays::put_back(const std::string& load, Time now) {
+void Strays::put_back(const std::string& arm, const std::string& load, Time now) {
   const auto torn = std::ranges::find(torn_, load, &Torn::load);
   std::erase_if(doubted_,
                 [&](const Doubted& one) { return one.load == load && !one.let_go && one.stray.code.empty(); });
@@ -48,6 +48,19 @@ void Strays::put_back(const std::string& load, Time now) {
     if (torn != torn_.end()) one.stray.place = torn->place;
   }
   std::erase_if(torn_, [&](const Torn& each) { return each.load == load; });
+  doubt_itself(arm, load, now);
+  doubted_.back().put_back = true;
+}
+
+void Strays::doubt_itself(const std::string& arm, const std::string& load, Time now) {
+  std::erase_if(doubted_, [&](const Doubted& one) { return one.stray.code == load; });
+  Doubted one;
+  one.track = kNoTrack;
+  one.arm = arm;
+  one.load = one.stray.code = load;
+  one.let_go = now;
+  doubted_.push_back(std::move(one));
+  forget_oldest(doubted_);
 }
 
 void Strays::let_go(const std::string& load, const std::string& place, Time now) {
@@ -68,15 +81,8 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 }
 
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
-  put_back(load, now);
-  std::erase_if(doubted_, [&](const Doubted& one) { return one.stray.code == load; });
-  Doubted one;
-  one.track = kNoTrack;
-  one.arm = arm;
-  one.load = one.stray.code = load;
-  one.let_go = now;
-  doubted_.push_back(std::move(one));
-  forget_oldest(doubted_);
+  put_back(arm, load, now);
+  doubted_.back().put_back = false;
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
@@ -94,15 +100,19 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   found_gone(*torn);
 }
 
-// Who of the company of a load that was put back is not known; who is seen again is not in doubt.
+// Who of those that were put back together is not known; who is seen again is not in doubt.
 void Strays::fell_beside(const std::string& load, const std::string& place) {
-  const auto may_have = [&](const Doubted& one) { return one.put_back && one.load == load && one.stray.place.empty(); };
-  const bool alone = std::ranges::count_if(doubted_, may_have) == 1;
+  for (Doubted& one : doubted_)
+    if (one.put_back && one.load == load && one.stray.place.empty()) one.stray.place = place;
+}
+
+void Strays::find_fallen() {
   for (Doubted& one : doubted_) {
-    if (!may_have(one)) continue;
-    one.stray.place = place;
-    one.gone = alone;
-    if (alone) found_gone_.push_back(one.stray);
+    if (!one.put_back || one.gone || one.stray.place.empty()) continue;
+    const auto with_it = [&](const Doubted& other) { return other.put_back && other.load == one.load; };
+    if (std::ranges::count_if(doubted_, with_it) > 1) continue;
+    one.gone = true;
+    found_gone_.push_back(one.stray);
   }
 }
 
@@ -139,6 +149,7 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
       return same && one.let_go && object.last_seen > *one.let_go;
     });
   }
+  find_fallen();
   for (Doubted& one : doubted_) {
     const auto object = std::ranges::find(objects, one.track, &ObjectBelief::track);
     const bool believed = object != objects.end();
@@ -177,7 +188,7 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
 
 bool Strays::missed_twice(const std::string& code) {
   const Doubted* const found = of(code);
-  return found != nullptr && !found->put_back &&
+  return found != nullptr && !(found->put_back && found->stray.place.empty()) &&
          std::exchange(doubted_[static_cast<std::size_t>(found - doubted_.data())].missed, true);
 }
 

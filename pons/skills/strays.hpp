@@ -29,9 +29,9 @@ class Strays {
  public:
   // A load with that company hangs on the arm's cups.
   void lifted(const std::string& arm, const std::string& load, const Company& company);
-  // It lies on the belt again, and who came along most likely, too: unless a light curtain tells otherwise, of then or
-  // soon after.
-  void put_back(const std::string& load, Time now);
+  // It lies on the belt again, and who came along, too, most likely: unless a light curtain tells otherwise, of then or
+  // soon after. Who is not seen again then is the one that fell.
+  void put_back(const std::string& arm, const std::string& load, Time now);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
   // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
@@ -73,6 +73,8 @@ class Strays {
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
   void fell_beside(const std::string& load, const std::string& place);
+  void find_fallen();
+  void doubt_itself(const std::string& arm, const std::string& load, Time now);
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
   [[nodiscard]] static bool is_over(const Doubted& one, const BeltAt& belt);
   [[nodiscard]] bool has_ridden_off(const Doubted& one) const;
