@@ -78,8 +78,10 @@ class Tracker {
     bool odd_hidden = false;                               // the odd sizes counted lie within what it should look like
     bool crowded = false, covered = false, whole = false;  // when last seen
     TrackLabel label;
-    // Seen whole for a while: a bad cut does not come this often.
-    [[nodiscard]] bool well_known() const { return observations.size() >= 4 && !observations.back().doubtful; }
+    // Seen whole for a while, or for long: a bad cut does not come this often.
+    [[nodiscard]] bool well_known() const {
+      return (observations.size() >= 4 || frames_seen >= 8) && !observations.back().doubtful;
+    }
     bool forgotten = false;  // only kept to swallow frames from before it was taken
     Time forgotten_until;
   };

@@ -122,6 +122,17 @@ TEST(TrackerTest, WhatStandsAloneAtLastIsMeasuredAfresh) {
   EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).world_from_top.translation().x(), -0.504, 1e-9);
 }
 
+// At the end of the view, say, with something before the camera.
+TEST(TrackerTest, APieceOfOneThatIsMeasuredAfreshIsNoOther) {
+  Bench bench;
+  Sighting crowded = Bench::sighting(-0.5, 0);
+  crowded.crowded = true;
+  for (int i = 0; i < 8; ++i) bench.update({crowded});
+  bench.update({Bench::sighting(-0.5, 0)});
+  EXPECT_EQ(bench.update({Bench::sighting(-0.585, 0.01, 1.5, {0.12, 0.03, 0.1})}).at(0), 0U);
+  EXPECT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1U);
+}
+
 // As a load carried over it hides more and more of it, and then less.
 TEST(TrackerTest, WhatHangsOverAParcelNeitherMovesNorRenamesIt) {
   Bench bench;
