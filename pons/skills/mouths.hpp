@@ -25,6 +25,8 @@ class Mouths {
   // A load is let go of over that place, or has been lost on its way and may fall anywhere.
   void expect_at(std::string_view place, Time now);
   void expect_anywhere(Time now) { anywhere_ = now; }
+  // What was lost is no longer waited for: if it falls now, nobody else tells of it.
+  void expect_no_more() { anywhere_.reset(); }
   // Each tick: the places into which something fell since the last one that was not expected, or rode.
   [[nodiscard]] std::vector<const world::Place*> unexpected(const Falls& falls, Time now);
 

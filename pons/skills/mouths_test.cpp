@@ -49,6 +49,10 @@ TEST_F(MouthsTest, WhatIsLostOnItsWayMayFallAnywhereForAWhile) {
   mouths_.expect_anywhere(at(3));
   ++falls_[0];
   EXPECT_EQ(fallen(5), Names{"chute_1"}) << "too late for it";
+  mouths_.expect_anywhere(at(6));
+  mouths_.expect_no_more();
+  ++falls_[1];
+  EXPECT_EQ(fallen(6.1), Names{"chute_2"});
 }
 
 }  // namespace

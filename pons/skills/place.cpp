@@ -48,7 +48,7 @@ constexpr Duration kRested = std::chrono::milliseconds(20);           // after t
 constexpr double kGoneShare = 0.4;                                    // of the load's mass
 constexpr double kGoneLeast_kg = 0.08;
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
-constexpr Duration kLooksWithin = std::chrono::milliseconds(2500);  // a camera that watches the tray
+constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);  // a camera that watches the tray, every 2 s
 constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
 
 class Place final : public ArmSkill {
@@ -291,6 +291,7 @@ class Place final : public ArmSkill {
     if (cell_.awaits(fallen_.code)) return look_for_it(now);
     if (now < fell_at_ + kFallsWithin) return {};
     // On a rim, maybe, off which it falls later: then a mouth's curtain counts what nobody let go of.
+    cell_.mouths.expect_no_more();
     cell_.strays->dropped(cell_.world.arm, fallen_.code, now);
     return {Status::kFailed, "dropped", std::move(detail)};
   }

@@ -57,6 +57,27 @@ TEST_F(LostOverItsChuteTest, WithOneThingMoreOnTheTrayItLiesThere) {
   EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
 }
 
+TEST_F(LostOverItsChuteTest, ThoughThePictureComesLate) {
+  const Progress progress = ends(3.0, kThings + 1);
+  EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
+}
+
+// Off a rim, while nobody looks any more.
+TEST_F(LostOverItsChuteTest, WhatIsCountedOnceItWasGivenUpIsNamed) {
+  --falls_[0];
+  pass();
+  cell_.lost = held_;
+  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+  const Progress progress = ends(9, kThings);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  ++falls_[1];
+  pass();
+  const std::vector<Stray> strays = cell_.strays->take_found_gone();
+  ASSERT_EQ(strays.size(), 1U);
+  EXPECT_EQ(strays[0].code, "P1");
+  EXPECT_EQ(strays[0].place, "chute_2");
+}
+
 // It may still be falling.
 TEST_F(LostOverItsChuteTest, APictureOfTheNextMomentSaysNothing) {
   const Progress progress = ends(0.2, kThings);
