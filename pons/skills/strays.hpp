@@ -59,7 +59,7 @@ class Strays {
   struct Doubted {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along
-    Stray stray;                 // the place is the load's; empty while that hangs on the cups, and when it has none
+    Stray stray;                 // the place is the load's; empty as long as nobody knows it
     std::optional<Time> let_go;  // of the load
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
     std::optional<double> at_m = {};
