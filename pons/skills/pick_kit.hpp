@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -67,6 +68,29 @@ class PickTest : public ::testing::Test {
   Vector3 tip() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
   std::unique_ptr<task::Skill> start(const std::string& code) {
     return type_.start(task::Json{{"object", code}}, now_);
+  }
+  // Takes P1, the first of `all()`, until that ends. On the cups it weighs so much, and hangs there below the tip.
+  // `before` each tick; `let_go` once it is.
+  template <typename All>
+  task::Progress take_first(
+      const All& all, double weighs_kg, const Vector3& hangs_m, const std::function<void()>& let_go = [] {},
+      const std::function<void()>& before = [] {}) {
+    tick_with(all());
+    const auto skill = start("P1");
+    task::Progress progress;
+    for (int i = 0; i < 1000 && progress.status == task::Status::kRunning; ++i) {
+      before();
+      const bool held = cell_.held.has_value();
+      tick_with(all());
+      progress = skill->tick(now_);
+      for (link::Command command; cerebellum_.receive(command);) {
+      }
+      if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = weighs_kg, hangs_in_tip_m_ = hangs_m;
+      if (!held || cell_.held) continue;
+      let_go();
+      grips_kg_.reset();
+    }
+    return progress;
   }
 
   Time now_ = Time(from_s(5));

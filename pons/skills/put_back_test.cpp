@@ -23,17 +23,10 @@ TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
     return std::vector{parcel(1, -0.4 + belt_travel_m_, 0, size_m), parcel(2, -0.59 + belt_travel_m_, 0, size_m)};
   };
   for (int i = 0; i < 50; ++i) belt_m_s_ += 0.001, tick_with(all());
-  const auto skill = start("P1");
-  Progress progress;
   Vector3 let_go = Vector3::Zero();
-  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
-    belt_m_s_ = std::max(0.0, belt_m_s_ + (cell_.holds_belt(now_) ? -0.01 : 0.001));
-    const bool held = cell_.held.has_value();
-    tick_with(all());
-    progress = skill->tick(now_);
-    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 6;
-    if (held && !cell_.held) let_go = tip() - all()[0].world_from_top.translation(), grips_kg_.reset();
-  }
+  const Progress progress = take_first(
+      all, 6, Vector3::Zero(), [&] { let_go = tip() - all()[0].world_from_top.translation(); },
+      [&] { belt_m_s_ = std::max(0.0, belt_m_s_ + (cell_.holds_belt(now_) ? -0.01 : 0.001)); });
   EXPECT_EQ(progress.status, Status::kException);
   EXPECT_THAT(progress.reason, HasSubstr("overweight"));
   EXPECT_NEAR(let_go.x(), 0.05, 0.012);
@@ -49,19 +42,10 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
     return std::vector{on_another};
   };
   for (const double beside_m : {0.02, 0.16}) {
-    tick_with(all());
-    const auto skill = start("P1");
-    Progress progress;
-    for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
-      const bool held = cell_.held.has_value();
-      tick_with(all());
-      progress = skill->tick(now_);
-      if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, beside_m, 0.05};
-      if (!held || cell_.held) continue;
-      grips_kg_.reset();
+    const Progress progress = take_first(all, 1, {0, beside_m, 0.05}, [&] {
       ASSERT_EQ(cell_.left().size(), 1U);
       EXPECT_NEAR(cell_.left()[0].world_from_top.translation().z(), all()[0].world_from_top.translation().z(), 1e-9);
-    }
+    });
     const bool beside = beside_m > 0.5 * all()[0].size_m.y();
     EXPECT_EQ(progress.status, beside ? Status::kRetry : Status::kSucceeded) << progress.reason;
     EXPECT_THAT(progress.reason, HasSubstr(beside ? "another hangs on it" : ""));
@@ -78,28 +62,10 @@ TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
       return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1}), parcel(2, 0.32, 0, {0.2, 0.15, 0.1})};
     };
     cell_.hooked.reset();
-    std::vector<std::string> reasons;
-    for (int tries = 0; tries < 2; ++tries) {
-      tick_with(all());
-      const auto skill = start("P1");
-      Progress progress;
-      for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
-        const bool held = cell_.held.has_value();
-        tick_with(all());
-        for (link::Command command; cerebellum_.receive(command);) {
-        }
-        progress = skill->tick(now_);
-        if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = tries == 0 ? 4.2 : again_kg;
-        if (held && !cell_.held) grips_kg_.reset();
-      }
-      reasons.push_back(progress.reason);
-      EXPECT_EQ(progress.status, tries == 0       ? Status::kRetry
-                                 : again_kg < 3.6 ? Status::kSucceeded
-                                                  : Status::kException)
-          << progress.reason;
-    }
-    EXPECT_THAT(reasons[0], HasSubstr("another may hang on it"));
-    EXPECT_THAT(reasons[1], HasSubstr(again_kg < 3.6 ? "" : "overweight"));
+    const Progress first = take_first(all, 4.2, Vector3::Zero()), second = take_first(all, again_kg, Vector3::Zero());
+    EXPECT_EQ(first.status, Status::kRetry);
+    EXPECT_THAT(first.reason, HasSubstr("another may hang on it"));
+    EXPECT_EQ(second.status, again_kg < 3.6 ? Status::kSucceeded : Status::kException) << second.reason;
     grips_kg_.reset();
     cell_.held.reset();
   }
@@ -135,18 +101,12 @@ TEST_F(PickTest, WhatGoesBackAtTheEndOfTheZoneStaysInReach) {
   const auto x_m = [&] { return world_.belt.waits_at_m() + belt_travel_m_; };
   std::optional<double> lies_at_m;
   const auto all = [&] { return std::vector{parcel(1, x_m(), 0, {0.2, 0.15, 0.1})}; };
-  tick_with(all());
-  const auto skill = start("P1");
-  Progress progress;
-  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
-    const bool held = cell_.held.has_value();
-    const bool waits = cell_.holds_belt(now_) || (!held && world_.belt.must_wait_for(x_m(), belt_m_s_));
+  // The brain has it wait for what lies there, the skill for what hangs on the cups.
+  const auto run_belt = [&] {
+    const bool waits = cell_.holds_belt(now_) || (!cell_.held && world_.belt.must_wait_for(x_m(), belt_m_s_));
     belt_m_s_ = std::clamp(belt_m_s_ + (waits ? -0.01 : 0.01), 0.0, 0.26);
-    tick_with(all());
-    progress = skill->tick(now_);
-    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = 1, hangs_in_tip_m_ = {0, 0.16, 0.05};
-    if (held && !cell_.held) grips_kg_.reset(), lies_at_m = x_m();
-  }
+  };
+  const Progress progress = take_first(all, 1, {0, 0.16, 0.05}, [&] { lies_at_m = x_m(); }, run_belt);
   EXPECT_THAT(progress.reason, HasSubstr("another hangs on it"));
   ASSERT_TRUE(lies_at_m);
   EXPECT_LT(*lies_at_m, world_.belt.pick_x_max_m);
@@ -155,16 +115,7 @@ TEST_F(PickTest, WhatGoesBackAtTheEndOfTheZoneStaysInReach) {
 // It is wedged in, or stands on something that came up with it: carried off, it would strike something.
 TEST_F(PickTest, WhatSomethingBearsGoesBack) {
   const auto all = [&] { return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1})}; };
-  tick_with(all());
-  const auto skill = start("P1");
-  Progress progress;
-  for (int i = 0; i < 1000 && progress.status == Status::kRunning; ++i) {
-    const bool held = cell_.held.has_value();
-    tick_with(all());
-    progress = skill->tick(now_);
-    if (tip().z() < all()[0].world_from_top.translation().z()) grips_kg_ = -0.5;
-    if (held && !cell_.held) grips_kg_.reset();
-  }
+  const Progress progress = take_first(all, -0.5, Vector3::Zero());
   EXPECT_EQ(progress.status, Status::kRetry) << progress.reason;
   EXPECT_THAT(progress.reason, HasSubstr("something bears it"));
   EXPECT_FALSE(cell_.held);

@@ -37,28 +37,33 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
 }
 
 void Strays::put_back(const std::string& arm, const std::string& load, Time now) {
+  leave_company(load, now);
+  doubt_itself(arm, load, now, true);
+}
+
+// Whose label is known: of the others nobody could tell who it was.
+void Strays::leave_company(const std::string& load, Time now) {
+  const auto hung = [&](const Doubted& one) { return one.load == load && !one.let_go; };
   const auto torn = std::ranges::find(torn_, load, &Torn::load);
-  std::erase_if(doubted_,
-                [&](const Doubted& one) { return one.load == load && !one.let_go && one.stray.code.empty(); });
+  std::erase_if(doubted_, [&](const Doubted& one) { return hung(one) && one.stray.code.empty(); });
   for (Doubted& one : doubted_) {
-    if (one.load != load || one.let_go) continue;
+    if (!hung(one)) continue;
     one.let_go = now;
     one.put_back = true;
     one.gone = false;
     if (torn != torn_.end()) one.stray.place = torn->place;
   }
   std::erase_if(torn_, [&](const Torn& each) { return each.load == load; });
-  doubt_itself(arm, load, now);
-  doubted_.back().put_back = true;
 }
 
-void Strays::doubt_itself(const std::string& arm, const std::string& load, Time now) {
+void Strays::doubt_itself(const std::string& arm, const std::string& load, Time now, bool put_back) {
   std::erase_if(doubted_, [&](const Doubted& one) { return one.stray.code == load; });
   Doubted one;
   one.track = kNoTrack;
   one.arm = arm;
   one.load = one.stray.code = load;
   one.let_go = now;
+  one.put_back = put_back;
   doubted_.push_back(std::move(one));
   forget_oldest(doubted_);
 }
@@ -81,8 +86,8 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 }
 
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
-  put_back(arm, load, now);
-  doubted_.back().put_back = false;
+  leave_company(load, now);
+  doubt_itself(arm, load, now, false);
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {

@@ -74,7 +74,8 @@ class Strays {
   void found_gone(Doubted& one);
   void fell_beside(const std::string& load, const std::string& place);
   void find_fallen();
-  void doubt_itself(const std::string& arm, const std::string& load, Time now);
+  void leave_company(const std::string& load, Time now);
+  void doubt_itself(const std::string& arm, const std::string& load, Time now, bool put_back);
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of
   [[nodiscard]] static bool is_over(const Doubted& one, const BeltAt& belt);
   [[nodiscard]] bool has_ridden_off(const Doubted& one) const;
