@@ -38,7 +38,8 @@ struct Held {
   Load load;
   double mass_kg = 0;
   Company company = {};
-  Falls falls = {};  // when it was lifted
+  bool alone = true;  // nobody was near, or the lift has shown that nobody came along
+  Falls falls = {};   // when it was lifted
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.

@@ -132,7 +132,7 @@ class Pick final : public ArmSkill {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
       const double mass = cell_.held->mass_kg;
-      const bool wanted = cell_.held->code == code_;
+      const bool wanted = cell_.held->code == code_ && cell_.held->alone;  // or it is laid down, and lifted again
       if (wanted && mass <= cell_.world.rules.max_mass_kg) return success(now);
       const Progress begun = begin_set_down(now, wanted ? overweight(mass) : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
@@ -370,6 +370,7 @@ class Pick final : public ArmSkill {
                       .load = load_of(target_, grasp_.orientation),
                       .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
                       .falls = cell_.falls()};
+    cell_.held->alone = cell_.held->company.empty();
     cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company);
     cell_.lost.reset();
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * cell_.held->load.size_m.prod());
@@ -397,17 +398,16 @@ class Pick final : public ArmSkill {
     const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear it or drag along: only a reading at rest tells for sure.
     const bool odd = weighed && (weighed->mass_kg > (1 - kNearLimit) * limit || weighed->mass_kg < kLightest_kg);
-    const Company& company = cell_.held->company;
     const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
-    const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, company, hooked) : std::nullopt;
+    const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, cell_.held->company, hooked) : std::nullopt;
     if (beside) cell_.hold_belt(now);
     if ((!weighed || odd || beside || hooked) && !at_rest) return {};
-    if ((target_.crowded || !company.empty()) && now < lift_end_) return {};
+    if ((target_.crowded || !cell_.held->alone) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.
     const double mass = weighed ? weighed->mass_kg : kUnweighable * limit;
     cell_.weighs(std::max(kLightest_kg, mass));
     if (mass < kLightest_kg) return begin_put_back(now, 0, {Status::kRetry, "something bears it", {}});
-    const bool alone = company.empty() || hooked || mass > kTogether * limit;
+    const bool alone = cell_.held->alone || hooked || mass > kTogether * limit;
     if (mass > limit && alone) return begin_put_back(now, kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
     if (!beside && mass <= limit) return success(now);
@@ -448,10 +448,10 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
+    Held& held = *cell_.held;
+    held.alone = true;
     const int sealed = cell_.arm.cups().sealed_cups;
-    return {Status::kSucceeded,
-            {},
-            {{"mass_kg", cell_.held->mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
+    return {Status::kSucceeded, {}, {{"mass_kg", held.mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
   }
 
   Cell& cell_;

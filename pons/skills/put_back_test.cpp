@@ -71,6 +71,30 @@ TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
   }
 }
 
+// The arm was stopped in the lift, or its bridge ended: whether another came along nobody has felt.
+TEST_F(PickTest, WhatMayNotHangAloneIsLaidDownAndLiftedAgain) {
+  for (const bool alone : {true, false}) {
+    std::optional<ObjectBelief> lies;
+    cell_.held = Held{.code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}, .mass_kg = 1, .alone = alone};
+    grips_kg_ = 1;
+    const auto all = [&] { return lies ? std::vector{*lies} : std::vector<ObjectBelief>{}; };
+    tick_with({});
+    const auto skill = start("P1");
+    Progress progress;
+    for (int i = 0; i < 1500 && progress.status == Status::kRunning; ++i) {
+      progress = skill->tick(now_);
+      if (!cell_.held && !lies) lies = parcel(1, tip().x(), tip().y(), {0.2, 0.15, 0.1}), grips_kg_.reset();
+      if (lies && tip().z() < lies->world_from_top.translation().z()) grips_kg_ = 1;
+      tick_with(all());
+    }
+    EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    EXPECT_EQ(lies.has_value(), !alone);
+    ASSERT_TRUE(cell_.held);
+    EXPECT_TRUE(cell_.held->alone);
+    cell_.held.reset();
+  }
+}
+
 // What stands beside its place is no lower than the load was lifted. The belt has come to rest just now.
 TEST_F(PickTest, WhatGoesBackComesDownStraight) {
   for (int i = 20; i >= 0; --i) belt_m_s_ = 0.01 * i, tick_with({});

@@ -41,6 +41,7 @@ Json TakeUp::carries() const {
           {"size_m", of(held.load.size_m)},
           {"yaw_rad", held.load.yaw_in_tip_rad},
           {"offset_m", of(held.load.offset_in_tip_m)},
+          {"alone", held.alone},
           {"falls", std::span(held.falls).first(cell_.world.places.size())}};
 }
 
@@ -53,6 +54,7 @@ void TakeUp::restore(const Json& carried) {
                            .yaw_in_tip_rad = carried.value("yaw_rad", 0.0),
                            .offset_in_tip_m = vector_from(carried, "offset_m")},
                   .mass_kg = carried.value("mass_kg", 0.0),
+                  .alone = carried.value("alone", true),
                   .falls = falls_from(carried)};
   if (!cell_.arm.cups().open) {
     cell_.held = held;
