@@ -135,6 +135,7 @@ void Cell::watch_strays() {
       strays->rode_off(travel_m);
   }
   strays->look(objects_, {travel_m, view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m});
+  std::erase_if(left_, [&](const ObjectBelief& left) { return strays->is_gone(left.code); });
 }
 
 // What the view's downstream border cuts: its track knows more, unless it was never in view as a whole.
@@ -154,7 +155,7 @@ void Cell::add_unseen() {
   if (hidden_) {
     const Vector3 tip = model.world_from_tip(arm.state().position).translation();
     const Vector3 off = (tip - hidden_->world_from_top.translation()).cwiseAbs();
-    if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * hidden_->size_m.y()) hidden_.reset();
+    if (off.x() > 0.5 * hidden_->size_m.x() || off.y() > 0.5 * world.belt.width_m) hidden_.reset();
   }
   if (unseen_) {
     const double height_m = hidden_ ? std::min(unseen_->height_m, hidden_->size_m.z()) : unseen_->height_m;
@@ -162,11 +163,6 @@ void Cell::add_unseen() {
   }
   if (hidden_) objects_.push_back(*hidden_);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
-}
-
-void Cell::weighs(double mass_kg) {
-  held->mass_kg = mass_kg;
-  bears(mass_kg);
 }
 
 void Cell::bears(double mass_kg) {

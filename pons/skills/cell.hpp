@@ -95,7 +95,7 @@ class Cell {
 
   // What is held weighs so much: the loop is told. It must know of every load before the arm moves with it, for it
   // takes what it does not know for a collision, or throws the arm up.
-  void weighs(double mass_kg);
+  void weighs(double mass_kg) { held->mass_kg = mass_kg, bears(mass_kg); }
   // Likewise, but not weighed yet: about so much.
   void bears(double mass_kg);
   // Nothing is held any longer: likewise.

@@ -65,10 +65,9 @@ class Pick final : public ArmSkill {
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
     if (stopped_ && phase_ != Phase::kRetreat) {
+      if (!cell_.held) return give_up(now, "the arm was stopped");
       cell_.missed = Miss{code_, now};
-      const Progress verdict{Status::kRetry, "the arm was stopped", {}};
-      if (cell_.held) return verdict;
-      begin_retreat(now, verdict);
+      return {Status::kRetry, "the arm was stopped", {}};
     }
     switch (phase_) {
       case Phase::kFind:
@@ -132,9 +131,10 @@ class Pick final : public ArmSkill {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
       const double mass = cell_.held->mass_kg;
-      const bool wanted = cell_.held->code == code_ && cell_.held->alone;  // or it is laid down, and lifted again
-      if (wanted && mass <= cell_.world.rules.max_mass_kg) return success(now);
-      const Progress begun = begin_set_down(now, wanted ? overweight(mass) : Progress{});
+      const bool wanted = cell_.held->code == code_, alone = cell_.held->alone;
+      if (wanted && alone && mass <= cell_.world.rules.max_mass_kg) return success(now);
+      const Progress verdict = alone ? overweight(mass) : Progress{Status::kRetry, "another may hang on it", {}};
+      const Progress begun = begin_set_down(now, wanted ? verdict : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
     if (!cell_.lifts) return {Status::kException, "the vacuum is too weak", {}};

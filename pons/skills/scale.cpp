@@ -144,6 +144,8 @@ bool LateWeighing::tick(Time now) {
   scale_.add(cell_);
   const std::optional<Weight> weighed = scale_.weigh(cell_, most_kg);
   if (!weighed && now < *rested_ + kWeighAtMost) return false;
+  Held& held = *cell_.held;
+  held.alone = held.alone || (weighed && !hangs_beside(held.load, *weighed, held.company, std::nullopt));
   cell_.weighs(weighed && free_m >= kFree_m / 2 ? std::max(kLightest_kg, weighed->mass_kg) : most_kg);
   rested_.reset();
   return true;

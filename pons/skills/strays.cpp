@@ -191,6 +191,11 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
   return found == doubted_.end() ? nullptr : &*found;
 }
 
+bool Strays::is_gone(const std::string& code) const {
+  const Doubted* const found = of(code);
+  return found != nullptr && found->gone;
+}
+
 bool Strays::missed_twice(const std::string& code) {
   const Doubted* const found = of(code);
   return found != nullptr && !(found->put_back && found->stray.place.empty()) &&

@@ -50,6 +50,8 @@ class Strays {
   void taken(std::uint32_t track);
   // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
   [[nodiscard]] const std::string* place_of(const std::string& code) const;
+  // It was found gone, and not seen since.
+  [[nodiscard]] bool is_gone(const std::string& code) const;
   // The cups met nothing where it should lie. True once they have before, with no camera's having seen it meanwhile.
   [[nodiscard]] bool missed_twice(const std::string& code);
   // Those found gone since the last call.

@@ -176,11 +176,13 @@ TEST_F(StraysTest, WhatFellOffAfterItWasPutBackIsNamed) {
   look({box(2, "B", 0, 12.5), box(0x8000'0000, "A", 0, 11)});
   EXPECT_EQ(place_of("A"), "chute_2") << "it is only believed to lie there yet";
   look({box(2, "B", 0, 12.5)});
+  EXPECT_TRUE(strays_.is_gone("A"));
   ASSERT_EQ(strays_.take_found_gone().size(), 1U);
   EXPECT_FALSE(strays_.missed_twice("A"));
   EXPECT_TRUE(strays_.missed_twice("A"));
   strays_.put_back("arm", "A", at(13));
   EXPECT_FALSE(strays_.missed_twice("A") || strays_.missed_twice("A")) << "it lies there";
+  EXPECT_FALSE(strays_.is_gone("A"));
   strays_.fell("arm", "chute_7", at(50));
   EXPECT_EQ(place_of("A"), "") << "that was long ago";
 }

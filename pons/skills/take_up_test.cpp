@@ -174,6 +174,8 @@ TEST_F(SettleTest, WhatHangsLowRisesStraightBeforeAnythingElseMovesTheArm) {
   EXPECT_NEAR(hidden.world_from_top.translation().z(), world_.belt.surface_z_m + 0.30, 1e-9);
   EXPECT_GT(hidden.size_m.x(), 0.8);
   EXPECT_NEAR(hidden.world_from_top.translation().x(), began_.x(), 0.01);
+  stands({0.1, world_.belt.y_center_m + 0.4 * world_.belt.width_m, 1.3});
+  EXPECT_EQ(cell_.objects().size(), 1U) << "over the belt yet";
   // The tip has left it: the cameras see.
   stands({0.1, world_.belt.y_center_m + 0.5 * world_.belt.width_m + 0.05, 1.3});
   EXPECT_TRUE(cell_.objects().empty());
