@@ -134,7 +134,7 @@ void Cell::watch_strays() {
     else
       strays->rode_off(travel_m);
   }
-  strays->look(objects_, {travel_m, view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m});
+  strays->look(objects_, {travel_m, view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m}, now_);
   std::erase_if(left_, [&](const ObjectBelief& left) { return strays->is_gone(left.code); });
 }
 

@@ -65,13 +65,20 @@ TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItAndItIsHeavierStill) {
 TEST_F(FeltTest, WhatIsFeltTimeAndAgainIsUneven) {
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 1}), "B") << "it may have hooked again";
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 2}), "nobody");
+  EXPECT_EQ(felt(1, 0.05, 0, Hooked{"A", 1, 1, 2}), "B") << "no contents explain it";
   EXPECT_EQ(felt(1, -0.14, 0, Hooked{"A", 1.5, 1.5, 2}), "another") << "no parcel is that uneven";
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 0.8, 2}), "B") << "heavier: the neighbour bore a part of it then";
 }
 
+TEST_F(FeltTest, WhatIsTooHeavyForItsSizeDoesNotHangAlone) {
+  EXPECT_EQ(felt(6, 0, 0), "nobody") << "some are that heavy";
+  EXPECT_EQ(felt(6, 0, 0, Hooked{"A", 6, 6, 3}), "another");
+}
+
 TEST_F(FeltTest, WhatIsLighterThanWhenAnotherHungOnItIsUneven) {
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.3, 1.3, 1}), "nobody") << "that has let go";
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.05, 1.05, 1}), "B") << "no more than two weighings differ";
+  EXPECT_EQ(felt(1, 0.05, 0, Hooked{"A", 1.3, 1.3, 1}), "B") << "it still pulls";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.15, 1.15, 1}), "B") << "it may drag on the belt";
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.6, 1.3, 2}), "B") << "but heavier than the last time";
 }
 

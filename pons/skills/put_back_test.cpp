@@ -59,7 +59,7 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
 TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
   for (const double again_kg : {3.0, 4.2}) {
     const auto all = [&] {
-      return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1}), parcel(2, 0.32, 0, {0.2, 0.15, 0.1})};
+      return std::vector{parcel(1, 0.1, 0, {0.3, 0.2, 0.1}), parcel(2, 0.42, 0, {0.3, 0.2, 0.1})};
     };
     cell_.hooked.reset();
     const Progress first = take_first(all, 4.2, Vector3::Zero()), second = take_first(all, again_kg, Vector3::Zero());

@@ -14,14 +14,17 @@ constexpr double kSwing_s_per_root_kg = 0.08;
 constexpr double kQuickest_s = 0.05,
                  kSlowest_s = 0.15;  // of the swings: a few readings; the heaviest load that is sorted
 constexpr double kAgreeLeast_kg = 0.3, kAgreeShare = 0.3;
-constexpr double kNearEdge = 0.45;   // of the way from the middle to an edge
-constexpr double kFelt_nm = 0.2;     // a moment below that the cups bear easily
-constexpr double kUneven_m = 0.008;  // between where a load's middle seems to be and where it weighs: both are measured
+constexpr double kNearEdge = 0.45;  // of the way from the middle to an edge
+constexpr double kFelt_nm = 0.2;    // a moment below that the cups bear easily
+// Between where a load's middle seems to be and where it weighs: both are measured, and contents lie to one side.
+constexpr double kUneven_m = 0.008, kUnevenMost_m = 0.035;
+constexpr double kDensest_kg_m3 = 600;  // of what hardly any parcel holds; two weigh as much for the size of one
 constexpr double kFeltLeast_nm = 0.05;  // the wrist's own error
 constexpr int kTimeAndAgain = 2;
 constexpr double kFellOff = 1.5;                 // of the mass of the latest readings: over all of them
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
-constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load
+constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load,
+constexpr double kLess = 0.15;                   // and of two, one of which drags on the belt
 
 Eigen::Matrix3d world_from_flange(Cell& cell) {
   const Pose tip = cell.model.world_from_tip(cell.arm.state().position);
@@ -56,9 +59,11 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                    const std::optional<Hooked>& before) {
   const bool heavier = before && weight.mass_kg > (1 + kMore) * before->mass_kg + kMore_kg;
-  const bool lighter = before && (1 + kMore) * weight.mass_kg + kMore_kg < before->most_kg;
-  const bool uneven = before && !heavier && (lighter || before->times >= kTimeAndAgain);
+  const bool lighter = before && (1 + kLess) * weight.mass_kg + kMore_kg < before->most_kg;
   const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
+  const bool as_before = before && !heavier && (lighter || before->times >= kTimeAndAgain);
+  const bool uneven = as_before && beside_m.norm() < kUnevenMost_m;
+  if (before && weight.mass_kg > kDensest_kg_m3 * load.size_m.prod()) return Beside{};
   const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
   if (!uneven && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
     for (const Companion& companion : company)

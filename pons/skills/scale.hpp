@@ -22,9 +22,9 @@ struct Beside {
   std::string whose = "another";
 };
 // Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; or less
-// far, towards one of its company; or, where another was found on it `before` and it is heavier still, at all. What was
-// found so time and again and is no heavier now, or is lighter than ever, is uneven by itself: only the first of these
-// counts then.
+// far, towards one of its company; or, where another was found on it `before` and it is heavier still, at all, or is
+// denser than parcels are. What was found so time and again and is no heavier now, or is far lighter than ever, and is
+// not so far off its middle that no contents explain it, is uneven by itself: only the first of these counts then.
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                                  const std::optional<Hooked>& before);
 

@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::size_t kRemembered = 64;                         // of those who are gone
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
+constexpr Duration kTorn = std::chrono::milliseconds(1000);     // that one falls beside where its load was let go of
 constexpr Duration kAstray = std::chrono::seconds(30);          // after a load was dropped: something may push it
 constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
@@ -51,7 +52,7 @@ void Strays::leave_company(const std::string& load, Time now) {
     one.let_go = now;
     one.put_back = true;
     one.gone = false;
-    if (torn != torn_.end()) one.stray.place = torn->place;
+    if (torn != torn_.end()) one.stray.place = torn->place, one.fell = now;
   }
   std::erase_if(torn_, [&](const Torn& each) { return each.load == load; });
 }
@@ -80,7 +81,6 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
     });
     one.let_go = now;
     one.stray.place = place;
-    if (one.gone) found_gone(one);
     doubted_.push_back(std::move(one));
   }
 }
@@ -92,12 +92,12 @@ void Strays::dropped(const std::string& arm, const std::string& load, Time now) 
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   const auto torn = std::ranges::find_if(doubted_.rbegin(), doubted_.rend(), [&](const Doubted& one) {
-    const bool told = one.let_go && (one.gone || (one.put_back && !one.stray.place.empty()));
-    const Duration within = one.stray.place.empty() ? kAstray : kTornOff;
+    const bool told = one.told || (one.put_back && !one.stray.place.empty());
+    const Duration within = one.stray.place.empty() && one.seen == Time{} ? kAstray : kTornOff;
     return one.arm == arm && !told && !(one.let_go && now > *one.let_go + within);
   });
   if (torn == doubted_.rend()) return;
-  if (torn->put_back) return fell_beside(torn->load, place);
+  if (torn->put_back) return fell_beside(torn->load, place, now);
   torn_.push_back({torn->load, place});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
@@ -105,25 +105,31 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   found_gone(*torn);
 }
 
-// Who of those that were put back together is not known; who is seen again is not in doubt.
-void Strays::fell_beside(const std::string& load, const std::string& place) {
+// Who of those that were put back together is not known; who is seen after that is not in doubt.
+void Strays::fell_beside(const std::string& load, const std::string& place, Time now) {
   for (Doubted& one : doubted_)
-    if (one.put_back && one.load == load && one.stray.place.empty()) one.stray.place = place;
+    if (one.put_back && one.load == load && one.stray.place.empty()) one.stray.place = place, one.fell = now;
+}
+
+// Who was put back may lean on a neighbour, or hang on the belt's edge, where it is seen, and then fall off.
+bool Strays::has_stayed(const Doubted& one) {
+  if (!one.let_go || one.seen <= one.fell.value_or(*one.let_go)) return false;
+  return !one.put_back || one.fell || one.seen > *one.let_go + kTornOff;
 }
 
 void Strays::find_fallen() {
   for (Doubted& one : doubted_) {
     if (!one.put_back || one.gone || one.stray.place.empty()) continue;
-    const auto with_it = [&](const Doubted& other) { return other.put_back && other.load == one.load; };
-    if (std::ranges::count_if(doubted_, with_it) > 1) continue;
-    one.gone = true;
+    const auto may_have = [&](const Doubted& other) { return other.fell && other.load == one.load; };
+    if (std::ranges::count_if(doubted_, may_have) > 1) continue;
+    one.gone = one.told = true;
     found_gone_.push_back(one.stray);
   }
 }
 
 // As many of a load's company as were counted were torn off; the others, if they are gone, went with it.
 const std::string& Strays::place_of(const Doubted& one) const {
-  if (one.gone) return one.stray.place;
+  if (one.told) return one.stray.place;
   const auto torn = std::ranges::find(torn_, one.load, &Torn::load);
   return torn != torn_.end() ? torn->place : one.stray.place;
 }
@@ -134,6 +140,7 @@ void Strays::found_gone(Doubted& one) {
     one.stray.place = torn->place;
     torn_.erase(torn);
   }
+  one.told = true;
   found_gone_.push_back(one.stray);
 }
 
@@ -146,14 +153,15 @@ void Strays::taken(std::uint32_t track) {
   std::erase_if(doubted_, [&](const Doubted& one) { return one.track == track; });
 }
 
-void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) {
+void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, Time now) {
   if (doubted_.empty()) return;
   for (const ObjectBelief& object : objects) {
-    std::erase_if(doubted_, [&](const Doubted& one) {
+    for (Doubted& one : doubted_) {
       const bool same = one.track == object.track || (!one.stray.code.empty() && one.stray.code == object.code);
-      return same && one.let_go && object.last_seen > *one.let_go;
-    });
+      if (same && one.let_go && object.last_seen > *one.let_go) one.seen = std::max(one.seen, object.last_seen);
+    }
   }
+  std::erase_if(doubted_, has_stayed);
   find_fallen();
   for (Doubted& one : doubted_) {
     const auto object = std::ranges::find(objects, one.track, &ObjectBelief::track);
@@ -168,8 +176,9 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt) 
     const bool unseen = !believed && *one.at_m < belt.view_end_m;
     if (!unseen && !(is_over(one, belt) && !has_ridden_off(one))) continue;
     one.gone = true;
-    if (one.let_go) found_gone(one);
   }
+  for (Doubted& one : doubted_)
+    if (one.gone && !one.told && one.let_go && now > *one.let_go + kTorn) found_gone(one);
   std::erase_if(doubted_, [&](const Doubted& one) {
     return !one.gone && one.let_go && one.at_m && is_over(one, belt) && has_ridden_off(one);
   });

@@ -45,7 +45,7 @@ class Strays {
   // Each tick's beliefs: whoever is seen since the load was let go of has stayed, for until then who hangs beside it
   // may be seen, too. Who is believed to lie nowhere any more, and was to be seen, or should have ridden off the belt's
   // end and did not, has gone.
-  void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt);
+  void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, Time now);
   // It was taken off the belt by itself.
   void taken(std::uint32_t track);
   // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
@@ -63,10 +63,12 @@ class Strays {
     std::string arm, load;       // with which it may have come along
     Stray stray;                 // the place is the load's; empty as long as nobody knows it
     std::optional<Time> let_go;  // of the load
+    std::optional<Time> fell;    // once it was put back: then a light curtain counted it or another of them
     // As it was last believed to lie, along the belt; and the belt's travel when its middle comes to the end.
     std::optional<double> at_m = {};
     double half_m = 0, ends_m = 0;
-    bool missed = false, gone = false, put_back = false;
+    Time seen;  // since its load was let go of
+    bool missed = false, gone = false, told = false, put_back = false;
   };
   // One of a load's company, where a light curtain has told.
   struct Torn {
@@ -74,7 +76,8 @@ class Strays {
   };
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
-  void fell_beside(const std::string& load, const std::string& place);
+  void fell_beside(const std::string& load, const std::string& place, Time now);
+  [[nodiscard]] static bool has_stayed(const Doubted& one);
   void find_fallen();
   void leave_company(const std::string& load, Time now);
   void doubt_itself(const std::string& arm, const std::string& load, Time now, bool put_back);

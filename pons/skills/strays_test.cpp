@@ -21,8 +21,8 @@ class StraysTest : public testing::Test {
     object.last_seen = at(seen_s);
     return object;
   }
-  void look(const std::vector<ObjectBelief>& objects, double travel_m = 0) {
-    strays_.look(objects, {travel_m, kViewEnd_m, kEnd_m});
+  void look(const std::vector<ObjectBelief>& objects, double travel_m = 0, double now_s = 99) {
+    strays_.look(objects, {travel_m, kViewEnd_m, kEnd_m}, at(now_s));
   }
   // Takes up a load with B beside it at 10 s, and lets go of it over chute_1 at 11 s.
   void carry(const Company& company = {{2, "B", {0.2, 0}}}) {
@@ -93,6 +93,7 @@ TEST_F(StraysTest, WhoIsFoundGoneWhileTheLoadIsCarriedIsNamedWhenItIsLetGoOf) {
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "nobody knows where to yet";
   EXPECT_EQ(place_of("B"), "");
   strays_.let_go("A", "chute_1", at(11));
+  look({});
   const std::vector<Stray> gone = strays_.take_found_gone();
   ASSERT_EQ(gone.size(), 1U);
   EXPECT_EQ(gone[0].code, "B");
@@ -135,6 +136,21 @@ TEST_F(StraysTest, OfTwoOneIsTornOff) {
   EXPECT_EQ(gone[1].place, "chute_1");
 }
 
+// Below its load it comes against the rim, and falls into the next mouth.
+TEST_F(StraysTest, WhereItWentIsToldOnceItHasFallen) {
+  strays_.lifted("arm", "A", {{2, "", {0.2, 0}}});
+  look({box(2, "", 0)});
+  look({}, 0, 10.5);
+  strays_.let_go("A", "chute_1", at(11));
+  look({}, 0, 11.1);
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+  strays_.fell("arm", "chute_2", at(11.4));
+  look({}, 0, 12.1);
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].place, "chute_2");
+}
+
 // What was torn off before it was put back lies somewhere, and has nothing to do with the next lift.
 TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
@@ -154,10 +170,10 @@ TEST_F(StraysTest, WhoFellWhenItsLoadWasPutBackIsNamedWhereACurtainTells) {
     strays_.put_back("arm", "A", at(11));
     if (!before) strays_.fell("arm", "chute_7", at(12));
     EXPECT_TRUE(strays_.take_found_gone().empty()) << "it may be either";
-    look({box(3, "C", 0, 11.5), box(5, "A", 0, 12.5)});
+    look({box(3, "C", 0, 12.5), box(5, "A", 0, 12.5)});
     EXPECT_EQ(place_of("B"), "chute_7");
     EXPECT_EQ(place_of("C"), "");
-    look({box(3, "C", 0, 11.5), box(5, "A", 0, 12.5)});
+    look({box(3, "C", 0, 12.5), box(5, "A", 0, 12.5)});
     ASSERT_EQ(strays_.take_found_gone().size(), 1U) << "though nobody asks for it";
     strays_.lifted("arm", "A", {{3, "C", {0, 0.2}}});
     strays_.let_go("A", "chute_1", at(15));
@@ -185,6 +201,22 @@ TEST_F(StraysTest, WhatFellOffAfterItWasPutBackIsNamed) {
   EXPECT_FALSE(strays_.is_gone("A"));
   strays_.fell("arm", "chute_7", at(50));
   EXPECT_EQ(place_of("A"), "") << "that was long ago";
+}
+
+// It hung on its neighbour, or at the belt's edge, where a camera saw it.
+TEST_F(StraysTest, WhoIsSeenBeforeACurtainCountsMayBeTheOneThatFell) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.put_back("arm", "A", at(11));
+  look({box(5, "A", 0, 11.5)});
+  strays_.fell("arm", "chute_1", at(11.8));
+  look({box(5, "A", 0, 11.5)});
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+  look({box(2, "B", 0, 12.5)});
+  look({box(2, "B", 0, 12.5)});
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "A");
+  EXPECT_EQ(gone[0].place, "chute_1");
 }
 
 // A load that was lost on its way, and lies on a rim, or on the belt with its label below.
