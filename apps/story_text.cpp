@@ -138,6 +138,11 @@ std::string allowed(const Json& d) { return fmt::format("by {}, {}", text(d, "by
 
 std::string stopped(const Json& d) { return fmt::format("by {}: {}", text(d, "by"), text(d, "cause")); }
 
+std::string stray(const Json& d) {
+  const std::string place = text(d, "fell_into");
+  return place.empty() ? "its chute's light curtain has not counted it" : "fell into " + place;
+}
+
 std::string recognised(const Json& d) { return "on the belt again, as track " + text(d, "track"); }
 
 const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
@@ -149,6 +154,7 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"motion", motion},
     {"carries", carries},
     {"ride", reason},
+    {"stray", stray},
     {"attempt_ended", attempt_ended},
     {"resumed", step},
     {"found_done", step},

@@ -27,6 +27,7 @@ struct Entry {
   std::string last_reason;
   std::string put_into;   // where the last task that succeeded put it
   std::string fell_into;  // the chute that the last outcome, or a later entry, names
+  bool astray = false;    // since the last success an entry says that it is not where that put it
 };
 
 // The parcels that a task puts somewhere, and where: what a step places or, where that does not say, what was picked
@@ -59,6 +60,11 @@ void take_in(Entry& entry, const std::string& place, const std::optional<bridge:
     entry.fell_into = task::text_of(step.value("detail", Json{}), "fell_into");
 }
 
+void stray(Entry& entry, const std::string& place, const std::pair<std::int64_t, Time>& when) {
+  entry.fell_into = place;
+  entry.astray = entry.succeeded && when > entry.done;
+}
+
 // What it says of all of them.
 struct Story {
   std::map<std::string, Entry> entries;           // by code
@@ -82,7 +88,7 @@ Expected<Story> read(const bridge::Journal& journal) {
       if (code.empty())
         ++story.unread_strays[place];
       else
-        entries[code].fell_into = place;
+        stray(entries[code], place, {event.run, event.stamp});
     }
     if (event.kind != "ride") continue;
     Entry& entry = entries[code];
@@ -125,7 +131,7 @@ class Judge {
 
  private:
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
-    if (!entry.succeeded && parcel.place == entry.fell_into) {
+    if ((!entry.succeeded || entry.astray) && parcel.place == entry.fell_into) {
       undeserved(entry);
       find(parcel, entry, "fell into another chute, which the journal names");
     } else if (entry.tasks == 0 && story_.unread_strays[parcel.place] > 0) {
@@ -146,7 +152,7 @@ class Judge {
     // Some brain wanted it there.
     const bool put_there = entry.succeeded && entry.put_into == parcel.place;
     // Another that bore its code was sorted; what rode by later is named, too.
-    if (entry.succeeded && !put_there && !entry.rode_since)
+    if (entry.succeeded && !put_there && !entry.rode_since && !entry.astray)
       return lost(parcel, entry, "in the exception chute, but the journal says sorted");
     if (!entry.ride && !entry.ended) return lost(parcel, entry, "in the exception chute without an entry");
     if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {
@@ -159,7 +165,8 @@ class Judge {
   }
 
   void below(const ParcelTruth& parcel, const Entry& entry) {
-    if (entry.succeeded || (!entry.ride && !entry.ended)) return lost(parcel, entry, "fell without an entry");
+    const bool told = entry.succeeded ? entry.astray : entry.ride || entry.ended;
+    if (!told) return lost(parcel, entry, "fell without an entry");
     undeserved(entry);
     find(parcel, entry, "fell, with an entry");
   }

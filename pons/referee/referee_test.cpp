@@ -40,8 +40,8 @@ class RefereeTest : public ::testing::Test {
     const bridge::Json detail{{"steps", {{{"skill", "place"}, {"detail", {{"fell_into", place}}}}}}};
     ASSERT_TRUE(journal_->outcome(id, Outcome::kException, "fell into " + place, Time{}, detail));
   }
-  void stray(const std::string& code, const std::string& place) {
-    ASSERT_TRUE(journal_->note(Time{}, "stray", {{"code", code}, {"fell_into", place}}));
+  void stray(const std::string& code, const std::string& place, Time now = {}) {
+    ASSERT_TRUE(journal_->note(now, "stray", {{"code", code}, {"fell_into", place}}));
   }
   void ride(const std::string& code, Time now = {}) {
     ASSERT_TRUE(journal_->note(now, "ride", {{"code", code}, {"reason", "r"}}));
@@ -167,6 +167,22 @@ TEST_F(RefereeTest, WhoCameAlongWithAnotherIsNamedAfterItsOwnTaskHasEnded) {
       judge({parcel("A", Whereabouts::kChute, "chute_2"), parcel("B", Whereabouts::kChute, "chute_2")});
   EXPECT_EQ(verdict.undeserved, 1);
   EXPECT_EQ(verdict.missorted, 1) << "B is not where the journal says";
+}
+
+TEST_F(RefereeTest, WhatIsNotWhereItWasPutIsNamedAfterwards) {
+  const Time before = Time(from_s(1)), done = Time(from_s(2)), after = Time(from_s(3));
+  stray("D", "", before);
+  for (const char* const each : {"A", "B", "C", "D"}) accept(each, each), end(each, Outcome::kSucceeded, done);
+  stray("A", "", after);
+  stray("B", "chute_2", after);
+  stray("C", "", after);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kFloor, "floor"), parcel("B", Whereabouts::kChute, "chute_2"),
+             parcel("C", Whereabouts::kChute, "chute_1"), parcel("D", Whereabouts::kFloor, "floor")});
+  EXPECT_EQ(verdict.undeserved, 2) << "A and B";
+  EXPECT_EQ(verdict.sorted, 1) << "it lay on the rim, and has fallen in since";
+  EXPECT_EQ(verdict.missorted, 0);
+  EXPECT_EQ(verdict.lost, 1) << "since D was put there, nothing was said of it";
 }
 
 TEST_F(RefereeTest, OfThoseNobodyHasReadAsManyAreNamedAsTheJournalSays) {

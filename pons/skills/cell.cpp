@@ -134,6 +134,8 @@ void Cell::watch_strays() {
     else
       strays->rode_off(travel_m);
   }
+  for (const Mouths::Load& load : mouths.take_uncounted(now_))
+    if (!held || held->code != load.code) strays->uncounted(world.arm, load.code, load.let_go);
   strays->look(objects_, {travel_m, view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m}, now_);
   std::erase_if(left_, [&](const ObjectBelief& left) { return strays->is_gone(left.code); });
 }

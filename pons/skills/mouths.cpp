@@ -8,13 +8,12 @@ namespace {
 
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1500);  // off a rim, too
 
-bool within(const std::optional<Time>& since, Time now) { return since && now < *since + kFallsWithin; }
-
 }  // namespace
 
-void Mouths::expect_at(std::string_view place, Time now) {
+void Mouths::expect_at(std::string_view place, const std::string& code, Time now) {
   const auto found = std::ranges::find(world_.places, place, &world::Place::name);
-  if (found != world_.places.end()) expected_[static_cast<std::size_t>(found - world_.places.begin())] = now;
+  if (found == world_.places.end() || found->kind != world::PlaceKind::kChute) return;
+  expected_[static_cast<std::size_t>(found - world_.places.begin())] = Load{code, now};
 }
 
 std::vector<const world::Place*> Mouths::unexpected(const Falls& falls, Time now) {
@@ -30,9 +29,17 @@ std::vector<const world::Place*> Mouths::unexpected(const Falls& falls, Time now
 
 // One fall each.
 bool Mouths::was_expected(std::size_t place, Time now) {
-  for (std::optional<Time>* const expected : {&expected_[place], &anywhere_})
-    if (within(std::exchange(*expected, std::nullopt), now)) return true;
-  return false;
+  const std::optional<Load> load = std::exchange(expected_[place], std::nullopt);
+  if (load && now < load->let_go + kFallsWithin) return true;
+  const std::optional<Time> lost = std::exchange(anywhere_, std::nullopt);
+  return lost && now < *lost + kFallsWithin;
+}
+
+std::vector<Mouths::Load> Mouths::take_uncounted(Time now) {
+  std::vector<Load> uncounted;
+  for (std::optional<Load>& load : expected_)
+    if (load && now >= load->let_go + kFallsWithin) uncounted.push_back(*std::exchange(load, std::nullopt));
+  return uncounted;
 }
 
 }  // namespace pons::skills

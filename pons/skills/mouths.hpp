@@ -1,9 +1,11 @@
-// What falls into the mouths of one arm's chutes, as their light curtains count it, and what of that nobody let go of.
+// What falls into the mouths of one arm's chutes, as their light curtains count it: what of that nobody let go of, and
+// what was let go of and is not counted.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -22,20 +24,27 @@ class Mouths {
   // `world` must outlive it.
   explicit Mouths(const world::World& world) : world_(world) {}
 
+  struct Load {
+    std::string code;
+    Time let_go;
+  };
+
   // A load is let go of over that place, or has been lost on its way and may fall anywhere.
-  void expect_at(std::string_view place, Time now);
+  void expect_at(std::string_view place, const std::string& code, Time now);
   void expect_anywhere(Time now) { anywhere_ = now; }
   // What was lost is no longer waited for: if it falls now, nobody else tells of it.
   void expect_no_more() { anywhere_.reset(); }
   // Each tick: the places into which something fell since the last one that was not expected, or rode.
   [[nodiscard]] std::vector<const world::Place*> unexpected(const Falls& falls, Time now);
+  // After that: the loads that should have fallen into their places by now, each once.
+  [[nodiscard]] std::vector<Load> take_uncounted(Time now);
 
  private:
   [[nodiscard]] bool was_expected(std::size_t place, Time now);
 
   const world::World& world_;
   std::optional<Falls> last_;
-  std::array<std::optional<Time>, kMaxPlaces> expected_{};  // since when
+  std::array<std::optional<Load>, kMaxPlaces> expected_{};
   std::optional<Time> anywhere_;
 };
 

@@ -28,16 +28,31 @@ class MouthsTest : public testing::Test {
 using Names = std::vector<std::string>;
 
 TEST_F(MouthsTest, WhatWasLetGoOfIsExpectedOnce) {
-  mouths_.expect_at("chute_1", at(1));
+  mouths_.expect_at("chute_1", "A", at(1));
   ++falls_[0];
   EXPECT_EQ(fallen(1.2), Names{});
   ++falls_[0];
   EXPECT_EQ(fallen(1.3), Names{"chute_1"}) << "another came along";
-  mouths_.expect_at("chute_1", at(2));
+  mouths_.expect_at("chute_1", "A", at(2));
   ++falls_[1];  // its count begins anew
   EXPECT_EQ(fallen(2.2), Names{"chute_2"}) << "not where it was let go of";
   falls_[0] += 2;
   EXPECT_EQ(fallen(2.3), Names{"chute_1"}) << "one of the two";
+}
+
+TEST_F(MouthsTest, WhatIsNotCountedIsToldOnce) {
+  mouths_.expect_at("chute_1", "A", at(1));
+  mouths_.expect_at("chute_2", "B", at(1.2));
+  mouths_.expect_at("exception", "C", at(1.2));
+  ++falls_[1];
+  EXPECT_EQ(fallen(2.4), Names{});
+  EXPECT_TRUE(mouths_.take_uncounted(at(2.4)).empty()) << "it may lie on the rim";
+  EXPECT_EQ(fallen(2.6), Names{});
+  const auto uncounted = mouths_.take_uncounted(at(2.6));
+  ASSERT_EQ(uncounted.size(), 1U);
+  EXPECT_EQ(uncounted[0].code, "A");
+  EXPECT_EQ(uncounted[0].let_go, at(1));
+  EXPECT_TRUE(mouths_.take_uncounted(at(3)).empty());
 }
 
 TEST_F(MouthsTest, WhatIsLostOnItsWayMayFallAnywhereForAWhile) {

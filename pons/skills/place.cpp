@@ -247,7 +247,7 @@ class Place final : public ArmSkill {
     cell_.arm.vacuum(false);
     let_go_ = cell_.held->code;
     cell_.strays->let_go(cell_.held->code, name_, now);
-    cell_.mouths.expect_at(name_, now);
+    cell_.mouths.expect_at(name_, let_go_, now);
     cell_.arm.expect_contact(kHandling_n);
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;

@@ -115,6 +115,31 @@ TEST_F(CarriedTest, WhatIsWideAndFarIsBroughtThereInTwoParts) {
   EXPECT_LT((tip_now() - world_.place("chute_6")->center_m).head<2>().norm(), 0.03);
 }
 
+// On its rim, or beside it.
+TEST_F(CarriedTest, WhatItsOwnCurtainDoesNotCountIsNamed) {
+  ASSERT_EQ(world_.places[2].name, "chute_3");
+  for (const bool counted : {true, false}) {
+    opened_ = false;
+    stands({0.4, -0.3, 1.4});
+    cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 0.5};
+    const auto skill = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+    Progress progress;
+    for (int i = 0; i < 600 && progress.status == Status::kRunning; ++i) {
+      pass();
+      progress = skill->tick(now_);
+      opened_ = opened_ || lets_go();
+    }
+    EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    if (counted) ++falls_[2];
+    for (int i = 0; i < 200; ++i) pass();
+    const std::vector<Stray> strays = cell_.strays->take_found_gone();
+    ASSERT_EQ(strays.size(), counted ? 0U : 1U);
+    if (counted) continue;
+    EXPECT_EQ(strays[0].code, "P1");
+    EXPECT_EQ(strays[0].place, "");
+  }
+}
+
 // A load over chute_3 that swings, less and less.
 class SwingingTest : public CarriedTest {
  protected:

@@ -96,13 +96,23 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
     const Duration within = one.stray.place.empty() && one.seen == Time{} ? kAstray : kTornOff;
     return one.arm == arm && !told && !(one.let_go && now > *one.let_go + within);
   });
-  if (torn == doubted_.rend()) return;
+  if (torn == doubted_.rend()) {
+    nobodys_.push_back({arm, place, now});
+    return forget_oldest(nobodys_);
+  }
   if (torn->put_back) return fell_beside(torn->load, place, now);
   torn_.push_back({torn->load, place});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
   found_gone(*torn);
+}
+
+void Strays::uncounted(const std::string& arm, const std::string& load, Time let_go) {
+  const auto fall =
+      std::ranges::find_if(nobodys_, [&](const Fall& one) { return one.arm == arm && one.time > let_go; });
+  found_gone_.push_back({load, fall != nobodys_.end() ? fall->place : std::string()});
+  if (fall != nobodys_.end()) nobodys_.erase(fall);
 }
 
 // Who of those that were put back together is not known; who is seen after that is not in doubt.

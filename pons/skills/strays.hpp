@@ -1,5 +1,5 @@
-// Who may lie in a chute that was not theirs, because it came along with another unfelt: as far as cameras, the light
-// curtains in the mouths and the belt's encoder tell.
+// Who may lie in a chute that was not theirs, because it came along with another unfelt, or nowhere that was theirs: as
+// far as cameras, the light curtains in the mouths and the belt's encoder tell.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@
 namespace pons::skills {
 
 struct Stray {
-  std::string code;  // empty: nobody has read it
-  std::string place;
+  std::string code;   // empty: nobody has read it
+  std::string place;  // empty: it was let go of over its mouth, and has not fallen into it; nobody knows where to
 };
 
 // How far the belt has come, and where along it, world frame, it is seen and ends.
@@ -40,6 +40,8 @@ class Strays {
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
   // moment, or is what was dropped.
   void fell(const std::string& arm, const std::string& place, Time now);
+  // What was let go of then is not counted where it should have fallen: it went where something of nobody's fell since.
+  void uncounted(const std::string& arm, const std::string& load, Time let_go);
   // Something rode off the belt's end.
   void rode_off(double travel_m);
   // Each tick's beliefs: whoever is seen since the load was let go of has stayed, for until then who hangs beside it
@@ -70,6 +72,11 @@ class Strays {
     Time seen;  // since its load was let go of
     bool missed = false, gone = false, told = false, put_back = false;
   };
+  // What fell into a place of an arm's, and was nobody's.
+  struct Fall {
+    std::string arm, place;
+    Time time;
+  };
   // One of a load's company, where a light curtain has told.
   struct Torn {
     std::string load, place;
@@ -87,6 +94,7 @@ class Strays {
 
   std::vector<Doubted> doubted_;
   std::vector<Torn> torn_;  // and not found gone yet
+  std::vector<Fall> nobodys_;
   std::vector<Stray> found_gone_;
   std::vector<double> rode_off_;  // the belt's travel each time
 };

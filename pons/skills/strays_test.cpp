@@ -151,6 +151,20 @@ TEST_F(StraysTest, WhereItWentIsToldOnceItHasFallen) {
   EXPECT_EQ(gone[0].place, "chute_2");
 }
 
+// It came down on the rim, and from there fell into the next mouth, or beside it.
+TEST_F(StraysTest, WhatItsOwnCurtainDoesNotCountWentWhereNobodysFell) {
+  strays_.fell("arm", "chute_3", at(9));
+  strays_.fell("other", "chute_4", at(11.3));
+  strays_.fell("arm", "chute_2", at(11.4));
+  strays_.uncounted("arm", "A", at(11));
+  strays_.uncounted("arm", "B", at(11));
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 2U);
+  EXPECT_EQ(gone[0].code, "A");
+  EXPECT_EQ(gone[0].place, "chute_2");
+  EXPECT_EQ(gone[1].place, "") << "nobody knows";
+}
+
 // What was torn off before it was put back lies somewhere, and has nothing to do with the next lift.
 TEST_F(StraysTest, ACurtainCountsForTheLiftOfItsMoment) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
