@@ -38,8 +38,9 @@ struct Held {
   Load load;
   double mass_kg = 0;
   Company company = {};
-  bool alone = true;  // nobody was near, or the lift has shown that nobody came along
-  Falls falls = {};   // when it was lifted
+  bool alone = true;                   // nobody was near, or the lift has shown that nobody came along
+  std::optional<Vector3> from_m = {};  // where the tip was when it was lifted, world frame less the belt's travel
+  Falls falls = {};                    // when it was lifted
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.

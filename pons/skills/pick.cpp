@@ -36,8 +36,7 @@ constexpr double kLifted_m = 0.020;  // nothing below supports the load any more
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
 constexpr double kDragged_m = 0.006;  // behind the belt; further, the cups slide over what they touch
-constexpr double kPutBack_m = 0.02;   // over where it was lifted from: on stretched bellows it hangs up to 12 mm lower
-constexpr double kHangsLow_m = 0.05;  // likewise what is too heavy: it hangs askew, a corner up to 35 mm lower
+constexpr double kHangsLow_m = 0.05;  // over where it was, what is too heavy: a corner hangs up to 35 mm lower
 constexpr double kPutAside = 2.5;     // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;     // felt while it is lifted, over what it was taken for
 constexpr double kUnweighable = 2.0, kTogether = 1.35;  // times the mass limit: and what two may weigh
@@ -218,9 +217,8 @@ class Pick final : public ArmSkill {
   Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now
-    Vector3 to = aside * lift_offset(cell_, target_) + lift_from_;
-    to.x() -= lift_travel_m_;
-    to.z() = lift_from_.z() + (cell_.held->mass_kg > cell_.world.rules.max_mass_kg ? kHangsLow_m : kPutBack_m);
+    Vector3 to = aside * lift_offset(cell_, target_) + *cell_.held->from_m;
+    to.z() = cell_.held->from_m->z() + (cell_.held->mass_kg > cell_.world.rules.max_mass_kg ? kHangsLow_m : kPutBack_m);
     const auto top_z_m = aside == 0 ? std::optional(target_.world_from_top.translation().z()) : std::nullopt;
     if (auto begun = set_down_.begin_back(now, to, grasp_.orientation, top_z_m); !begun)
       return begin_set_down(now, std::move(verdict));
@@ -358,8 +356,7 @@ class Pick final : public ArmSkill {
   Progress begin_lift(Time now) {
     const Time from = cell_.arm.splice_time(now);
     const AxisState state = cell_.arm.planned(from);
-    lift_from_ = cell_.model.world_from_tip(state.position).translation();
-    lift_travel_m_ = cell_.belt_travel_m(from);
+    const Vector3 tip = cell_.model.world_from_tip(state.position).translation();
     const auto up = skills::lift(cell_, state, from, grasp_.orientation, lift_offset(cell_, target_), kLifted_m_s2);
     if (!up || !cell_.arm.stream(up->trajectory))
       return give_up(now, up ? "the link to the cerebellum is full" : up.error().line());
@@ -369,6 +366,7 @@ class Pick final : public ArmSkill {
     cell_.held = Held{.code = code_,
                       .load = load_of(target_, grasp_.orientation),
                       .company = company_of(seen != nullptr ? *seen : target_, cell_.objects(), grasp_.orientation),
+                      .from_m = tip - cell_.belt_travel_m(from) * Vector3::UnitX(),
                       .falls = cell_.falls()};
     cell_.held->alone = cell_.held->company.empty();
     cell_.strays->lifted(cell_.world.arm, code_, cell_.held->company);
@@ -381,14 +379,15 @@ class Pick final : public ArmSkill {
   }
 
   Progress lift(Time now) {
-    const double height = cell_.model.world_from_tip(cell_.arm.state().position).translation().z() - lift_from_.z();
+    const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
+    const double height = tip.z() - cell_.held->from_m->z();
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
       cell_.dropped();
       cell_.strays->dropped(cell_.world.arm, code_, now);
       begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
       return {};
     }
-    const double back_to_m = lift_from_.x() + cell_.belt_travel_m(now) - lift_travel_m_;
+    const double back_to_m = cell_.held->from_m->x() + cell_.belt_travel_m(now);
     if (cell_.world.belt.must_wait_for(back_to_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
     bear_at_least(std::min(cell_.world.rules.max_mass_kg, weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2)));
     if (height < kLifted_m) return {};
@@ -460,9 +459,7 @@ class Pick final : public ArmSkill {
   Phase phase_ = Phase::kFind;
   Grasp grasp_;
   ObjectBelief target_;
-  Vector3 lift_from_ = Vector3::Zero();
-  double lift_travel_m_ = 0;  // of the belt then
-  double expected_kg_ = 0;    // of the load, by its size
+  double expected_kg_ = 0;  // of the load, by its size
   Scale scale_;
   SetDown set_down_;
   Delay delay_;

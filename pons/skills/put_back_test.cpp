@@ -74,8 +74,8 @@ TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
 // The arm was stopped in the lift, or its bridge ended: whether another came along is felt afterwards.
 TEST_F(PickTest, WhatDoesNotHangAloneIsLaidDown) {
   for (const double beside_m : {0.0, 0.06}) {
-    const Vector3 middle_m(0, 0, 0.05);
-    cell_.held = Held{.code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}, .alone = false};
+    const Vector3 middle_m(0, 0, 0.05), from_m(0.1, -0.05, world_.belt.surface_z_m + 0.1);
+    cell_.held = Held{.code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}, .alone = false, .from_m = from_m};
     grips_kg_ = 1, hangs_in_tip_m_ = middle_m + Vector3(0, beside_m, 0);
     tick_with({});
     const auto skill = start("P1");
@@ -92,6 +92,8 @@ TEST_F(PickTest, WhatDoesNotHangAloneIsLaidDown) {
     cell_.held.reset();
   }
   ASSERT_EQ(cell_.left().size(), 1U);
+  const Vector3 off = cell_.left()[0].world_from_top.translation() - Vector3(0.1, -0.05, world_.belt.surface_z_m + 0.1);
+  EXPECT_LT(off.norm(), 0.02) << "where it was lifted from: who hangs on it fits there";
   cell_.strays->fell(world_.arm, "chute_2", now_);
   tick_with({});
   EXPECT_TRUE(cell_.left().empty()) << "a light curtain tells where it went";

@@ -28,7 +28,16 @@ constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid 
 
 }  // namespace
 
+bool SetDown::goes_back(Time now) {
+  const Held& held = *cell_.held;
+  if (held.alone || !held.from_m) return false;
+  if (held.from_m->x() + cell_.belt_travel_m(now) > cell_.world.belt.pick_x_max_m) return false;
+  const Pose tip = cell_.model.world_from_tip(cell_.arm.planned(cell_.arm.splice_time(now)).position);
+  return begin_back(now, *held.from_m + kPutBack_m * Vector3::UnitZ(), tip.linear()).has_value();
+}
+
 Expected<void> SetDown::begin(Time now) {
+  if (goes_back(now)) return {};
   back_.reset();
   top_z_m_.reset();
   if (heavy()) height_ = std::max(height_, kHeavyFrom);

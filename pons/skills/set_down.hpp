@@ -7,13 +7,17 @@
 
 namespace pons::skills {
 
+// Over where it was lifted from, when it is let go of: on stretched bellows it hangs up to 12 mm lower.
+inline constexpr double kPutBack_m = 0.02;
+
 class SetDown {
  public:
   // `cell` must outlive it.
   explicit SetDown(Cell& cell) : cell_(cell), delay_(cell.arm) {}
 
-  // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. Error: no way
-  // there now; what is in it rides on.
+  // Sets out for the first spot with room, from the middle of the pick zone on; something must be held. What may not
+  // hang alone goes back to where it was lifted from, if that is within reach: who hangs on it may be larger than the
+  // room. Error: no way there now; what is in it rides on.
   [[nodiscard]] Expected<void> begin(Time now);
   // Sets out for a place on the belt beside others: to over it first, and straight down from there; what is heavy not
   // before the belt, which has to be held, and it have come to rest. `tip_m`: where the
@@ -25,6 +29,7 @@ class SetDown {
   [[nodiscard]] Expected<bool> tick(Time now);
 
  private:
+  [[nodiscard]] bool goes_back(Time now);
   // To over the place if it is not there yet, else down.
   [[nodiscard]] Expected<void> go_back(Time now);
   void begin_at(Time released_at);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kRemembered = 64;                         // of those who are gone
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
-constexpr Duration kTorn = std::chrono::milliseconds(1000);     // that one falls beside where its load was let go of
+constexpr Duration kFalls = std::chrono::milliseconds(1000);    // from letting go to a curtain, perhaps another's
 constexpr Duration kAstray = std::chrono::seconds(30);          // after a load was dropped: something may push it
 constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
@@ -188,7 +188,7 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, 
     one.gone = true;
   }
   for (Doubted& one : doubted_)
-    if (one.gone && !one.told && one.let_go && now > *one.let_go + kTorn) found_gone(one);
+    if (one.gone && !one.told && one.let_go && now > *one.let_go + kFalls) found_gone(one);
   std::erase_if(doubted_, [&](const Doubted& one) {
     return !one.gone && one.let_go && one.at_m && is_over(one, belt) && has_ridden_off(one);
   });

@@ -45,8 +45,8 @@ class Strays {
   // Something rode off the belt's end.
   void rode_off(double travel_m);
   // Each tick's beliefs: whoever is seen since the load was let go of has stayed, for until then who hangs beside it
-  // may be seen, too. Who is believed to lie nowhere any more, and was to be seen, or should have ridden off the belt's
-  // end and did not, has gone.
+  // may be seen, too; of those put back, whoever is seen after a curtain's count, or much later. Who is believed to lie
+  // nowhere any more, and was to be seen, or should have ridden off the belt's end and did not, has gone.
   void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, Time now);
   // It was taken off the belt by itself.
   void taken(std::uint32_t track);

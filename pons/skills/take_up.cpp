@@ -36,13 +36,15 @@ Vector3 vector_from(const Json& json, const char* key) {
 Json TakeUp::carries() const {
   if (!cell_.held) return {};
   const Held& held = *cell_.held;
-  return {{"code", held.code},
-          {"mass_kg", held.mass_kg},
-          {"size_m", of(held.load.size_m)},
-          {"yaw_rad", held.load.yaw_in_tip_rad},
-          {"offset_m", of(held.load.offset_in_tip_m)},
-          {"alone", held.alone},
-          {"falls", std::span(held.falls).first(cell_.world.places.size())}};
+  Json carried = {{"code", held.code},
+                  {"mass_kg", held.mass_kg},
+                  {"size_m", of(held.load.size_m)},
+                  {"yaw_rad", held.load.yaw_in_tip_rad},
+                  {"offset_m", of(held.load.offset_in_tip_m)},
+                  {"alone", held.alone},
+                  {"falls", std::span(held.falls).first(cell_.world.places.size())}};
+  if (held.from_m) carried["from_m"] = of(*held.from_m);
+  return carried;
 }
 
 void TakeUp::restore(const Json& carried) {
@@ -55,6 +57,7 @@ void TakeUp::restore(const Json& carried) {
                            .offset_in_tip_m = vector_from(carried, "offset_m")},
                   .mass_kg = carried.value("mass_kg", 0.0),
                   .alone = carried.value("alone", true),
+                  .from_m = carried.contains("from_m") ? std::optional(vector_from(carried, "from_m")) : std::nullopt,
                   .falls = falls_from(carried)};
   if (!cell_.arm.cups().open) {
     cell_.held = held;

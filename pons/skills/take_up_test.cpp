@@ -64,6 +64,7 @@ TEST_F(TakeUpTest, WhatHangsThereIsRestoredAsItWasWrittenDown) {
   EXPECT_TRUE(take_up_.carries().is_null());
   cell_.held = held_;
   cell_.held->alone = false;
+  cell_.held->from_m = Vector3(0.1, 0.2, 1.1);
   const task::Json written = task::Json::parse(take_up_.carries().dump());
   EXPECT_EQ(written, take_up_.carries()) << "to the last digit";
   cell_.held.reset();
@@ -73,6 +74,7 @@ TEST_F(TakeUpTest, WhatHangsThereIsRestoredAsItWasWrittenDown) {
   EXPECT_EQ(cell_.held->code, "P1");
   EXPECT_EQ(cell_.held->mass_kg, 1.25);
   EXPECT_FALSE(cell_.held->alone);
+  EXPECT_EQ(cell_.held->from_m, Vector3(0.1, 0.2, 1.1));
   EXPECT_EQ(cell_.held->load.size_m, held_.load.size_m);
   EXPECT_EQ(cell_.held->load.yaw_in_tip_rad, 0.7);
   EXPECT_EQ(cell_.held->load.offset_in_tip_m, held_.load.offset_in_tip_m);
