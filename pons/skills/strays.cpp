@@ -85,9 +85,12 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   }
 }
 
+// With others, whatever is counted next may be one of them.
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
+  const bool with_others = std::ranges::any_of(
+      doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go && !one.stray.code.empty(); });
   leave_company(load, now);
-  doubt_itself(arm, load, now, false);
+  doubt_itself(arm, load, now, with_others);
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {

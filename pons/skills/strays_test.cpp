@@ -217,6 +217,19 @@ TEST_F(StraysTest, WhatFellOffAfterItWasPutBackIsNamed) {
   EXPECT_EQ(place_of("A"), "") << "that was long ago";
 }
 
+TEST_F(StraysTest, OfThoseThatWereDroppedTogetherEitherMayBeCounted) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.dropped("arm", "A", at(11));
+  strays_.fell("arm", "chute_5", at(11.5));
+  look({});
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+  look({box(5, "A", 0, 12.5)});
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "B");
+  EXPECT_EQ(gone[0].place, "chute_5");
+}
+
 // It hung on its neighbour, or at the belt's edge, where a camera saw it.
 TEST_F(StraysTest, WhoIsSeenBeforeACurtainCountsMayBeTheOneThatFell) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
