@@ -20,6 +20,7 @@ constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel 
 constexpr double kTouched_kg = 0.25;     // and of anything that the cups touch
 constexpr int kPresses = 2;
 constexpr double kDeeper_m = 0.015, kDeeper_m_s = 0.15;
+constexpr double kSlips_m = 0.010;
 constexpr double kOverBelt_m = 0.012;  // the thinnest is as high
 constexpr int kDeepest = 3;
 constexpr double kWithin_m = 0.02;    // the zone, where the arm waits,
@@ -249,6 +250,14 @@ Expected<PressedDown> press_down(Cell& cell, Time now, const Eigen::Matrix3d& or
   down->insert(down->end(), along->begin(), along->end());
   ++tried;
   return PressedDown{*std::move(down), end};
+}
+
+bool Slip::is_over(Cell& cell, bool touches) {
+  if (!touches && !met_at_m_) return false;
+  const link::State& state = cell.arm.state();
+  const double tip_m = cell.model.world_from_tip(state.commanded.position).translation().x() - state.belt_travel_m;
+  if (!met_at_m_) met_at_m_ = tip_m;
+  return std::abs(tip_m - *met_at_m_) > kSlips_m;
 }
 
 ObjectBelief held_at(const Held& held, const Pose& world_from_tip) {

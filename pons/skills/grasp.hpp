@@ -99,6 +99,17 @@ struct PressedDown {
 [[nodiscard]] Expected<PressedDown> press_down(Cell& cell, Time now, const Eigen::Matrix3d& orientation,
                                                Presses& presses);
 
+// How far the cups slide over what they touch. They ride along as fast as the belt ran when that was planned; it may
+// start, stop or jam, or the arm be slowed: pressed on what drags them along, they push the arm aside.
+class Slip {
+ public:
+  // Each period; `touches` from the contact on. True: further than the cups give way.
+  [[nodiscard]] bool is_over(Cell& cell, bool touches);
+
+ private:
+  std::optional<double> met_at_m_;  // the commanded tip then, along the belt and relative to it
+};
+
 // What hangs on the cups, as if it were seen there.
 [[nodiscard]] ObjectBelief held_at(const Held& held, const Pose& world_from_tip);
 

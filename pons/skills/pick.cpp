@@ -35,7 +35,6 @@ constexpr double kLifted_m_s2 = 5.0;
 constexpr double kLifted_m = 0.020;  // nothing below supports the load any more: the bellows stretch 12 mm at most
 constexpr double kNearLimit = 0.15;  // of the mass limit: so near to it only a reading at rest decides
 constexpr double kRetreat_m = 0.08;
-constexpr double kDragged_m = 0.006;  // behind the belt; further, the cups slide over what they touch
 constexpr double kHangsLow_m = 0.05;  // over where it was, what is too heavy: a corner hangs up to 35 mm lower
 constexpr double kPutAside = 2.5;     // times as far from its neighbours as it was lifted: what is heavy swings,
 constexpr double kHeavier = 1.5, kHeavier_kg = 1.5;     // felt while it is lifted, over what it was taken for
@@ -119,7 +118,6 @@ class Pick final : public ArmSkill {
     for (Time* const moment : {&grasp_.hover, &grasp_.contact, &lift_end_, &rides_until_, &retreated_at_})
       *moment += later;
     for (Segment& segment : grasp_.trajectory) segment.start += later;
-    behind_ += later;
   }
 
   Progress find(Time now) {
@@ -295,7 +293,7 @@ class Pick final : public ArmSkill {
     if (now >= grasp_.hover) cell_.arm.expect_contact(kHandling_n);
     if (now + kVacuumLead >= grasp_.contact) {
       cell_.arm.vacuum(true);
-      behind_ = Duration{0};
+      slip_ = {};
       phase_ = Phase::kGrip;
     }
     return {};
@@ -320,7 +318,8 @@ class Pick final : public ArmSkill {
   }
 
   Progress grip(Time now) {
-    if (to_s(behind_) * cell_.belt_speed_m_s() > kDragged_m) return give_up(now, "slowed over it, and left behind");
+    if (cell_.belt_speed_m_s() < kStands_m_s) cell_.hold_belt(now);  // what stands below the cups stays
+    if (slip_.is_over(cell_, now >= grasp_.contact)) return give_up(now, "the belt is faster or slower than the cups");
     const link::Vacuum& cups = cell_.arm.cups();
     const bool enough =
         cups.phase == link::VacuumPhase::kSealed && cups.sealed_cups >= cell_.world.robot.tool.cups_to_lift;
@@ -463,7 +462,7 @@ class Pick final : public ArmSkill {
   Scale scale_;
   SetDown set_down_;
   Delay delay_;
-  Duration behind_{0};  // of the belt, since the cups set out for the contact
+  Slip slip_;
   Progress verdict_;
   std::optional<Time> tried_, blocked_since_, tangled_;
   GraspSearch search_;

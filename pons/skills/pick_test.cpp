@@ -81,6 +81,52 @@ TEST_F(PickTest, WhatMayStandOnTheBeltIsLiftedBeforeItIsWeighed) {
   EXPECT_NEAR(cell_.held->mass_kg, 2.5, 0.1);
 }
 
+// The cups come down on P1 and touch it, and do not seal.
+class TouchTest : public PickTest {
+ protected:
+  // Until they have for 50 ms. With a belt as fast as that.
+  void touch(double belt_m_s) {
+    belt_m_s_ = belt_m_s;
+    from_m_ = 0.1 - belt_travel_m_ - 2 * belt_m_s;
+    tick_with({object()});
+    skill_ = start("P1");
+    std::optional<Time> sucks_since;
+    for (int i = 0; i < 600 && !(sucks_since && now_ > *sucks_since + from_s(0.09)); ++i) {
+      tick_with({object()});
+      ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+      for (link::Command command; cerebellum_.receive(command);)
+        if (command.kind == link::CommandKind::kVacuum && command.vacuum_on != 0) sucks_since = now_;
+    }
+    ASSERT_TRUE(sucks_since);
+  }
+  [[nodiscard]] ObjectBelief object() const { return parcel(1, from_m_ + belt_travel_m_, 0, {0.2, 0.15, 0.1}); }
+  double from_m_ = 0;
+  std::unique_ptr<task::Skill> skill_;
+};
+
+// A belt that jams below cups that are pressed on a parcel drags at them, and pushes the arm aside.
+TEST_F(TouchTest, WhatTheBeltDragsFromUnderTheCupsIsLetGoOf) {
+  touch(0.2);
+  belt_m_s_ = 0;
+  const double met_at_m = tip().x();
+  Progress progress;
+  double furthest_m = 0;
+  for (int i = 0; i < 200 && progress.status == Status::kRunning; ++i) {
+    progress = skill_->tick(now_);
+    tick_with({object()});
+    if (tip().z() < object().world_from_top.translation().z()) furthest_m = tip().x() - met_at_m;
+  }
+  EXPECT_EQ(progress.status, Status::kRetry);
+  EXPECT_THAT(progress.reason, HasSubstr("the belt is faster or slower than the cups"));
+  EXPECT_LT(furthest_m, 0.02);
+}
+
+// Or one that starts.
+TEST_F(TouchTest, WhatStandsBelowTheCupsStays) {
+  touch(0);
+  EXPECT_TRUE(cell_.holds_belt(now_));
+}
+
 // With cups on it that have not lifted: nobody would know what hangs there.
 TEST_F(PickTest, WhatIsNotHeldYetIsLetGoOfWhenItIsBrokenOff) {
   for (const bool stopped : {true, false}) {

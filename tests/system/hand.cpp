@@ -28,10 +28,14 @@ bool Hand::go(Time now, const Vector3& to) {
   return sent;
 }
 
+// As far as the arm gets: right above where a stop came it may have no pose.
 bool Hand::rise(Time now) {
-  Vector3 up = cell_.model.world_from_tip(cell_.arm.planned(cell_.arm.splice_time(now)).position).translation();
-  up.z() = cell_.world.belt.surface_z_m + kParcelHeight_m + kRise_m;
-  return go(now, up);
+  const AxisState state = cell_.arm.planned(cell_.arm.splice_time(now));
+  const Vector3 tip = cell_.model.world_from_tip(state.position).translation();
+  const double by_m = cell_.world.belt.surface_z_m + kParcelHeight_m + kRise_m - tip.z();
+  for (const double share : {1.0, 0.5, 0.25})
+    if (go(now, tip + share * by_m * Vector3::UnitZ())) return true;
+  return false;
 }
 
 bool Hand::arrived(Time now) const { return now >= cell_.arm.motion_end() + kSettles; }
