@@ -20,7 +20,7 @@ constexpr double kPressedHard_kg = 5.5;  // what the wrist feels then; a parcel 
 constexpr double kTouched_kg = 0.25;     // and of anything that the cups touch
 constexpr int kPresses = 2;
 constexpr double kDeeper_m = 0.015, kDeeper_m_s = 0.15;
-constexpr double kSlips_m = 0.010;
+constexpr double kSlips_m = 0.010;     // between cups and what they touch; that much they give way
 constexpr double kOverBelt_m = 0.012;  // the thinnest is as high
 constexpr int kDeepest = 3;
 constexpr double kWithin_m = 0.02;    // the zone, where the arm waits,
