@@ -13,6 +13,7 @@ namespace {
 using link::Controller;
 using link::SafetyState;
 using link::StopCause;
+using link::VacuumPhase;
 
 // Share of a speed limit beyond which a measurement is told of: an arm that is sent at its limit is measured about it.
 constexpr double kTooFast = 1.01;
@@ -241,12 +242,15 @@ void Cerebellum::watch_contact(Time now) {
 }
 
 void Cerebellum::watch_cups(Time now) {
-  const link::VacuumPhase before = vacuum_.seen.phase;
+  const VacuumPhase before = vacuum_.seen.phase;
   vacuum_ = next(vacuum_settings_, vacuum_, vacuum_on_, state_.cup_vacuum_kpa, now);
-  if (before != link::VacuumPhase::kSealed || vacuum_.seen.phase != link::VacuumPhase::kLost) return;
-  // Drives that go on bearing a load that is gone throw the arm up, and whoever told of it is too slow to take it back.
+  const bool lost = before == VacuumPhase::kSealed && vacuum_.seen.phase == VacuumPhase::kLost;
+  const bool let_go = before != VacuumPhase::kOff && vacuum_.seen.phase == VacuumPhase::kOff;
+  if (!lost && !let_go) return;
+  // Drives that go on bearing a load that is gone throw the arm up or let it buzz, and whoever told of it is too slow
+  // to take it back, or alive no longer.
   bear({});
-  log_.write(now, "the cups have lost what they held");
+  if (lost) log_.write(now, "the cups have lost what they held");
 }
 
 void Cerebellum::watch_following(Time now) {
@@ -288,7 +292,7 @@ void Cerebellum::advance(Time now) {
     return;
   }
   if (moves(state_.safety)) follow(now);
-  if (is_braking(state_.safety)) sample_stop(now);
+  if (is_braking(state_.safety)) stop_at(to_s(now - stop_began_), commanded_);
   // A heap creeps while it is pressed, and an arm that creeps with it never stands.
   if ((gives_way_ || held_off_) && now >= stop_ends_) hold_measured(now);
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);

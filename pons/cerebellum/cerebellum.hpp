@@ -84,8 +84,8 @@ class Cerebellum {
   //                    queued (SeamTolerance), a full queue, or queued motion that ends moving: protective stop
   //                    kBadCommand. Beyond a limit when its tick comes: protective stop kLimit, from the last tick.
   //   kVacuum          operational only; a cup that the tool does not have: protective stop kBadCommand
-  //   kPayload         any state, and forgotten when the cups have lost what they held; negative, not finite or above
-  //                    max_payload_kg: protective stop kBadCommand
+  //   kPayload         any state, and forgotten when the cups have lost or let go of what they held; negative, not
+  //                    finite or above max_payload_kg: protective stop kBadCommand
   //   kContact         operational or in recovery, and forgotten when either begins; negative, not finite or above
   //                    CollisionSettings::contact_max_n: protective stop kBadCommand
   //   kControl         operational and commanded to rest, else refused; a fault() of its parameters: protective stop
@@ -143,9 +143,11 @@ class Cerebellum {
   bool leave_commanded(link::StopCause cause);
   void widen_to_stop();
   double plan_stop();
+  [[nodiscard]] double stop_duration_s() const;
+  [[nodiscard]] double drive_use_of_stop();
+  void stop_at(double t_s, AxisState& state) const;
   void go_on_from(const AxisState& state);
   void hold_measured(Time now);
-  void sample_stop(Time now);
   void judge_stop(Time now);
   void control(Time now, body::SetPoints& set_points);
   void publish_measurement(const body::Sensors& sensors);

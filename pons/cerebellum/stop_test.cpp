@@ -219,6 +219,57 @@ TEST(StopCauses, AreAllHereThatBrakeAndCanBeConfirmed) {
   }
 }
 
+struct Braking {
+  double took_s = 0, shortest_s = 0;
+  std::uint64_t saturated = 0;
+};
+
+// 3 kg on their way down, stretched out, so long after they began.
+Braking brake_a_load(Duration after) {
+  const model::Payload load{.mass_kg = 3, .com_m = {0, 0, 0.25}};
+  Bench bench({.step = 1ms, .payload = load});
+  link::Command told = plain_command(CommandKind::kPayload);
+  told.payload_kg = load.mass_kg;
+  std::ranges::copy(std::array{0.0, 0.0, 0.25}, told.payload_com_m.begin());
+  bench.arm();
+  bench.send(told);
+  AxisVector up = bench_robot().home, down = up;
+  up[1] += 0.6;
+  up[2] = -0.6;
+  down[1] += 1.6;
+  down[2] = -0.4;
+  bench.move(up);
+  bench.run(2s);
+  AxisLimits gentle = bench_robot().limits;  // else its own motion would be too much for them
+  gentle.acceleration_rad_s2 *= 0.3;
+  gentle.speed_rad_s *= 0.6;
+  bench.move(point_to_point(bench.state().commanded, bench.now + 20ms, down, gentle));
+  bench.run(after);
+  EXPECT_TRUE(bench.operational());
+  const std::uint64_t before = bench.cerebellum.statistics().saturated;
+  Braking braking{.shortest_s = shortest_stop_s(bench.state().commanded)};
+  const Time began = bench.now;
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  bench.tick();
+  while (!is_at_rest(bench.state().commanded)) bench.tick();
+  braking.took_s = to_s(bench.now - began);
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+  braking.saturated = bench.cerebellum.statistics().saturated - before;
+  return braking;
+}
+
+// Told to brake harder than that, it would be thrown off its way.
+TEST(StopOfALoad, IsNoHarderThanTheDrivesAre) {
+  int longer = 0;
+  for (Duration after = 50ms; after <= 600ms; after += 25ms) {
+    const Braking braking = brake_a_load(after);
+    EXPECT_EQ(braking.saturated, 0u) << to_s(after) << " s after it began";
+    if (braking.took_s > braking.shortest_s + 5e-3) ++longer;
+  }
+  EXPECT_GT(longer, 0) << "else this asks nothing of the drives";
+}
+
 TEST(StopLatch, ResetIsRefusedWhileTheWordOrTheInputIsHeld) {
   Bench bench;
   bench.arm();

@@ -1,5 +1,8 @@
 // How a stop begins, brakes and is judged: see stop_result in docs/safety.md.
 #include <algorithm>
+#include <array>
+#include <limits>
+#include <ranges>
 #include <span>
 #include <string_view>
 
@@ -7,6 +10,14 @@
 #include "pons/motion/stop.hpp"
 
 namespace pons::cerebellum {
+namespace {
+
+// Of the acceleration limits, tried one after the other until the drives can give what that takes.
+constexpr std::array kBrakingShares = {1.0, 0.85, 0.72, 0.61, 0.52, 0.44, 0.37, 0.31};
+constexpr double kDriveShare = 0.95;  // of the drives' torques: the rest is for what the load's swinging adds
+constexpr int kLooks = 12;            // at the torques of a stop: 30 ms apart where it is a long one
+
+}  // namespace
 
 using link::Controller;
 using link::SafetyState;
@@ -70,14 +81,56 @@ void Cerebellum::widen_to_stop() {
   }
 }
 
-// Returns how long it takes.
+// Returns how long it takes. The limits are each axis' own. Where all of them brake a heavy load at once, the drives
+// may be too weak for that: an arm that is told to is thrown off its way. So it brakes as hard as they can.
 double Cerebellum::plan_stop() {
-  const auto axes = commanded_.position.size();
-  motion::plan_stop(commanded_, limits(), std::span(stop_profiles_).first(static_cast<std::size_t>(axes)));
-  double longest = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(axes); ++i)
-    longest = std::max(longest, stop_profiles_[i].duration_s());
-  return longest;
+  const auto profiles = std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size()));
+  AxisLimits braking = limits();
+  double best = 1, least_use = std::numeric_limits<double>::infinity();
+  const auto plan = [&](double share) {
+    braking.acceleration_rad_s2 = share * limits().acceleration_rad_s2;
+    motion::plan_stop(commanded_, braking, profiles);
+  };
+  for (const double share : kBrakingShares) {
+    plan(share);
+    const double use = drive_use_of_stop();
+    if (use < least_use) {
+      least_use = use;
+      best = share;
+    }
+    if (use <= kDriveShare) return stop_duration_s();
+  }
+  plan(best);
+  return stop_duration_s();
+}
+
+double Cerebellum::stop_duration_s() const {
+  const auto axes = static_cast<std::size_t>(commanded_.position.size());
+  return std::ranges::max(std::span(stop_profiles_).first(axes) |
+                          std::views::transform([](const auto& profile) { return profile.duration_s(); }));
+}
+
+// The largest share of a drive's torque limit that the planned stop asks for.
+double Cerebellum::drive_use_of_stop() {
+  const double duration_s = stop_duration_s();
+  AxisState state = commanded_;
+  AxisVector torque_nm = driven_nm_;
+  double most = 0;
+  for (int look = 1; look <= kLooks; ++look) {
+    stop_at(duration_s * look / kLooks, state);
+    model_.inverse_dynamics(state.position, state.speed, state.acceleration, payload_, torque_nm);
+    most = std::max(most, torque_nm.cwiseAbs().cwiseQuotient(limits().torque_nm).maxCoeff());
+  }
+  return most;
+}
+
+void Cerebellum::stop_at(double t_s, AxisState& state) const {
+  for (Eigen::Index i = 0; i < state.position.size(); ++i) {
+    const motion::AxisPoint point = stop_profiles_[static_cast<std::size_t>(i)].at(t_s);
+    state.position[i] = point.position;
+    state.speed[i] = point.speed;
+    state.acceleration[i] = point.acceleration;
+  }
 }
 
 // Whatever was commanded.
@@ -94,16 +147,6 @@ void Cerebellum::hold_measured(Time now) {
   go_on_from(at_rest(measured_position_));
   plan_stop();
   queue_.rest(commanded_.position, now);
-}
-
-void Cerebellum::sample_stop(Time now) {
-  const double t = to_s(now - stop_began_);
-  for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
-    const motion::AxisPoint point = stop_profiles_[static_cast<std::size_t>(i)].at(t);
-    commanded_.position[i] = point.position;
-    commanded_.speed[i] = point.speed;
-    commanded_.acceleration[i] = point.acceleration;
-  }
 }
 
 void Cerebellum::judge_stop(Time now) {

@@ -146,5 +146,32 @@ TEST(Vacuum, ALostLoadIsBorneNoLonger) {
   EXPECT_LE(felt.speed_share, unfelt.speed_share);
 }
 
+// Whoever told of the load may be gone by the time it is: an arm that believes in it buzzes on its way to nothing.
+TEST(Vacuum, WhatWasLetGoIsBorneNoLonger) {
+  const model::Payload load{.mass_kg = 2.5, .com_m = {0, 0, 0.2}};
+  Bench bench({.step = 1ms, .payload = load});
+  link::Command told = plain_command(link::CommandKind::kPayload), cups = plain_command(link::CommandKind::kVacuum);
+  told.payload_kg = load.mass_kg;
+  std::ranges::copy(std::array{0.0, 0.0, 0.2}, told.payload_com_m.begin());
+  bench.arm();
+  cups.vacuum_on = 15;
+  bench.send(cups);
+  bench.send(told);
+  std::ranges::copy(kHeld, bench.plant.sensors.cup_vacuum_kpa.begin());
+  bench.run(500ms);
+  const auto external_nm = [&] { return bench.state().external_nm.cwiseAbs().maxCoeff(); };
+  EXPECT_LT(external_nm(), 1);
+  cups.vacuum_on = 0;
+  bench.send(cups);
+  bench.run(20ms);
+  EXPECT_LT(external_nm(), 1) << "half sealed still holds";
+  bench.plant.lose_load();
+  bench.plant.sensors.cup_vacuum_kpa = kOpen;
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().vacuum.phase, VacuumPhase::kOff);
+  EXPECT_LT(external_nm(), 1);
+  EXPECT_TRUE(bench.operational());
+}
+
 }  // namespace
 }  // namespace pons::cerebellum

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "pons/core/gravity.hpp"
@@ -28,6 +29,7 @@ constexpr int kHeights = 5;
 constexpr std::array kHeightsOverRim_m{kTipOverRim_m, kTipOverRim_m + 2 * kHigher_m, kTipOverRim_m + 4 * kHigher_m};
 constexpr double kOverBelt_m = 0.36;  // of the tip, on a way in two parts
 constexpr double kSofter_m = 0.015;   // than the longest fall that is allowed: sizes are measured
+constexpr int kStruckMost = 3;        // times something may be struck on the way
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;    // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;   // of the cups together: the wrist's moment for a load's lean, measured
@@ -60,11 +62,8 @@ class Place final : public ArmSkill {
     move_along(delay_.take());
     if (!let_go_.empty() && !cell_.held) return gone(now);
     if (phase_ == Phase::kFall) return fall(now);
-    if (!cell_.arm.operational()) {
-      // The cups hold through a stop: once the arm is armed again, a new way from where it rests.
-      plan_anew();
-      return cancelled_ ? Progress{Status::kFailed, "cancelled; still held", {}} : Progress{};
-    }
+    if (!cell_.arm.operational()) return stopped();
+    stopped_ = false;
     switch (phase_) {
       case Phase::kPlan:
         return plan(now);
@@ -101,6 +100,19 @@ class Place final : public ArmSkill {
 
  private:
   enum class Phase : std::uint8_t { kPlan, kCarry, kRelease, kFall, kHold };
+
+  // The cups hold through a stop: once the arm is armed again, a new way from where it rests. Where it strikes
+  // something again and again, a mouth is jammed maybe; the next collision could be one that only a person leads out
+  // of.
+  Progress stopped() {
+    plan_anew();
+    if (cancelled_) return {Status::kFailed, "cancelled; still held", {}};
+    const link::StopCause cause = cell_.arm.state().cause;
+    const bool struck = cause == link::StopCause::kCollision || cause == link::StopCause::kFollowingError;
+    if (!std::exchange(stopped_, true) && struck) ++times_struck_;
+    if (times_struck_ < kStruckMost) return {};
+    return {Status::kFailed, fmt::format("{}: struck something {} times on the way", name_, times_struck_), {}};
+  }
 
   void plan_anew() {
     phase_ = Phase::kPlan;
@@ -378,7 +390,8 @@ class Place final : public ArmSkill {
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
   Time counted_at_;
   Time fell_at_;
-  bool cancelled_ = false, aside_ = false;
+  bool cancelled_ = false, aside_ = false, stopped_ = false;
+  int times_struck_ = 0;
 };
 
 // Beside the arm: what the place has, or any place may have that the arguments may come to name.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "pons/skills/test_kit.hpp"
 
@@ -138,6 +139,35 @@ TEST_F(CarriedTest, WhatItsOwnCurtainDoesNotCountIsNamed) {
     EXPECT_EQ(strays[0].code, "P1");
     EXPECT_EQ(strays[0].place, "");
   }
+}
+
+// Then a mouth is jammed, maybe. What stops the arm for another reason is no collision, however often it comes.
+TEST_F(CarriedTest, ItIsGivenUpWhenSomethingIsStruckAThirdTime) {
+  const auto ends_after = [&](link::StopCause cause, int most) {
+    stands({0.4, -0.3, 1.4});
+    cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 0.5};
+    const auto skill = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+    Progress progress;
+    int stops = 0;
+    while (progress.status == Status::kRunning && stops < most) {
+      for (int i = 0; i < 10; ++i) {
+        pass();
+        progress = skill->tick(now_);
+        EXPECT_EQ(progress.status, Status::kRunning) << progress.reason;
+      }
+      ++stops;
+      stops_at({0.4, -0.3, 1.4}, cause);
+      for (int i = 0; i < 3 && progress.status == Status::kRunning; ++i) progress = skill->tick(now_);
+      is_armed_at({0.4, -0.3, 1.4});
+    }
+    return std::pair(stops, progress);
+  };
+  const auto [stops, progress] = ends_after(link::StopCause::kCollision, 9);
+  EXPECT_EQ(stops, 3);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_EQ(progress.reason, "chute_3: struck something 3 times on the way");
+  ASSERT_TRUE(cell_.held);
+  EXPECT_EQ(ends_after(link::StopCause::kHeartbeatLost, 6).second.status, Status::kRunning);
 }
 
 // A load over chute_3 that swings, less and less.

@@ -35,9 +35,17 @@ class ObedientArmTest : public testing::Test {
   }
   // What it was told is forgotten.
   void is_stopped_at(const Vector3& tip) {
+    stops_at(tip, link::StopCause::kCommanded);
+    is_armed_at(tip);
+  }
+  void stops_at(const Vector3& tip, link::StopCause cause) {
     now_ += from_s(1);
+    cause_ = cause;
     safety_ = link::SafetyState::kProtectiveStop;
     stands(tip);
+  }
+  void is_armed_at(const Vector3& tip) {
+    cause_ = link::StopCause::kNone;
     safety_ = link::SafetyState::kOperational;
     stands(tip);
   }
@@ -67,6 +75,7 @@ class ObedientArmTest : public testing::Test {
   void publish(const AxisState& at) {
     link::State state;
     state.safety = safety_;
+    state.cause = cause_;
     state.epoch = 1;
     state.stamp = now_;
     state.commanded = at;
@@ -83,6 +92,7 @@ class ObedientArmTest : public testing::Test {
   }
 
   link::SafetyState safety_ = link::SafetyState::kOperational;
+  link::StopCause cause_ = link::StopCause::kNone;
 };
 
 }  // namespace pons::skills
