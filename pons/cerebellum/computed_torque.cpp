@@ -30,8 +30,11 @@ void feed_forward(model::RobotModel& model, const AxisState& commanded, const mo
 
 void give_way(model::RobotModel& model, const Gains& gains, const ArmNow& arm, Corrections& corrections,
               AxisVector& torque_nm) PONS_NONBLOCKING {
-  const AxisVector& most = model.robot().limits.acceleration_rad_s2;
-  const AxisVector wanted = (-gains.brake_1_s * arm.speed).cwiseMin(most).cwiseMax(-most);
+  const AxisLimits& limits = model.robot().limits;
+  const AxisVector& most = limits.acceleration_rad_s2;
+  const AxisVector brake = -gains.brake_1_s * arm.speed;
+  const auto thrown = arm.speed.cwiseAbs().array() > limits.speed_rad_s.array();
+  const AxisVector wanted = thrown.select(brake, brake.cwiseMin(most).cwiseMax(-most));
   corrections.sent.push(corrections.integral);
   model.inverse_dynamics(arm.position, arm.speed, wanted, arm.payload, torque_nm);
 }

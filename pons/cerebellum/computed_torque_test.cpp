@@ -138,6 +138,22 @@ TEST(ComputedTorque, IsInverseDynamicsAndTheGains) {
   EXPECT_LT((torque - exact).cwiseAbs().maxCoeff(), 1e-9);
 }
 
+// A blow throws a wrist to several times its speed limit: nothing is gained by letting it spin.
+TEST(GiveWay, BrakesGentlyButWhatWasThrown) {
+  model::RobotModel model = bench_model();
+  const Gains gains;
+  const AxisLimits& limits = bench_robot().limits;
+  Corrections corrections(6, 0);
+  AxisVector speed = AxisVector::Zero(6), wanted = speed, torque, exact;
+  speed[0] = 0.01, wanted[0] = -gains.brake_1_s * speed[0];
+  speed[1] = -0.9 * limits.speed_rad_s[1], wanted[1] = limits.acceleration_rad_s2[1];
+  speed[4] = 2.5 * limits.speed_rad_s[4], wanted[4] = -gains.brake_1_s * speed[4];
+  const AxisVector& at = bench_robot().home;
+  give_way(model, gains, {at, speed, {}}, corrections, torque);
+  model.inverse_dynamics(at, speed, wanted, {}, exact);
+  EXPECT_LT((torque - exact).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 // What cannot be corrected winds the integral up to its bound and no further; forgotten, it starts from nothing.
 TEST(ComputedTorque, BoundsItsIntegral) {
   model::RobotModel model = bench_model();

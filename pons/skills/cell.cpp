@@ -15,30 +15,26 @@
 namespace pons::skills {
 namespace {
 
-constexpr double kCornered_rad = 0.35;  // from a position limit
-constexpr double kWholeTurn_rad = 2 * std::numbers::pi;
-// Planned motion stays this far inside the enforced limits, so that rounding never trips them.
-constexpr double kPlanShare = 0.97;
-// A swinging load drives the arm beyond what was planned: so much room for that.
-constexpr double kLoadedSpeedShare = 0.92;
-// Of what the cups hold, how much a planned motion may use up: a load on bellows swings to about twice, at a reversal
-// thrice, what it would take were it rigid.
+constexpr double kWholeTurn_rad = 2 * std::numbers::pi, kCornered_rad = 0.35;  // from a position limit
+constexpr double kPlanShare = 0.97;         // of the enforced limits, so that rounding never trips them
+constexpr double kLoadedSpeedShare = 0.92;  // a swinging load drives the arm beyond what was planned
+// Of what the cups hold: a load on bellows swings to about twice, at a reversal thrice, what it would take if rigid.
 constexpr double kGripShare = 0.40;
 constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
-// Of the acceleration limits. So slowly hardly anything swings, and weight alone, or a motion that is under way, may
-// use up more.
-constexpr double kSlowestShare = 0.10;
-constexpr double kSlowGripShare = 0.70;
+// Of the acceleration limits: so slowly hardly anything swings; weight alone, or a motion under way, may use up more.
+constexpr double kSlowestShare = 0.10, kSlowGripShare = 0.70;
 // Of one correction: a few are fine, but what no speed helps must come to an end.
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
 constexpr int kFineCorrections = 5;
-constexpr double kUnsure_kg = 0.1;                 // the scale's
-constexpr std::uint32_t kFirstLeft = 0x8000'0000;  // tracks of what no camera has seen
-constexpr int kSeenBefore = 3;                     // at least: whoever asked for it trusted them
-constexpr double kSlides_m = 0.05;                 // when it is let go of just over the belt
-constexpr double kStoodUp_m = 0.10;                // of what leans, or lies on another, where that was not known
-constexpr double kBeside_m = 0.05;                 // its middle when a load falls that comes to lie on the belt
+constexpr double kUnsure_kg = 0.1;                    // the scale's
+constexpr std::uint32_t kFirstLeft = 0x8000'0000;     // tracks of what no camera has seen
+constexpr int kSeenBefore = 3;                        // at least: whoever asked for it trusted them
+constexpr double kSlides_m = 0.05;                    // when it is let go of just over the belt
+constexpr double kNoHigher_m = 0.01;                  // seen so far above another's place at most, and
+constexpr double kNoRoom_m = 0.05;                    // so far in it, something is there in its stead
+constexpr double kStoodUp_m = 0.10;                   // of what leans, or lies on another, where that was not known
+constexpr double kBeside_m = 0.05, kBounces_m = 0.2;  // the belt, what falls: it comes to lie on it, or may
 constexpr double kInstant_s = 0.001;
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
@@ -50,8 +46,7 @@ constexpr double kAround_m = 0.25;    // a mouth: there arm and load may be in a
 constexpr double kTallest_m = 0.30;   // of what rides along the belt
 constexpr double kRise_m = 0.05;
 constexpr int kRises = 8;
-// Belt speed changes within seconds; its slope is smoothed over about this long.
-constexpr double kBeltSmoothing_s = 0.15;
+constexpr double kBeltSmoothing_s = 0.15;  // of its speed's slope, which changes within seconds
 
 // Of what stands so high on the belt; none where no camera watches it.
 std::optional<double> view_end_m(const world::World& world, double height_m) {
@@ -164,6 +159,7 @@ void Cell::add_unseen() {
     objects_.push_back(across_belt(unseen_->from_m, world.belt.x_end_m, world.belt.width_m, height_m));
   }
   if (hidden_) objects_.push_back(*hidden_);
+  fallen_.add_unseen(objects_, belt_speed_m_s(), now_);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
 }
 
@@ -223,8 +219,12 @@ void Cell::dropped() {
   const double height_m = tip.z() - held->load.size_m.z() - world.belt.surface_z_m;
   const double falls_s = std::sqrt(2 * std::max(0.0, height_m) / kGravity_m_s2);
   const Vector3 lands = tip + falls_s / kInstant_s * (tip_soon - tip);
-  const bool on_belt = std::abs(lands.y() - world.belt.y_center_m) < 0.5 * world.belt.width_m + kBeside_m;
-  if (on_belt && in_view(lands.x())) fallen_.fell(held->code, held->load.size_m, lands, objects_, now_);
+  const double beside_m = std::abs(lands.y() - world.belt.y_center_m) - 0.5 * world.belt.width_m;
+  const Vector3& size_m = held->load.size_m;
+  if (in_view(lands.x()) && beside_m < kBeside_m)
+    fallen_.fell(held->code, size_m, lands, objects_, now_);
+  else if (!in_view(lands.x()) && beside_m < kBounces_m)
+    fallen_.fell_unseen(held->code, size_m, lands, std::min(tip.z(), world.belt.surface_z_m + size_m.maxCoeff()));
   holds_nothing();
 }
 
@@ -272,16 +272,18 @@ void Cell::believe_felt() {
   }
 }
 
-// Nothing else can have come to lie just there.
+// Nothing else can have come to lie just there; and where something else is seen, nothing lies any more.
 void Cell::recognise_left() {
   for (const ObjectBelief& object : objects_) {
     if (object.track == 0) continue;
     std::erase_if(left_, [&](const ObjectBelief& left) {
+      if (left.code.empty() || object.code == left.code) return !left.code.empty();
       const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
-      const bool lies_there =
-          object.code.empty() && !left.code.empty() && object.last_seen > left.last_seen && off.norm() < kSlides_m;
-      if (lies_there) labelled_[object.track] = left.code;
-      return lies_there || (object.code == left.code && !left.code.empty());
+      if (object.last_seen <= left.last_seen) return false;
+      if (!object.code.empty()) return off.z() < kNoHigher_m && apart_m(object, left) < -kNoRoom_m;
+      if (off.norm() >= kSlides_m) return false;
+      labelled_[object.track] = left.code;
+      return true;
     });
   }
 }

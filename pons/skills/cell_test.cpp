@@ -175,8 +175,16 @@ TEST_F(DroppedTest, OverTheBeltItIsAwaitedAndKnownByPlaceAndSize) {
 TEST_F(DroppedTest, OverAChuteOrOutOfViewItIsNot) {
   loses_over({-0.2, 0.46, 1.2});
   EXPECT_FALSE(cell_.awaits("P1"));
+  pass();
+  EXPECT_TRUE(cell_.objects().empty());
   loses_over({0.4, 0, 1.2});
   EXPECT_FALSE(cell_.awaits("P1"));
+  pass();
+  ASSERT_EQ(cell_.objects().size(), 1U) << "but something is in the way there";
+  EXPECT_NEAR(cell_.objects()[0].world_from_top.translation().x(), 0.4, 1e-9);
+  cell_.await_no_more("P1");
+  pass();
+  EXPECT_TRUE(cell_.objects().empty());
 }
 
 class FeltBySomeTest : public ObedientArmTest {
@@ -236,6 +244,22 @@ TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
   EXPECT_EQ(cell_.find("P000001"), nullptr) << "what is seen there may be what it leans on";
   ASSERT_EQ(cell_.objects().size(), 2U);
   EXPECT_GT(cell_.objects()[1].world_from_top.translation().z(), world_.belt.surface_z_m + 0.19);
+}
+
+// With a label of its own, and no higher. Its neighbour overlaps it a little at most, and what hooked may have come to
+// lie on it.
+TEST_F(LeftOnBeltTest, WhereAnotherIsSeenItLiesNoMore) {
+  const auto is_left = [&](double x_m, double higher_m, const char* code) {
+    ObjectBelief other = seen(x_m, 0.05);
+    other.code = code;
+    other.world_from_top.translation().z() += higher_m;
+    cell_.refresh(now_ + from_s(0.5), {other});
+    return cell_.find("P000001") != nullptr;
+  };
+  EXPECT_TRUE(is_left(0.36, 0, "P000002")) << "beside it";
+  EXPECT_TRUE(is_left(0.2, 0, "")) << "unread";
+  EXPECT_TRUE(is_left(0.2, 0.05, "P000002")) << "on it";
+  EXPECT_FALSE(is_left(0.2, -0.03, "P000002"));
 }
 
 TEST_F(LeftOnBeltTest, WhatIsSeenElsewhereIsAnother) {

@@ -9,6 +9,7 @@ namespace {
 
 constexpr Duration kAwaited = std::chrono::milliseconds(3500);
 constexpr double kAbout_m = 0.40;                      // it may bounce, slide and roll
+constexpr double kNear_m = 0.10;                       // from where it should land, mostly
 constexpr int kFrames = 2;                             // in which it was seen: the first may show it still falling
 constexpr double kAsLarge_m = 0.015, kAsLarge = 0.06;  // two measurements of one side
 
@@ -35,8 +36,29 @@ void Fallen::fell(std::string code, const Vector3& size_m, const Vector3& lands_
   loads_.push_back(std::move(load));
 }
 
+void Fallen::fell_unseen(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m) {
+  forget(code);
+  ObjectBelief room;
+  const double longest_m = size_m.maxCoeff();
+  room.size_m = {longest_m + 2 * kNear_m, longest_m + 2 * kNear_m, longest_m};
+  room.world_from_top.translation() = Vector3(lands_m.x(), lands_m.y(), top_m);
+  unseen_.push_back({std::move(code), std::move(room)});
+}
+
+void Fallen::add_unseen(std::vector<ObjectBelief>& objects, double speed_m_s, Time now) const {
+  for (const Unseen& unseen : unseen_) {
+    ObjectBelief& room = objects.emplace_back(unseen.room);
+    room.velocity_m_s.x() = speed_m_s;
+    room.stamp = now;
+  }
+}
+
 std::vector<std::pair<std::uint32_t, std::string>> Fallen::recognise(const std::vector<ObjectBelief>& objects,
                                                                      double rode_m, Time now) {
+  std::erase_if(unseen_, [&](Unseen& unseen) {
+    unseen.room.world_from_top.translation().x() += rode_m;
+    return unseen.room.world_from_top.translation().x() > belt_ends_m_;
+  });
   std::vector<std::pair<std::uint32_t, std::string>> recognised;
   std::erase_if(loads_, [&](Load& load) {
     load.lands_m.x() += rode_m;
@@ -65,6 +87,7 @@ const ObjectBelief* Fallen::only_one(const Load& load, const std::vector<ObjectB
 }
 
 void Fallen::forget(std::string_view code) {
+  std::erase_if(unseen_, [&](const Unseen& unseen) { return unseen.code == code; });
   std::erase_if(loads_, [&](const Load& load) { return load.code == code; });
 }
 

@@ -30,7 +30,7 @@ class FallenTest : public testing::Test {
     EXPECT_EQ(recognised[0].second, "A");
     return recognised[0].first;
   }
-  Fallen fallen_;
+  Fallen fallen_{1.2};
 };
 
 TEST_F(FallenTest, WhatIsSeenFirstAboutThereAndIsAsLargeIsIt) {
@@ -92,6 +92,28 @@ TEST_F(FallenTest, AfterAWhileOrOnceItsCodeIsReadNothingIsAwaited) {
 }
 
 // A light curtain has counted it in a chute.
+TEST_F(FallenTest, BeyondTheViewItIsInTheWayUntilItHasRiddenOff) {
+  const auto rooms = [&] {
+    std::vector<ObjectBelief> objects;
+    fallen_.add_unseen(objects, 0.2, at(10));
+    return objects;
+  };
+  fallen_.fell_unseen("A", {0.3, 0.2, 0.1}, {0.6, 0.1, 0.9}, 1.2);
+  ASSERT_EQ(rooms().size(), 1U);
+  EXPECT_EQ(rooms()[0].track, 0U) << "nobody picks it";
+  EXPECT_GT(rooms()[0].size_m.x(), 0.4) << "it may have slid";
+  EXPECT_EQ(rooms()[0].size_m.z(), 0.3) << "or stand on its end";
+  (void)fallen_.recognise({}, 0.5, at(12));
+  ASSERT_EQ(rooms().size(), 1U);
+  EXPECT_NEAR(rooms()[0].world_from_top.translation().x(), 1.1, 1e-9);
+  EXPECT_EQ(rooms()[0].velocity_m_s.x(), 0.2);
+  (void)fallen_.recognise({}, 0.2, at(13));
+  EXPECT_TRUE(rooms().empty());
+  fallen_.fell_unseen("A", {0.3, 0.2, 0.1}, {0.6, 0.1, 0.9}, 1.2);
+  fallen_.forget("A");
+  EXPECT_TRUE(rooms().empty()) << "a light curtain has counted it";
+}
+
 TEST_F(FallenTest, WhatIsKnownToLieElsewhereIsNotRecognised) {
   falls();
   fallen_.forget("A");

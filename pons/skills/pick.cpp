@@ -406,7 +406,7 @@ class Pick final : public ArmSkill {
     cell_.weighs(std::max(kLightest_kg, mass));
     if (mass < kLightest_kg) return begin_put_back(now, 0, {Status::kRetry, "something bears it", {}});
     const bool alone = cell_.held->alone || hooked || mass > kTogether * limit;
-    if (mass > limit && alone) return begin_put_back(now, kPutAside, overweight(mass));
+    if (mass > limit && alone) return begin_put_back(now, beside ? 0 : kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
     if (!beside && mass <= limit) return success(now);
     cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};

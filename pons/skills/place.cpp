@@ -27,9 +27,11 @@ constexpr double kHigher_m = 0.025;     // tried next when a mouth is out of rea
 constexpr int kHeights = 5;
 // Of the empty tool, for the question whether a mouth is within reach at all.
 constexpr std::array kHeightsOverRim_m{kTipOverRim_m, kTipOverRim_m + 2 * kHigher_m, kTipOverRim_m + 4 * kHigher_m};
-constexpr double kOverBelt_m = 0.36;  // of the tip, on a way in two parts
-constexpr double kSofter_m = 0.015;   // than the longest fall that is allowed: sizes are measured
-constexpr int kStruckMost = 3;        // times something may be struck on the way
+constexpr double kOverBelt_m = 0.36;                // of the tip, on a way in two parts
+constexpr double kSofter_m = 0.015;                 // than the longest fall that is allowed: sizes are measured
+constexpr double kMoreShare = 1.2, kMore_kg = 0.2;  // than was weighed: felt so much on the way,
+constexpr int kMoreTicks = 5;                       // for so long, another hangs on it
+constexpr int kStruckMost = 3;                      // times something may be struck on the way
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;    // a load hangs beside where the cups were believed to hold it, at most
 constexpr double kCups_nm_rad = 10;   // of the cups together: the wrist's moment for a load's lean, measured
@@ -53,6 +55,8 @@ constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim
 constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);  // a camera that watches the tray, every 2 s
 constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
 
+constexpr const char* kCancelled = "cancelled; still held";
+
 class Place final : public ArmSkill {
  public:
   Place(Cell& cell, std::string name, std::string object, Time now)
@@ -74,7 +78,7 @@ class Place final : public ArmSkill {
       case Phase::kFall:
         break;
       case Phase::kHold:
-        return now < arrives_ ? Progress{} : Progress{Status::kFailed, "cancelled; still held", {}};
+        return now < arrives_ ? Progress{} : Progress{Status::kFailed, why_held_, {}};
     }
     return {Status::kFailed, "unreachable", {}};
   }
@@ -83,8 +87,7 @@ class Place final : public ArmSkill {
     cancelled_ = true;
     // It is over the mouth already, or on its way down.
     if (phase_ == Phase::kRelease || phase_ == Phase::kFall || phase_ == Phase::kHold) return;
-    if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
-    phase_ = Phase::kHold;
+    hold(now, kCancelled);
   }
 
   // With the parcel on the cups, the arm is nobody else's; over the mouth it is let go of first.
@@ -106,7 +109,7 @@ class Place final : public ArmSkill {
   // of.
   Progress stopped() {
     plan_anew();
-    if (cancelled_) return {Status::kFailed, "cancelled; still held", {}};
+    if (cancelled_) return {Status::kFailed, kCancelled, {}};
     const link::StopCause cause = cell_.arm.state().cause;
     const bool struck = cause == link::StopCause::kCollision || cause == link::StopCause::kFollowingError;
     if (!std::exchange(stopped_, true) && struck) ++times_struck_;
@@ -117,6 +120,12 @@ class Place final : public ArmSkill {
   void plan_anew() {
     phase_ = Phase::kPlan;
     search_ = {};
+  }
+
+  void hold(Time now, std::string why) {
+    if (cell_.stop(now)) arrives_ = cell_.arm.motion_end();
+    why_held_ = std::move(why);
+    phase_ = Phase::kHold;
   }
 
   void move_along(Duration later) {
@@ -131,6 +140,7 @@ class Place final : public ArmSkill {
     if (!object_.empty() && cell_.held->code != object_) {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
     }
+    if (!cell_.held->alone) return {Status::kFailed, "another hangs on " + cell_.held->code, {}};
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
     if ((tried_ && now - *tried_ < kTryEvery) || (halfway_at_ && now < *halfway_at_)) return {};
@@ -145,6 +155,8 @@ class Place final : public ArmSkill {
     }
     blocked_since_.reset();
     looked_at_ = now;
+    scale_ = {};
+    more_ticks_ = 0;
     phase_ = Phase::kCarry;
     return {};
   }
@@ -253,6 +265,14 @@ class Place final : public ArmSkill {
   Progress carry(Time now) {
     if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now, *cell_.held);
     look_out(now);
+    if (const auto felt_kg = feels_more()) {
+      const std::string why = fmt::format("another hangs on {}: {:.2f} kg are felt where {:.2f} were weighed",
+                                          cell_.held->code, *felt_kg, cell_.held->mass_kg);
+      cell_.held->alone = false;
+      cell_.weighs(*felt_kg);
+      hold(now, why);
+      return {};
+    }
     const bool tight = may_lean() < kTight_rad, level = hangs_level(now, tight);
     if (now < (level && !tight ? arrives_ - kLetGoEarly : arrives_)) return {};
     if (!level && now < arrives_ + (tight ? kSwingTight : kSwing)) return {};
@@ -264,6 +284,16 @@ class Place final : public ArmSkill {
     arrives_ = std::max(arrives_, now);
     phase_ = Phase::kRelease;
     return {};
+  }
+
+  // Who hangs on it with an edge on the belt weighs nothing on the scale, and is felt only when he comes off.
+  std::optional<double> feels_more() {
+    scale_.add(cell_);
+    const double weighed_kg = cell_.held->mass_kg;
+    const auto felt = scale_.weigh(cell_, weighed_kg);
+    const bool more = felt && felt->mass_kg > kMoreShare * weighed_kg + kMore_kg;
+    more_ticks_ = more ? more_ticks_ + 1 : 0;
+    return more_ticks_ < kMoreTicks ? std::nullopt : std::optional(felt->mass_kg);
   }
 
   Progress begin_fall(Time now, Held load) {
@@ -391,7 +421,9 @@ class Place final : public ArmSkill {
   Time counted_at_;
   Time fell_at_;
   bool cancelled_ = false, aside_ = false, stopped_ = false;
-  int times_struck_ = 0;
+  int times_struck_ = 0, more_ticks_ = 0;
+  Scale scale_;
+  std::string why_held_;
 };
 
 // Beside the arm: what the place has, or any place may have that the arguments may come to name.

@@ -1,5 +1,6 @@
 #include "pons/skills/place.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -139,6 +140,32 @@ TEST_F(CarriedTest, WhatItsOwnCurtainDoesNotCountIsNamed) {
     EXPECT_EQ(strays[0].code, "P1");
     EXPECT_EQ(strays[0].place, "");
   }
+}
+
+// With an edge on the belt it weighed nothing on the scale.
+TEST_F(CarriedTest, WhoIsFeltToHangOnItOnTheWayEndsTheWay) {
+  const auto carries = [&](double felt_kg) {
+    is_stopped_at({0.4, -0.3, 1.4});
+    (void)lets_go();
+    cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 1.5};
+    hangs_kg_ = felt_kg;
+    const auto skill = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+    Progress progress;
+    for (int i = 0; i < 600 && progress.status == Status::kRunning && !lets_go(); ++i) {
+      pass();
+      progress = skill->tick(now_);
+    }
+    return progress;
+  };
+  EXPECT_EQ(carries(1.6).status, Status::kRunning) << "swings, and a scale is wrong by a little";
+  const Progress progress = carries(4);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, testing::StartsWith("another hangs on P1: "));
+  ASSERT_TRUE(cell_.held);
+  EXPECT_FALSE(cell_.held->alone);
+  EXPECT_NEAR(cell_.held->mass_kg, 4, 1);
+  const auto again = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+  EXPECT_EQ(again->tick(now_).status, Status::kFailed) << "not before it was laid down";
 }
 
 // Then a mouth is jammed, maybe. What stops the arm for another reason is no collision, however often it comes.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "pons/core/gravity.hpp"
 #include "pons/skills/cell.hpp"
 #include "pons/world/world.hpp"
 
@@ -66,6 +67,7 @@ class ObedientArmTest : public testing::Test {
   bool opened_ = false;
   std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
+  double hangs_kg_ = 0;  // stiffly; 0: the wrist feels nothing, not even the tool
   Eigen::Vector2d wrist_nm_ = Eigen::Vector2d::Zero();
   Falls falls_{};  // into each of the world's places
   std::vector<ObjectBelief> seen_;
@@ -82,6 +84,7 @@ class ObedientArmTest : public testing::Test {
     state.position = at.position, state.speed = at.speed;
     state.belt_speed_m_s = belt_m_s_;
     state.fallen_into = falls_;
+    if (hangs_kg_ > 0) Vector3::Map(state.wrist_force_n.data()) = pull_n(at.position);
     std::ranges::copy(wrist_nm_, state.wrist_torque_nm.begin());
     if (!opened_) {
       state.vacuum_on = 15;
@@ -89,6 +92,23 @@ class ObedientArmTest : public testing::Test {
       std::fill_n(state.cup_vacuum_kpa.begin(), sealed_cups_, kSealed_kpa);
     }
     link::CerebellumEnd(*link_).publish(state);
+  }
+
+  // On the wrist, flange frame.
+  [[nodiscard]] Vector3 pull_n(const AxisVector& at) {
+    const world::Tool& tool = world_.robot.tool;
+    const Eigen::Matrix3d world_from_flange =
+        cell_.model.world_from_tip(at).linear() * tool.flange_from_tip.linear().transpose();
+    const double force_n = (kGravity_m_s2 + rises_m_s2()) * (tool.mass_kg + hangs_kg_);
+    return world_from_flange.transpose() * Vector3(0, 0, -force_n);
+  }
+  // The tip's acceleration upwards, as planned.
+  [[nodiscard]] double rises_m_s2() {
+    constexpr double kStep_s = 0.004;
+    const auto height_m = [&](double later_s) {
+      return cell_.model.world_from_tip(cell_.arm.planned(now_ + from_s(later_s)).position).translation().z();
+    };
+    return (height_m(kStep_s) - 2 * height_m(0) + height_m(-kStep_s)) / (kStep_s * kStep_s);
   }
 
   link::SafetyState safety_ = link::SafetyState::kOperational;

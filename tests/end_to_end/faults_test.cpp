@@ -45,7 +45,7 @@ TEST(Faults, CupsThatLeakHoldOrAreTriedAgain) {
 
 // Into its chute, into another, which the journal then names, on the belt or beside it.
 TEST(Faults, WhatFallsOnTheWayIsAccountedFor) {
-  const Faulty run = run_with("drop: {a_pick: 0.25}\n", 30, 10);
+  const Faulty run = run_with("drop: {a_pick: 0.25}\n", 30, 7);
   EXPECT_GE(run.injected("drop"), 5);
   EXPECT_GE(
       run.report["parcels"]["exceptions"]["reasons"].value("fell into chute_#", json::object()).value("undeserved", 0),
