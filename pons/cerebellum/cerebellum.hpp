@@ -141,7 +141,7 @@ class Cerebellum {
   void advance(Time now);
   void follow(Time now);
   bool leave_commanded(link::StopCause cause);
-  void widen_to_stop();
+  void widen_to_stop(AxisLimits& limits) const;
   double plan_stop();
   [[nodiscard]] double stop_duration_s() const;
   [[nodiscard]] double drive_use_of_stop();

@@ -1,6 +1,14 @@
 #include "pons/cerebellum/computed_torque.hpp"
 
+#include <cmath>
+
 namespace pons::cerebellum {
+namespace {
+
+// Times its speed limit: no motion of its own is as fast; then so many times as hard as its acceleration limit.
+constexpr double kThrown = 1.1, kThrownBrakes = 5;
+
+}  // namespace
 
 void computed_torque(model::RobotModel& model, const Gains& gains, const ArmNow& arm, const AxisState& commanded,
                      const AxisState& acting, double dt_s, Corrections& corrections,
@@ -33,8 +41,9 @@ void give_way(model::RobotModel& model, const Gains& gains, const ArmNow& arm, C
   const AxisLimits& limits = model.robot().limits;
   const AxisVector& most = limits.acceleration_rad_s2;
   const AxisVector brake = -gains.brake_1_s * arm.speed;
-  const auto thrown = arm.speed.cwiseAbs().array() > limits.speed_rad_s.array();
-  const AxisVector wanted = thrown.select(brake, brake.cwiseMin(most).cwiseMax(-most));
+  AxisVector wanted = brake.cwiseMin(most).cwiseMax(-most);
+  for (Eigen::Index i = 0; i < wanted.size(); ++i)
+    if (std::abs(arm.speed[i]) > kThrown * limits.speed_rad_s[i]) wanted[i] *= kThrownBrakes;
   corrections.sent.push(corrections.integral);
   model.inverse_dynamics(arm.position, arm.speed, wanted, arm.payload, torque_nm);
 }

@@ -147,7 +147,8 @@ TEST(GiveWay, BrakesGentlyButWhatWasThrown) {
   AxisVector speed = AxisVector::Zero(6), wanted = speed, torque, exact;
   speed[0] = 0.01, wanted[0] = -gains.brake_1_s * speed[0];
   speed[1] = -0.9 * limits.speed_rad_s[1], wanted[1] = limits.acceleration_rad_s2[1];
-  speed[4] = 2.5 * limits.speed_rad_s[4], wanted[4] = -gains.brake_1_s * speed[4];
+  speed[4] = 2.5 * limits.speed_rad_s[4], wanted[4] = -5 * limits.acceleration_rad_s2[4];
+  speed[5] = 1.05 * limits.speed_rad_s[5], wanted[5] = -limits.acceleration_rad_s2[5];
   const AxisVector& at = bench_robot().home;
   give_way(model, gains, {at, speed, {}}, corrections, torque);
   model.inverse_dynamics(at, speed, wanted, {}, exact);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "pons/cerebellum/test_bench.hpp"
 #include "pons/core/gravity.hpp"
@@ -221,13 +222,14 @@ TEST(StopCauses, AreAllHereThatBrakeAndCanBeConfirmed) {
 
 struct Braking {
   double took_s = 0, shortest_s = 0;
-  std::uint64_t saturated = 0;
+  double began_rad = 0, ended_rad = 0;  // axis 2, commanded
+  std::uint64_t saturated = 0, violations = 0;
 };
 
 // 3 kg on their way down, stretched out, so long after they began.
-Braking brake_a_load(Duration after) {
+Braking brake_a_load(Duration after, std::optional<double> axis_2_max_rad = {}) {
   const model::Payload load{.mass_kg = 3, .com_m = {0, 0, 0.25}};
-  Bench bench({.step = 1ms, .payload = load});
+  Bench bench({.step = 1ms, .payload = load, .axis_2_max_rad = axis_2_max_rad});
   link::Command told = plain_command(CommandKind::kPayload);
   told.payload_kg = load.mass_kg;
   std::ranges::copy(std::array{0.0, 0.0, 0.25}, told.payload_com_m.begin());
@@ -247,15 +249,18 @@ Braking brake_a_load(Duration after) {
   bench.run(after);
   EXPECT_TRUE(bench.operational());
   const std::uint64_t before = bench.cerebellum.statistics().saturated;
-  Braking braking{.shortest_s = shortest_stop_s(bench.state().commanded)};
+  Braking braking{.shortest_s = shortest_stop_s(bench.state().commanded),
+                  .began_rad = bench.state().commanded.position[1]};
   const Time began = bench.now;
   bench.send(plain_command(CommandKind::kProtectiveStop));
   bench.tick();
-  while (!is_at_rest(bench.state().commanded)) bench.tick();
+  for (int ticks = 0; ticks < 500 && !is_at_rest(bench.state().commanded); ++ticks) bench.tick();
   braking.took_s = to_s(bench.now - began);
+  braking.ended_rad = bench.state().commanded.position[1];
   bench.run(500ms);
   EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
   braking.saturated = bench.cerebellum.statistics().saturated - before;
+  braking.violations = bench.cerebellum.statistics().violations;
   return braking;
 }
 
@@ -265,9 +270,20 @@ TEST(StopOfALoad, IsNoHarderThanTheDrivesAre) {
   for (Duration after = 50ms; after <= 600ms; after += 25ms) {
     const Braking braking = brake_a_load(after);
     EXPECT_EQ(braking.saturated, 0u) << to_s(after) << " s after it began";
+    EXPECT_LT(braking.took_s, 0.33) << "at half the limits, from full speed: docs/safety.md";
     if (braking.took_s > braking.shortest_s + 5e-3) ++longer;
   }
   EXPECT_GT(longer, 0) << "else this asks nothing of the drives";
+}
+
+// More gently, it would go beyond.
+TEST(StopOfALoad, GoesBeyondNoLimitThatTheHardestStopKeeps) {
+  const Braking free = brake_a_load(600ms);
+  ASSERT_GT(free.took_s, free.shortest_s + 0.02) << "else it is none that brakes gently";
+  const double near_rad = free.began_rad + 0.97 * (free.ended_rad - free.began_rad);
+  const Braking near = brake_a_load(600ms, near_rad);
+  EXPECT_LE(near.ended_rad, near_rad);
+  EXPECT_EQ(near.violations, 0u);
 }
 
 TEST(StopLatch, ResetIsRefusedWhileTheWordOrTheInputIsHeld) {

@@ -13,7 +13,7 @@ namespace pons::cerebellum {
 namespace {
 
 // Of the acceleration limits, tried one after the other until the drives can give what that takes.
-constexpr std::array kBrakingShares = {1.0, 0.85, 0.72, 0.61, 0.52, 0.44, 0.37, 0.31};
+constexpr std::array kBrakingShares = {1.0, 0.85, 0.72, 0.61, 0.52};
 constexpr double kDriveShare = 0.95;  // of the drives' torques: the rest is for what the load's swinging adds
 constexpr int kLooks = 12;            // at the torques of a stop: 30 ms apart where it is a long one
 
@@ -41,7 +41,10 @@ bool Cerebellum::stop(StopCause cause, Time now) {
     const bool gave_way = leave_commanded(cause);
     stop_began_ = stepped_;
     stop_ends_ = std::max(now, stop_began_ + from_s(plan_stop()));
-    if (gave_way) widen_to_stop();
+    if (gave_way) {  // what is pushed towards a limit may have to go beyond it: that breaks none
+      widen();
+      widen_to_stop(limits_);
+    }
     queue_.rest(commanded_.position, stop_ends_);
   }
   log_.write(now, "{} stop: {}",
@@ -71,34 +74,42 @@ bool Cerebellum::leave_commanded(StopCause cause) {
   return true;
 }
 
-// What is pushed towards a limit may have to go beyond it: that breaks none.
-void Cerebellum::widen_to_stop() {
-  widen();
+// To where the planned stop goes.
+void Cerebellum::widen_to_stop(AxisLimits& limits) const {
   for (Eigen::Index i = 0; i < commanded_.position.size(); ++i) {
     const auto extent = stop_profiles_[static_cast<std::size_t>(i)].extent();
-    limits_.position_min[i] = std::min(limits_.position_min[i], extent.position_min);
-    limits_.position_max[i] = std::max(limits_.position_max[i], extent.position_max);
+    limits.position_min[i] = std::min(limits.position_min[i], extent.position_min);
+    limits.position_max[i] = std::max(limits.position_max[i], extent.position_max);
   }
 }
 
 // Returns how long it takes. The limits are each axis' own. Where all of them brake a heavy load at once, the drives
-// may be too weak for that: an arm that is told to is thrown off its way. So it brakes as hard as they can.
+// may be too weak for that: an arm that is told to is thrown off its way. So it brakes as gently as they need, but goes
+// beyond no position limit that the hardest stop keeps.
 double Cerebellum::plan_stop() {
   const auto profiles = std::span(stop_profiles_).first(static_cast<std::size_t>(commanded_.position.size()));
   AxisLimits braking = limits();
-  double best = 1, least_use = std::numeric_limits<double>::infinity();
   const auto plan = [&](double share) {
     braking.acceleration_rad_s2 = share * limits().acceleration_rad_s2;
     motion::plan_stop(commanded_, braking, profiles);
   };
+  double best = 1, least_use = std::numeric_limits<double>::infinity();
   for (const double share : kBrakingShares) {
     plan(share);
+    AxisLimits reached = braking;
+    widen_to_stop(reached);
+    if (share == 1) {
+      if (is_at_rest(commanded_)) return stop_duration_s();
+      braking = reached;
+    } else if (reached.position_min != braking.position_min || reached.position_max != braking.position_max) {
+      break;
+    }
     const double use = drive_use_of_stop();
+    if (use <= kDriveShare) return stop_duration_s();
     if (use < least_use) {
       least_use = use;
       best = share;
     }
-    if (use <= kDriveShare) return stop_duration_s();
   }
   plan(best);
   return stop_duration_s();

@@ -63,6 +63,7 @@ std::filesystem::path scaled_urdf(const std::filesystem::path& urdf, double by) 
 model::RobotModel controller_model(const PlantSettings& plant) {
   world::Robot robot = bench_robot();
   robot.drive_delay_s = to_s(plant.told_delay);
+  if (plant.axis_2_max_rad) robot.limits.position_max[1] = *plant.axis_2_max_rad;
   return model::RobotModel::load(robot).value();
 }
 

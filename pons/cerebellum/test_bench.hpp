@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,12 @@ namespace pons::cerebellum {
 [[nodiscard]] const world::Robot& bench_robot();
 
 struct PlantSettings {
-  Duration step{2'000'000};  // the plant's own; measurements are as old as that
-  double masses = 1;         // of the plant over the controller's model
-  model::Payload payload;    // what the plant carries, told or not
-  Duration drive_delay{0};   // whole milliseconds: set-points act so much later
-  Duration told_delay{0};    // what the controller takes that for
+  Duration step{2'000'000};              // the plant's own; measurements are as old as that
+  double masses = 1;                     // of the plant over the controller's model
+  model::Payload payload;                // what the plant carries, told or not
+  Duration drive_delay{0};               // whole milliseconds: set-points act so much later
+  Duration told_delay{0};                // what the controller takes that for
+  std::optional<double> axis_2_max_rad;  // the controller's limit there, instead of the robot's
 };
 
 // Integrates the arm's dynamics (semi-implicit Euler); brakes hold it while the drives are off.

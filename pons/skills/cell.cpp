@@ -10,6 +10,7 @@
 #include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/grip.hpp"
+#include "pons/skills/left.hpp"
 #include "pons/world/view.hpp"
 
 namespace pons::skills {
@@ -30,9 +31,6 @@ constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;                    // the scale's
 constexpr std::uint32_t kFirstLeft = 0x8000'0000;     // tracks of what no camera has seen
 constexpr int kSeenBefore = 3;                        // at least: whoever asked for it trusted them
-constexpr double kSlides_m = 0.05;                    // when it is let go of just over the belt
-constexpr double kNoHigher_m = 0.01;                  // seen so far above another's place at most, and
-constexpr double kNoRoom_m = 0.05;                    // so far in it, something is there in its stead
 constexpr double kStoodUp_m = 0.10;                   // of what leans, or lies on another, where that was not known
 constexpr double kBeside_m = 0.05, kBounces_m = 0.2;  // the belt, what falls: it comes to lie on it, or may
 constexpr double kInstant_s = 0.001;
@@ -229,7 +227,7 @@ void Cell::dropped() {
 }
 
 void Cell::recognise(double rode_m) {
-  recognise_left();
+  recognise_left(left_, objects_, labelled_);
   for (auto& [track, code] : fallen_.recognise(objects_, rode_m, now_)) {
     note("recognised", {{"code", code}, {"track", track}});
     labelled_[track] = std::move(code);
@@ -269,22 +267,6 @@ void Cell::believe_felt() {
       felt_.reset();
     else
       object.world_from_top.translation().head<2>() += felt_->aside_m;
-  }
-}
-
-// Nothing else can have come to lie just there; and where something else is seen, nothing lies any more.
-void Cell::recognise_left() {
-  for (const ObjectBelief& object : objects_) {
-    if (object.track == 0) continue;
-    std::erase_if(left_, [&](const ObjectBelief& left) {
-      if (left.code.empty() || object.code == left.code) return !left.code.empty();
-      const Vector3 off = object.world_from_top.translation() - left.world_from_top.translation();
-      if (object.last_seen <= left.last_seen) return false;
-      if (!object.code.empty()) return off.z() < kNoHigher_m && apart_m(object, left) < -kNoRoom_m;
-      if (off.norm() >= kSlides_m) return false;
-      labelled_[object.track] = left.code;
-      return true;
-    });
   }
 }
 

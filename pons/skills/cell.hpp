@@ -235,7 +235,6 @@ class Cell {
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);
   [[nodiscard]] AxisLimits limits_loaded(double share) const;
   void recognise(double rode_m);
-  void recognise_left();
   void believe_felt();
   void take_in_cut();
   void watch_strays();

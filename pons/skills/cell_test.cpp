@@ -249,9 +249,11 @@ TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
 // With a label of its own, and no higher. Its neighbour overlaps it a little at most, and what hooked may have come to
 // lie on it.
 TEST_F(LeftOnBeltTest, WhereAnotherIsSeenItLiesNoMore) {
-  const auto is_left = [&](double x_m, double higher_m, const char* code) {
+  const auto is_left = [&](double x_m, double higher_m, const char* code, bool whole = true) {
     ObjectBelief other = seen(x_m, 0.05);
     other.code = code;
+    other.confidence = whole ? 1 : 0.3;
+    other.frames_seen = 3;
     other.world_from_top.translation().z() += higher_m;
     cell_.refresh(now_ + from_s(0.5), {other});
     return cell_.find("P000001") != nullptr;
@@ -259,6 +261,8 @@ TEST_F(LeftOnBeltTest, WhereAnotherIsSeenItLiesNoMore) {
   EXPECT_TRUE(is_left(0.36, 0, "P000002")) << "beside it";
   EXPECT_TRUE(is_left(0.2, 0, "")) << "unread";
   EXPECT_TRUE(is_left(0.2, 0.05, "P000002")) << "on it";
+  EXPECT_TRUE(is_left(0.2, -0.08, "P000002")) << "under it";
+  EXPECT_TRUE(is_left(0.2, -0.03, "P000002", false)) << "what of it shows may be measured wrong";
   EXPECT_FALSE(is_left(0.2, -0.03, "P000002"));
 }
 

@@ -57,7 +57,8 @@ std::vector<std::pair<std::uint32_t, std::string>> Fallen::recognise(const std::
                                                                      double rode_m, Time now) {
   std::erase_if(unseen_, [&](Unseen& unseen) {
     unseen.room.world_from_top.translation().x() += rode_m;
-    return unseen.room.world_from_top.translation().x() > belt_ends_m_;
+    const bool found = std::ranges::find(objects, unseen.code, &ObjectBelief::code) != objects.end();
+    return found || unseen.room.world_from_top.translation().x() > belt_ends_m_;
   });
   std::vector<std::pair<std::uint32_t, std::string>> recognised;
   std::erase_if(loads_, [&](Load& load) {

@@ -31,6 +31,7 @@ constexpr double kOverBelt_m = 0.36;                // of the tip, on a way in t
 constexpr double kSofter_m = 0.015;                 // than the longest fall that is allowed: sizes are measured
 constexpr double kMoreShare = 1.2, kMore_kg = 0.2;  // than was weighed: felt so much on the way,
 constexpr int kMoreTicks = 5;                       // for so long, another hangs on it
+constexpr double kFeltMost = 2;                     // times what is carried: more is a rim that holds it
 constexpr int kStruckMost = 3;                      // times something may be struck on the way
 constexpr Duration kLetGoEarly = std::chrono::milliseconds(15);
 constexpr double kAside_m = 0.004;    // a load hangs beside where the cups were believed to hold it, at most
@@ -78,6 +79,7 @@ class Place final : public ArmSkill {
       case Phase::kFall:
         break;
       case Phase::kHold:
+        if (cell_.arm.cups().phase == link::VacuumPhase::kLost) return begin_fall(now, *cell_.held);
         return now < arrives_ ? Progress{} : Progress{Status::kFailed, why_held_, {}};
     }
     return {Status::kFailed, "unreachable", {}};
@@ -113,8 +115,7 @@ class Place final : public ArmSkill {
     const link::StopCause cause = cell_.arm.state().cause;
     const bool struck = cause == link::StopCause::kCollision || cause == link::StopCause::kFollowingError;
     if (!std::exchange(stopped_, true) && struck) ++times_struck_;
-    if (times_struck_ < kStruckMost) return {};
-    return {Status::kFailed, fmt::format("{}: struck something {} times on the way", name_, times_struck_), {}};
+    return {};
   }
 
   void plan_anew() {
@@ -141,6 +142,8 @@ class Place final : public ArmSkill {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
     }
     if (!cell_.held->alone) return {Status::kFailed, "another hangs on " + cell_.held->code, {}};
+    if (times_struck_ >= kStruckMost)
+      return {Status::kFailed, fmt::format("{}: struck something {} times on the way", name_, times_struck_), {}};
     const world::Place* target = cell_.world.place(name_);
     if (target == nullptr) return {Status::kFailed, "no place '" + name_ + "' in this world", {}};
     if ((tried_ && now - *tried_ < kTryEvery) || (halfway_at_ && now < *halfway_at_)) return {};
@@ -269,7 +272,7 @@ class Place final : public ArmSkill {
       const std::string why = fmt::format("another hangs on {}: {:.2f} kg are felt where {:.2f} were weighed",
                                           cell_.held->code, *felt_kg, cell_.held->mass_kg);
       cell_.held->alone = false;
-      cell_.weighs(*felt_kg);
+      cell_.weighs(std::min(*felt_kg, kFeltMost * cell_.world.rules.max_mass_kg));
       hold(now, why);
       return {};
     }
@@ -394,6 +397,7 @@ class Place final : public ArmSkill {
 
   // Let go of over its mouth, whether a stop came then or not.
   Progress gone(Time now) {
+    cell_.await_no_more(let_go_);
     cell_.arm.expect_contact(0);
     return {Status::kSucceeded, {}, {{"place", name_}, {"object", let_go_}, {"seconds", to_s(now - started_)}}};
   }

@@ -184,8 +184,9 @@ TEST_F(CarriedTest, ItIsGivenUpWhenSomethingIsStruckAThirdTime) {
       }
       ++stops;
       stops_at({0.4, -0.3, 1.4}, cause);
-      for (int i = 0; i < 3 && progress.status == Status::kRunning; ++i) progress = skill->tick(now_);
+      for (int i = 0; i < 3; ++i) EXPECT_EQ(skill->tick(now_).status, Status::kRunning);
       is_armed_at({0.4, -0.3, 1.4});
+      progress = skill->tick(now_);
     }
     return std::pair(stops, progress);
   };

@@ -34,6 +34,18 @@ TEST_F(PickTest, WhatIsTooHeavyGoesBackClearOfItsNeighbour) {
   EXPECT_NEAR(let_go.z(), 0.045, 0.01) << "a corner of it hangs low";
 }
 
+// With one that hangs on it, it goes back to its very place: aside, that one might hang over the belt's edge.
+TEST_F(PickTest, WhatIsTooHeavyGoesStraightBackWhereAnotherIsFeltBesideIt) {
+  const Vector3 size_m{0.2, 0.15, 0.1};
+  const auto all = [&] { return std::vector{parcel(1, 0, 0, size_m), parcel(2, -0.19, 0, size_m)}; };
+  Vector3 let_go = Vector3::Zero();
+  const Progress progress =
+      take_first(all, 6, {0, 0.16, 0.05}, [&] { let_go = tip() - all()[0].world_from_top.translation(); });
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_THAT(progress.reason, HasSubstr("overweight"));
+  EXPECT_LT(let_go.head<2>().norm(), 0.005);
+}
+
 // Lifted from another, it carries something along; all go back, and the arm looks again.
 TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
   const auto all = [&] {

@@ -21,6 +21,7 @@ constexpr int kRounds = 3;
 constexpr double kBack_m_s2 = 2.5;       // the less, the softer it is lowered
 constexpr double kHeavyBack_m_s2 = 0.8;  // sideways, where bellows let what is heavy swing like a pendulum,
 constexpr Duration kSwingsOut = std::chrono::milliseconds(350);  // before that, and after it
+constexpr double kNear_m = 0.4;          // of its place: from further away the straight way is not clear
 constexpr double kBeside_m = 0.01;       // from over its place, coming down would bring it against what stands there
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
@@ -33,6 +34,8 @@ bool SetDown::goes_back(Time now) {
   if (held.alone || !held.from_m) return false;
   if (held.from_m->x() + cell_.belt_travel_m(now) > cell_.world.belt.pick_x_max_m) return false;
   const Pose tip = cell_.model.world_from_tip(cell_.arm.planned(cell_.arm.splice_time(now)).position);
+  const Vector3 place = *held.from_m + cell_.belt_travel_m(now) * Vector3::UnitX();
+  if ((tip.translation() - place).head<2>().norm() > kNear_m) return false;
   return begin_back(now, *held.from_m + kPutBack_m * Vector3::UnitZ(), tip.linear()).has_value();
 }
 
@@ -41,6 +44,7 @@ Expected<void> SetDown::begin(Time now) {
   back_.reset();
   top_z_m_.reset();
   if (heavy()) height_ = std::max(height_, kHeavyFrom);
+  if (!cell_.held->alone) height_ = kOverBelt_m.size() - 1;  // who hangs on it hangs lower, maybe
   Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
   for (; height_ < kOverBelt_m.size() && !way; ++height_) {
     way = way_to_belt(now, kOverBelt_m[height_]);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "pons/skills/test_kit.hpp"
 
@@ -12,9 +13,12 @@ namespace {
 class SetDownTest : public ObedientArmTest {
  protected:
   // Between the belt and the load's underside, when it is let go of.
-  double let_go_over_belt_m(double mass_kg) {
+  double let_go_over_belt_m(double mass_kg, std::optional<Vector3> lifted_from_m = {}) {
     is_stopped_at({0.2, 0, 1.3});
+    opened_ = false;
     cell_.held = held_;
+    cell_.held->alone = !lifted_from_m;
+    cell_.held->from_m = lifted_from_m;
     cell_.weighs(mass_kg);
     SetDown set_down(cell_);
     for (int i = 0; i < 100 && !set_down.begin(now_); ++i) pass();  // it searches so far a tick
@@ -33,6 +37,14 @@ class SetDownTest : public ObedientArmTest {
 TEST_F(SetDownTest, WhatIsTooHeavyIsLetGoOfHigherForACornerOfItHangsLow) {
   EXPECT_NEAR(let_go_over_belt_m(1.2), 0.03, 0.005);
   EXPECT_NEAR(let_go_over_belt_m(5.5), 0.08, 0.005);
+}
+
+// From near its place it goes back there, just over it; from afar it is brought to the belt as any other, but higher.
+TEST_F(SetDownTest, WhatDoesNotHangAloneGoesStraightBackOnlyFromNearby) {
+  const double top_m = world_.belt.surface_z_m + held_.load.size_m.z();
+  EXPECT_LT(let_go_over_belt_m(1.2, Vector3(0.25, 0.05, top_m)), 0.02);
+  EXPECT_NEAR(tip_now().x(), 0.25, 0.01);
+  EXPECT_NEAR(let_go_over_belt_m(1.2, Vector3(-0.4, 0.05, top_m)), 0.2, 0.005);
 }
 
 // On a belt that comes to rest meanwhile: what swings out beside its place comes down on its neighbour.
