@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -19,6 +20,7 @@ constexpr int kLooks = 2;                                   // at a bare label: 
 constexpr Duration kWaitsToRead = std::chrono::seconds(6);  // for one to be taken that lies on another, and to look
 constexpr double kNearBorder_m = 0.04;  // of the view: what stands on the belt leaves it sooner than its surface
 constexpr double kStopsShort_m = 0.01;  // of that
+constexpr double kUpstream_m = 0.15;    // nothing rides back, but what is believed may jump a little
 constexpr double kTaskTakes_s = 3.0, kPickTakes_s = 1.4;  // roughly, of an arm
 
 double label_view_end_m(const world::World& world) {
@@ -96,6 +98,7 @@ Decisions Dispatcher::observe(const std::vector<ObjectBelief>& beliefs, Time now
   Decisions decisions;
   for (const ObjectBelief& belief : beliefs) {
     if (!decided_.contains(belief.track)) decide(belief, beliefs, now, decisions);
+    follow(belief);
     if (!decisions.belt_waits) decisions.belt_waits = is_to_be_read(belief, beliefs, now, set_aside);
     if (decisions.belt_waits || !would_ride_past(belief)) continue;
     const bool may_be_asked_for = !decided_.contains(belief.track) && orders_.contains(belief.code);
@@ -131,6 +134,9 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     decided_.insert(belief.track);
     return;
   }
+  // Asked for, it would be sorted as the one that rides into the exception chute.
+  if (known.tries == 0 && known.rode_to_m && x_m < *known.rode_to_m - kUpstream_m)
+    return ride(belief, kRideTwice, decisions);
   if (too_large(belief.size_m, order->second)) {
     if (in_reach && x_m < label_view_end_m_) return;  // it, too, may be two
     return ride(belief, kRideTooLarge, decisions);
@@ -250,6 +256,17 @@ void Dispatcher::ride(const ObjectBelief& belief, std::string_view reason, Decis
   // Either code may be its own: whoever looks for that parcel finds the entry.
   for (const std::string& code : belief.disputed) let_ride(code), entry(code);
   if (belief.disputed.empty()) let_ride(belief.code), entry(belief.code);
+  if (belief.code.empty()) return;
+  std::optional<double>& rode_to_m = known_[belief.code].rode_to_m;
+  rode_to_m =
+      std::max(rode_to_m.value_or(-std::numeric_limits<double>::infinity()), belief.world_from_top.translation().x());
+}
+
+void Dispatcher::follow(const ObjectBelief& belief) {
+  const auto known = known_.find(belief.code);
+  if (known == known_.end() || !known->second.rode_to_m) return;
+  double& rode_to_m = *known->second.rode_to_m;
+  rode_to_m = std::max(rode_to_m, belief.world_from_top.translation().x());
 }
 
 void Dispatcher::let_ride(const std::string& code) {

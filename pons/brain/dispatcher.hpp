@@ -64,16 +64,18 @@ class Dispatcher final : public Brain {
 
  private:
   struct Known {
-    std::uint32_t track = 0;  // that carries the code now
-    int tries = 0;            // tasks asked for
-    bool asked = false;       // the last of them has no outcome yet
-    bool sorted = false;      // one of them succeeded: whoever else shows the code is a copy
-    bool rode = false;        // it was let go by
-    bool failed = false;      // the last one failed, and the parcel may turn up again
+    std::uint32_t track = 0;          // that carries the code now
+    int tries = 0;                    // tasks asked for
+    bool asked = false;               // the last of them has no outcome yet
+    bool sorted = false;              // one of them succeeded: whoever else shows the code is a copy
+    bool rode = false;                // it was let go by
+    std::optional<double> rode_to_m;  // so far along the belt it was seen then, under this code alone
+    bool failed = false;              // the last one failed, and the parcel may turn up again
     std::optional<Time> seen_again;
   };
 
   void decide(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now, Decisions& decisions);
+  void follow(const ObjectBelief& belief);
   [[nodiscard]] bool too_large(const Vector3& size_m, const Order& order) const;
   // Whether one downstream would ride past for an express parcel that itself can wait.
   [[nodiscard]] bool must_wait(const ObjectBelief& express, const std::vector<ObjectBelief>& all) const;

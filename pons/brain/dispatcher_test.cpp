@@ -217,6 +217,23 @@ TEST_F(DispatcherTest, ACopyOfASortedParcelRides) {
   EXPECT_EQ(only_reason(dispatcher_.observe({parcel(2, 0, "P1")}, at(9))), kRideTwice);
 }
 
+// A second label of one that rode by: under its code alone, what is seen upstream of it is another. Whose two codes it
+// was, nobody knows.
+TEST_F(DispatcherTest, ACopyOfWhatRodeByRides) {
+  ObjectBelief giant = parcel(1, 0.55, "P1");
+  giant.size_m.x() = 0.5;
+  EXPECT_EQ(only_reason(dispatcher_.observe({giant}, at(0))), kRideTooLarge);
+  giant.world_from_top.translation().x() = 0.7;
+  EXPECT_TRUE(dispatcher_.observe({giant}, at(0.3)).rides.empty());
+  EXPECT_EQ(dispatcher_.observe({parcel(2, 0.6, "P1")}, at(0.6)).tasks.size(), 1u) << "the same, measured anew";
+  giant = parcel(3, 0.55, "P3");
+  giant.size_m.x() = 0.5;
+  EXPECT_EQ(only_reason(dispatcher_.observe({giant}, at(1))), kRideTooLarge);
+  giant.world_from_top.translation().x() = 0.7;
+  EXPECT_TRUE(dispatcher_.observe({giant}, at(1.3)).rides.empty());
+  EXPECT_EQ(only_reason(dispatcher_.observe({parcel(4, 0.5, "P3")}, at(9))), kRideTwice);
+}
+
 TEST_F(DispatcherTest, AsksAgainForWhatFailedAndTurnsUp) {
   EXPECT_EQ(dispatcher_.observe({parcel(1, 0, "P1")}, at(0)).tasks.size(), 1u);
   dispatcher_.heard("P1", task::Outcome::kFailed);
