@@ -55,9 +55,11 @@ void take_in(Entry& entry, const std::string& place, const std::optional<bridge:
     entry.done = {outcome->run, outcome->stamp};
   }
   entry.last_reason = outcome->reason;
-  entry.fell_into.clear();
-  for (const Json& step : outcome->detail.value("steps", Json::array()))
-    entry.fell_into = task::text_of(step.value("detail", Json{}), "fell_into");
+  // A later task that does not find it says nothing else of where it lies.
+  for (const Json& step : outcome->detail.value("steps", Json::array())) {
+    const std::string into = task::text_of(step.value("detail", Json{}), "fell_into");
+    if (!into.empty()) entry.fell_into = into;
+  }
 }
 
 void stray(Entry& entry, const std::string& place, const std::pair<std::int64_t, Time>& when) {

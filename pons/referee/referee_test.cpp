@@ -117,6 +117,21 @@ TEST_F(RefereeTest, WhatRodeByAfterItWasSortedIsAnException) {
   EXPECT_EQ(verdict.lost, 1) << "B rode by before it was sorted";
 }
 
+// The chute stays named when it is asked for again and not found, but not once it was sorted after all.
+TEST_F(RefereeTest, WhatALaterTaskDoesNotFindLiesWhereItFell) {
+  for (const char* const id : {"A", "B"}) {
+    accept(id, id);
+    fell(id, "chute_3");
+    accept(std::string(id) + ".2", id);
+  }
+  end("A.2", Outcome::kFailed);
+  end("B.2", Outcome::kSucceeded);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_3"), parcel("B", Whereabouts::kChute, "chute_3")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.missorted, 1);
+}
+
 TEST_F(RefereeTest, ATaskThatPutsNothingAnywhereSaysNothing) {
   ride("A");
   ASSERT_TRUE(journal_->accept({.id = "A", .steps = {{"detect", {{"object", "A"}}}}}, Time{}));
