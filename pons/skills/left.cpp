@@ -1,7 +1,6 @@
 #include "pons/skills/left.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace pons::skills {
 namespace {
