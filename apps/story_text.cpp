@@ -144,6 +144,7 @@ std::string stray(const Json& d) {
 }
 
 std::string recognised(const Json& d) { return "on the belt again, as track " + text(d, "track"); }
+std::string mistaken(const Json& d) { return "track " + text(d, "track") + " is larger: another"; }
 
 const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"seen", seen},
@@ -172,6 +173,7 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"stopped", stopped},
     {"left_out", left_out},
     {"recognised", recognised},
+    {"mistaken", mistaken},
 };
 
 }  // namespace

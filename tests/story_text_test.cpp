@@ -24,6 +24,10 @@ TEST(StoryText, SaysWhereAParcelIsThatWasNotCounted) {
   EXPECT_EQ(told("stray", {{"code", "P1"}, {"fell_into", ""}}), "its chute's light curtain has not counted it");
 }
 
+TEST(StoryText, SaysThatAnotherWasTakenForIt) {
+  EXPECT_EQ(told("mistaken", {{"code", "P1"}, {"track", 7}}), "track 7 is larger: another");
+}
+
 TEST(StoryText, SaysWhatTheCupsHold) {
   EXPECT_EQ(told("carries", {{"load", nullptr}}), "the cups hold nothing");
   EXPECT_EQ(told("carries", {{"load", {{"code", "P1"}, {"mass_kg", 0.0}}}}), "the cups hold P1, not weighed yet");

@@ -219,15 +219,20 @@ void Cell::dropped() {
   const Vector3 lands = tip + falls_s / kInstant_s * (tip_soon - tip);
   const double beside_m = std::abs(lands.y() - world.belt.y_center_m) - 0.5 * world.belt.width_m;
   const Vector3& size_m = held->load.size_m;
+  const double top_m = std::min(tip.z(), world.belt.surface_z_m + size_m.maxCoeff());
   if (in_view(lands.x()) && beside_m < kBeside_m)
-    fallen_.fell(held->code, size_m, lands, objects_, now_);
+    fallen_.fell(held->code, size_m, lands, top_m, objects_, now_);
   else if (!in_view(lands.x()) && beside_m < kBounces_m)
-    fallen_.fell_unseen(held->code, size_m, lands, std::min(tip.z(), world.belt.surface_z_m + size_m.maxCoeff()));
+    fallen_.fell_unseen(held->code, size_m, lands, top_m);
   holds_nothing();
 }
 
 void Cell::recognise(double rode_m) {
   recognise_left(left_, objects_, labelled_);
+  for (const auto& [track, code] : fallen_.take_mistaken(objects_)) {
+    note("mistaken", {{"code", code}, {"track", track}});
+    if (labelled_.erase(track) > 0) strays->dropped(world.arm, code, now_);
+  }
   for (auto& [track, code] : fallen_.recognise(objects_, rode_m, now_)) {
     note("recognised", {{"code", code}, {"track", track}});
     labelled_[track] = std::move(code);

@@ -256,7 +256,7 @@ class Cell {
   std::vector<ObjectBelief> objects_;
   std::vector<Watched> watched_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
-  Fallen fallen_{world.belt.x_end_m};
+  Fallen fallen_{view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m};
   std::optional<Felt> felt_;                       // of the last one
   std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since
   std::uint32_t lefts_ = 0;

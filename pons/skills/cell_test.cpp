@@ -172,6 +172,20 @@ TEST_F(DroppedTest, OverTheBeltItIsAwaitedAndKnownByPlaceAndSize) {
   EXPECT_EQ(others[0].code, "P1") << "for the brain, too";
 }
 
+// Then it lies anywhere again.
+TEST_F(DroppedTest, WhatTurnsOutToBeLargerIsNotTakenForItAnyMore) {
+  loses_over({-0.2, 0, 1.2});
+  seen_ = {seen()};
+  pass();
+  ASSERT_NE(cell_.find("P1"), nullptr);
+  EXPECT_FALSE(cell_.strays->is_any_astray(world_.arm, "P2", now_));
+  seen_[0].size_m.y() = 0.2;
+  seen_[0].frames_seen = 9;
+  pass();
+  EXPECT_EQ(cell_.find("P1"), nullptr);
+  EXPECT_TRUE(cell_.strays->is_any_astray(world_.arm, "P2", now_));
+}
+
 TEST_F(DroppedTest, OverAChuteOrOutOfViewItIsNot) {
   loses_over({-0.2, 0.46, 1.2});
   EXPECT_FALSE(cell_.awaits("P1"));

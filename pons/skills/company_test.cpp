@@ -82,5 +82,12 @@ TEST_F(FeltTest, WhatIsLighterThanWhenAnotherHungOnItIsUneven) {
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.6, 1.3, 2}), "B") << "but heavier than the last time";
 }
 
+// Nobody has seen who of two was left.
+TEST(WhoHungTest, IsAsHeavyAsWhatWasFeltBesideIt) {
+  EXPECT_TRUE(may_be_who_hung(0.28, {"A", 0.28, 0.47, 2}));
+  EXPECT_FALSE(may_be_who_hung(0.19, {"A", 0.47, 0.47, 1})) << "both hung there the last time";
+  EXPECT_FALSE(may_be_who_hung(0.47, {"A", 0.47, 0.47, 2})) << "it is uneven by itself";
+}
+
 }  // namespace
 }  // namespace pons::skills

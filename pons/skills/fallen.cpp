@@ -11,6 +11,7 @@ constexpr Duration kAwaited = std::chrono::milliseconds(3500);
 constexpr double kAbout_m = 0.40;                      // it may bounce, slide and roll
 constexpr double kNear_m = 0.10;                       // from where it should land, mostly
 constexpr int kFrames = 2;                             // in which it was seen: the first may show it still falling
+constexpr int kWellSeen = 4;                           // frames that show it as it is
 constexpr double kAsLarge_m = 0.015, kAsLarge = 0.06;  // two measurements of one side
 
 // Whichever side it lies on.
@@ -19,16 +20,21 @@ bool as_large(Vector3 a, Vector3 b) {
   return ((a - b).cwiseAbs().array() <= (kAsLarge * a).cwiseMax(kAsLarge_m).array()).all();
 }
 
+bool is_larger(Vector3 seen, Vector3 than) {
+  std::ranges::sort(seen), std::ranges::sort(than);
+  return ((seen - than).array() > (kAsLarge * than).cwiseMax(kAsLarge_m).array()).any();
+}
+
 bool is_believed(std::uint32_t track, const std::vector<ObjectBelief>& objects) {
   return std::ranges::find(objects, track, &ObjectBelief::track) != objects.end();
 }
 
 }  // namespace
 
-void Fallen::fell(std::string code, const Vector3& size_m, const Vector3& lands_m,
+void Fallen::fell(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m,
                   const std::vector<ObjectBelief>& objects, Time now) {
   forget(code);
-  Load load{.code = std::move(code), .size_m = size_m, .lands_m = lands_m, .fell = now};
+  Load load{.code = std::move(code), .size_m = size_m, .lands_m = lands_m, .top_m = top_m, .fell = now};
   for (const ObjectBelief& object : objects) {
     load.known.push_back(object.track);
     if (object.track != 0 && as_large(object.size_m, size_m)) load.as_large.push_back(object.track);
@@ -61,15 +67,33 @@ std::vector<std::pair<std::uint32_t, std::string>> Fallen::recognise(const std::
     return found || unseen.room.world_from_top.translation().x() > belt_ends_m_;
   });
   std::vector<std::pair<std::uint32_t, std::string>> recognised;
+  std::vector<Load> in_vain;
   std::erase_if(loads_, [&](Load& load) {
     load.lands_m.x() += rode_m;
-    if (now > load.fell + kAwaited || std::ranges::find(objects, load.code, &ObjectBelief::code) != objects.end())
+    if (std::ranges::find(objects, load.code, &ObjectBelief::code) != objects.end()) return true;
+    if (now > load.fell + kAwaited) {
+      if (load.lands_m.x() > view_ends_m_ - kAbout_m) in_vain.push_back(load);
       return true;
+    }
     const ObjectBelief* const one = only_one(load, objects);
     if (one != nullptr) recognised.emplace_back(one->track, load.code);
+    if (one != nullptr) recognised_.push_back({one->track, load.code, load.size_m});
     return one != nullptr;
   });
+  for (const Load& load : in_vain) fell_unseen(load.code, load.size_m, load.lands_m, load.top_m);
   return recognised;
+}
+
+std::vector<std::pair<std::uint32_t, std::string>> Fallen::take_mistaken(const std::vector<ObjectBelief>& objects) {
+  std::vector<std::pair<std::uint32_t, std::string>> mistaken;
+  std::erase_if(recognised_, [&](const Recognised& one) {
+    const auto object = std::ranges::find(objects, one.track, &ObjectBelief::track);
+    if (object == objects.end()) return true;
+    const bool too_large = object->frames_seen >= kWellSeen && is_larger(object->size_m, one.size_m);
+    if (too_large) mistaken.emplace_back(one.track, one.code);
+    return too_large;
+  });
+  return mistaken;
 }
 
 const ObjectBelief* Fallen::only_one(const Load& load, const std::vector<ObjectBelief>& objects) {

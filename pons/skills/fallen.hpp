@@ -18,16 +18,21 @@ namespace pons::skills {
 // One thread.
 class Fallen {
  public:
-  explicit Fallen(double belt_ends_m) : belt_ends_m_(belt_ends_m) {}
+  // Where, along the belt, cameras see it last, and where it ends.
+  Fallen(double view_ends_m, double belt_ends_m) : view_ends_m_(view_ends_m), belt_ends_m_(belt_ends_m) {}
 
-  // It lands about there, world frame, while `objects` are believed.
-  void fell(std::string code, const Vector3& size_m, const Vector3& lands_m, const std::vector<ObjectBelief>& objects,
-            Time now);
+  // It lands about there, world frame, while `objects` are believed, and stands no higher than `top_m`.
+  void fell(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m,
+            const std::vector<ObjectBelief>& objects, Time now);
   // Each tick, with the belt having ridden on: the tracks that are recognised now, by their codes. Nothing is while two
-  // might be it, or while anything as large that was believed then no longer is: it may be that, found again.
+  // might be it, or while anything as large that was believed then no longer is: it may be that, found again. What is
+  // awaited in vain near the view's end lies beyond it, maybe.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, std::string>> recognise(const std::vector<ObjectBelief>& objects,
                                                                              double rode_m, Time now);
-  // The same beyond the cameras' view, where it stands no higher than `top_m`.
+  // Of those recognised, by a side or two of which more was hidden, as it turns out now: tracks that are too large.
+  [[nodiscard]] std::vector<std::pair<std::uint32_t, std::string>> take_mistaken(
+      const std::vector<ObjectBelief>& objects);
+  // The same beyond the cameras' view.
   void fell_unseen(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m);
   // What lies there, without track and label, riding at that speed: room that may be taken.
   void add_unseen(std::vector<ObjectBelief>& objects, double speed_m_s, Time now) const;
@@ -40,6 +45,7 @@ class Fallen {
   struct Load {
     std::string code;
     Vector3 size_m, lands_m;
+    double top_m;
     Time fell;
     std::vector<std::uint32_t> known, as_large;  // tracks then, and those of its size
   };
@@ -50,9 +56,16 @@ class Fallen {
     ObjectBelief room;
   };
 
-  double belt_ends_m_;
+  struct Recognised {
+    std::uint32_t track;
+    std::string code;
+    Vector3 size_m;
+  };
+
+  double view_ends_m_, belt_ends_m_;
   std::vector<Load> loads_;
   std::vector<Unseen> unseen_;
+  std::vector<Recognised> recognised_;  // and believed still
 };
 
 }  // namespace pons::skills

@@ -20,7 +20,7 @@ class FallenTest : public testing::Test {
   // One of that size about there.
   static ObjectBelief like_it(std::uint32_t track = 7) { return box(track, {0.302, 0.196, 0.105}, 0.2); }
   void falls(const std::vector<ObjectBelief>& believed = {}) {
-    fallen_.fell("A", {0.3, 0.2, 0.1}, {0.1, 0.1, 0.9}, believed, at(10));
+    fallen_.fell("A", {0.3, 0.2, 0.1}, {0.1, 0.1, 0.9}, 1.2, believed, at(10));
   }
   // As which track it is recognised; 0: none.
   std::uint32_t seen(const std::vector<ObjectBelief>& objects, double after_s = 1) {
@@ -30,7 +30,12 @@ class FallenTest : public testing::Test {
     EXPECT_EQ(recognised[0].second, "A");
     return recognised[0].first;
   }
-  Fallen fallen_{1.2};
+  [[nodiscard]] std::vector<ObjectBelief> rooms() const {
+    std::vector<ObjectBelief> objects;
+    fallen_.add_unseen(objects, 0.2, at(10));
+    return objects;
+  }
+  Fallen fallen_{0.9, 1.2};
 };
 
 TEST_F(FallenTest, WhatIsSeenFirstAboutThereAndIsAsLargeIsIt) {
@@ -92,11 +97,6 @@ TEST_F(FallenTest, AfterAWhileOrOnceItsCodeIsReadNothingIsAwaited) {
 }
 
 TEST_F(FallenTest, BeyondTheViewItIsInTheWayUntilItHasRiddenOff) {
-  const auto rooms = [&] {
-    std::vector<ObjectBelief> objects;
-    fallen_.add_unseen(objects, 0.2, at(10));
-    return objects;
-  };
   fallen_.fell_unseen("A", {0.3, 0.2, 0.1}, {0.6, 0.1, 0.9}, 1.2);
   ASSERT_EQ(rooms().size(), 1U);
   EXPECT_EQ(rooms()[0].track, 0U) << "nobody picks it";
@@ -124,6 +124,38 @@ TEST_F(FallenTest, WhatIsKnownToLieElsewhereIsNotRecognised) {
   fallen_.forget("A");
   EXPECT_FALSE(fallen_.awaits("A"));
   EXPECT_EQ(seen({like_it()}), 0);
+}
+
+// It bounced or rolled beyond the view.
+TEST_F(FallenTest, AwaitedInVainNearTheViewsEndItIsInTheWay) {
+  falls();
+  EXPECT_EQ(seen({}, 4), 0);
+  EXPECT_TRUE(rooms().empty()) << "a camera would have shown it";
+  falls();
+  (void)fallen_.recognise({}, 0.45, at(11));
+  EXPECT_TRUE(rooms().empty());
+  EXPECT_EQ(seen({}, 4), 0);
+  ASSERT_EQ(rooms().size(), 1U);
+  EXPECT_NEAR(rooms()[0].world_from_top.translation().x(), 0.55, 1e-9);
+  EXPECT_EQ(rooms()[0].world_from_top.translation().z(), 1.2);
+}
+
+// Two sides of a higher one were seen first.
+TEST_F(FallenTest, WhatTurnsOutToBeLargerWasMistaken) {
+  const auto mistaken = [&](const Vector3& size_m, int frames) {
+    ObjectBelief object = box(7, size_m, 0.2);
+    object.frames_seen = frames;
+    return fallen_.take_mistaken({object});
+  };
+  falls();
+  ASSERT_EQ(seen({like_it()}), 7);
+  EXPECT_TRUE(mistaken({0.305, 0.2, 0.2}, 3).empty()) << "not well seen yet";
+  EXPECT_TRUE(mistaken({0.305, 0.15, 0.1}, 9).empty()) << "something hides a part of it";
+  const auto found = mistaken({0.305, 0.2, 0.2}, 4);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].first, 7U);
+  EXPECT_EQ(found[0].second, "A");
+  EXPECT_TRUE(mistaken({0.305, 0.2, 0.2}, 5).empty()) << "once";
 }
 
 }  // namespace

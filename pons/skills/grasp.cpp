@@ -177,7 +177,8 @@ task::Progress not_there(const Cell& cell, const std::string& code) {
   if (cell.disputed(code)) return {Status::kFailed, "it shows two codes", {}};
   const std::string* const place = cell.strays->place_of(code);
   if (place == nullptr) return {Status::kFailed, "lost from sight", {}};
-  return {Status::kException, "came along with another, into " + *place, {{"fell_into", *place}}};
+  const char* const how = cell.strays->may_have_fallen(code) ? "it or its neighbour fell" : "came along with another,";
+  return {Status::kException, fmt::format("{} into {}", how, *place), {{"fell_into", *place}}};
 }
 
 std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {

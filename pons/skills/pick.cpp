@@ -147,6 +147,7 @@ class Pick final : public ArmSkill {
     const world::Belt& belt = cell_.world.belt;
     if (auto never = never_taken(cell_.world, *object)) return *std::move(never);
     if (must_look_again(*object, now)) return step_aside(now), Progress{};
+    if (cell_.strays->may_have_fallen(code_)) return not_there(cell_, code_);
     if (const auto other = tied_to(cell_, *object)) {
       if (!untangles(now)) return {Status::kFailed, *other, {}};
       return step_aside(now), Progress{};
@@ -372,6 +373,7 @@ class Pick final : public ArmSkill {
     cell_.lost.reset();
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * cell_.held->load.size_m.prod());
     cell_.bears(expected_kg_);
+    unseen_ = std::ranges::count(cell_.left(), code_, &ObjectBelief::code) > 0;
     cell_.lifted(seen != nullptr ? *seen : target_);
     phase_ = Phase::kLift;
     return {};
@@ -408,6 +410,8 @@ class Pick final : public ArmSkill {
     const bool alone = cell_.held->alone || hooked || mass > kTogether * limit;
     if (mass > limit && alone) return begin_put_back(now, beside ? 0 : kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
+    if (!beside && mass <= limit && hooked && unseen_ && may_be_who_hung(mass, *hooked))
+      return begin_put_back(now, kPutAside, {Status::kException, "it may be what hung on it: nobody has seen it", {}});
     if (!beside && mass <= limit) return success(now);
     cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
     const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
@@ -468,7 +472,7 @@ class Pick final : public ArmSkill {
   GraspSearch search_;
   Presses presses_;
   int sealed_ticks_ = 0, quarters_ = 0;
-  bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false;
+  bool waiting_ = false, aside_ = false, stopped_ = false, cancelled_ = false, unseen_ = false;
 };
 
 }  // namespace

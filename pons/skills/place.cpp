@@ -318,8 +318,7 @@ class Place final : public ArmSkill {
       cell_.await_no_more(fallen_.code);
       cell_.mouths.expect_anywhere(now);  // it may have grazed that one
       fallen_.falls = cell_.falls();
-      into_ = chute;
-      counted_at_ = now;
+      count(*chute, now);
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
@@ -339,6 +338,16 @@ class Place final : public ArmSkill {
     cell_.mouths.expect_no_more();
     cell_.strays->dropped(cell_.world.arm, fallen_.code, now);
     return {Status::kFailed, "dropped", std::move(detail)};
+  }
+
+  // Grazed, a mouth counts, too, and the last one is where it went; unless another load lies on a rim: of two counts
+  // that of its own mouth is its own then, and the other that one's.
+  void count(const world::Place& chute, Time now) {
+    const bool another = into_ != nullptr && cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
+    const bool own_before = another && into_->name == name_;
+    if (another) cell_.strays->fell(cell_.world.arm, own_before ? chute.name : into_->name, now);
+    if (!own_before) into_ = &chute;
+    counted_at_ = now;
   }
 
   // A curtain counts what then bounces off its mouth's rim, too.

@@ -80,6 +80,30 @@ TEST_F(LostOverItsChuteTest, WhatIsCountedOnceItWasGivenUpIsNamed) {
   EXPECT_EQ(strays[0].place, "chute_2");
 }
 
+// One that lay on a rim falls off it when another load comes down.
+TEST_F(LostOverItsChuteTest, OfTwoCountsThatOfItsOwnMouthIsItsOwn) {
+  for (const std::size_t first : {0U, 1U}) {
+    pass();
+    cell_.strays->dropped(world_.arm, "P0", now_);
+    cell_.lost = held_;
+    cell_.lost->falls = falls_;
+    skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+    fell_ = now_;
+    ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+    for (const std::size_t place : {first, 1 - first}) {
+      ++falls_[place];
+      pass();
+      ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+    }
+    const Progress progress = ends(1.2, kThings);
+    EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    const std::vector<Stray> strays = cell_.strays->take_found_gone();
+    ASSERT_EQ(strays.size(), 1U);
+    EXPECT_EQ(strays[0].code, "P0");
+    EXPECT_EQ(strays[0].place, "chute_2");
+  }
+}
+
 // It may still be falling.
 TEST_F(LostOverItsChuteTest, APictureOfTheNextMomentSaysNothing) {
   const Progress progress = ends(0.2, kThings);

@@ -67,6 +67,33 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
   }
 }
 
+// Where no camera looks, the one that is left may be the other.
+TEST_F(PickTest, WhatMayBeWhatHungOnItRidesOn) {
+  const Vector3 size_m{0.2, 0.15, 0.1};
+  bool seen = true;
+  const auto all = [&] {
+    std::vector objects{parcel(9, -0.6, 0, size_m)};
+    if (seen) objects.push_back(parcel(1, 0.1, 0, size_m)), objects.push_back(parcel(2, 0.1, 0.16, size_m));
+    return objects;
+  };
+  EXPECT_EQ(take_first(all, 0.94, {0, 0.06, 0.05}, [&] { seen = false; }).status, Status::kRetry);
+  EXPECT_EQ(take_first(all, 0.56, {0, 0.06, 0.05}).status, Status::kRetry);
+  const Progress progress = take_first(all, 0.56, {0, 0.01, 0.05});
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_THAT(progress.reason, HasSubstr("it may be what hung on it"));
+  EXPECT_FALSE(cell_.held);
+}
+
+TEST_F(PickTest, WhatMayHaveFallenWhenItWasPutBackIsNotTaken) {
+  cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0, 0.2}}});
+  cell_.strays->put_back(world_.arm, "P1", now_ + from_s(60));
+  cell_.strays->fell(world_.arm, "chute_2", now_ + from_s(60));
+  const Progress progress = take_first([&] { return std::vector{parcel(1, 0.1, 0, {0.2, 0.15, 0.1})}; }, 1, {});
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_EQ(progress.reason, "it or its neighbour fell into chute_2");
+  EXPECT_EQ(progress.detail.value("fell_into", std::string()), "chute_2");
+}
+
 // Two that weigh too much together may be taken one by one.
 TEST_F(PickTest, WhatIsATooHeavyPairIsWeighedOnceMore) {
   for (const double again_kg : {3.0, 4.2}) {

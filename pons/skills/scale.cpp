@@ -50,11 +50,17 @@ Eigen::Vector2d moment_nm(Cell& cell) {
   return (tool.flange_from_tip.linear().transpose() * about_middle).head<2>();
 }
 
+constexpr double kBoth = 1.3, kSame = 0.9;  // of the mass of one of them
+
 constexpr double kFree_m = 0.06;     // between a load and the belt: it may hang lower than its size says
 constexpr double kFreed_m_s2 = 2.5;  // lifted so softly, it hardly swings
 constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 
 }  // namespace
+
+bool may_be_who_hung(double mass_kg, const Hooked& before) {
+  return before.most_kg > kBoth * mass_kg && mass_kg > kSame * before.mass_kg;
+}
 
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                    const std::optional<Hooked>& before) {

@@ -28,6 +28,10 @@ struct Beside {
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                                  const std::optional<Hooked>& before);
 
+// Whether a load that is felt to hang alone now may be the one that hung on it: it is as heavy as what was felt beside
+// its middle the last time, and once both were heavier. Only a camera tells who is left.
+[[nodiscard]] bool may_be_who_hung(double mass_kg, const Hooked& before);
+
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over all
 // readings, tells where it hangs.

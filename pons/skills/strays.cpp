@@ -9,6 +9,7 @@ namespace {
 constexpr std::size_t kRemembered = 64;                         // of those who are gone
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
 constexpr Duration kFalls = std::chrono::milliseconds(1000);    // from letting go to a curtain, perhaps another's
+constexpr Duration kClaimed = std::chrono::seconds(5);          // what fell: by then, or nobody knows whose it was
 constexpr Duration kAstray = std::chrono::seconds(30);          // after a load was dropped: something may push it
 constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
@@ -37,22 +38,26 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
   forget_oldest(doubted_);
 }
 
-void Strays::put_back(const std::string& arm, const std::string& load, Time now) {
+void Strays::put_back(const std::string& arm, const std::string& load, Time now) { leave(arm, load, now, true); }
+
+// What a curtain counted while it hung there may be itself: the cups are open a while before they are known to be.
+void Strays::leave(const std::string& arm, const std::string& load, Time now, bool put_back) {
+  const auto torn = std::ranges::find(torn_, load, &Torn::load);
+  const std::string place = torn != torn_.end() ? torn->place : std::string();
   leave_company(load, now);
-  doubt_itself(arm, load, now, true);
+  doubt_itself(arm, load, now, put_back);
+  if (!place.empty()) fell_beside(load, place, now);
 }
 
 // Whose label is known: of the others nobody could tell who it was.
 void Strays::leave_company(const std::string& load, Time now) {
   const auto hung = [&](const Doubted& one) { return one.load == load && !one.let_go; };
-  const auto torn = std::ranges::find(torn_, load, &Torn::load);
   std::erase_if(doubted_, [&](const Doubted& one) { return hung(one) && one.stray.code.empty(); });
   for (Doubted& one : doubted_) {
     if (!hung(one)) continue;
     one.let_go = now;
     one.put_back = true;
     one.gone = false;
-    if (torn != torn_.end()) one.stray.place = torn->place, one.fell = now;
   }
   std::erase_if(torn_, [&](const Torn& each) { return each.load == load; });
 }
@@ -89,19 +94,19 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
   const bool with_others = std::ranges::any_of(
       doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go && !one.stray.code.empty(); });
-  leave_company(load, now);
-  doubt_itself(arm, load, now, with_others);
+  leave(arm, load, now, with_others);
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   const auto torn = std::ranges::find_if(doubted_.rbegin(), doubted_.rend(), [&](const Doubted& one) {
     const bool told = one.told || (one.put_back && !one.stray.place.empty());
     const Duration within = one.stray.place.empty() && one.seen == Time{} ? kAstray : kTornOff;
-    return one.arm == arm && !told && !(one.let_go && now > *one.let_go + within);
+    const bool there = one.arm == arm || one.put_back;  // the belt carries it on to the next arm
+    return there && !told && !(one.let_go && now > *one.let_go + within);
   });
   if (torn == doubted_.rend()) {
     nobodys_.push_back({arm, place, now});
-    return forget_oldest(nobodys_);
+    return;
   }
   if (torn->put_back) return fell_beside(torn->load, place, now);
   torn_.push_back({torn->load, place});
@@ -167,6 +172,11 @@ void Strays::taken(std::uint32_t track) {
 }
 
 void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, Time now) {
+  std::erase_if(nobodys_, [&](const Fall& fall) {
+    const bool unclaimed = now > fall.time + kClaimed;
+    if (unclaimed) found_gone_.push_back({{}, fall.place});
+    return unclaimed;
+  });
   if (doubted_.empty()) return;
   for (const ObjectBelief& object : objects) {
     for (Doubted& one : doubted_) {
@@ -213,9 +223,21 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
   return found == doubted_.end() ? nullptr : &*found;
 }
 
+bool Strays::is_any_astray(const std::string& arm, const std::string& load, Time now) const {
+  return std::ranges::any_of(doubted_, [&](const Doubted& one) {
+    const bool lies_somewhere = one.track == kNoTrack && !one.put_back && !one.told && one.seen == Time{};
+    return lies_somewhere && one.arm == arm && one.load != load && now < one.let_go.value_or(now) + kAstray;
+  });
+}
+
 bool Strays::is_gone(const std::string& code) const {
   const Doubted* const found = of(code);
   return found != nullptr && found->gone;
+}
+
+bool Strays::may_have_fallen(const std::string& code) const {
+  const Doubted* const found = of(code);
+  return found != nullptr && found->put_back && found->fell;
 }
 
 bool Strays::missed_twice(const std::string& code) {

@@ -38,7 +38,7 @@ class Strays {
   // load. Once it is lifted again, it is not astray.
   void dropped(const std::string& arm, const std::string& load, Time now);
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
-  // moment, or is what was dropped.
+  // moment, or is what was dropped or put back, by whichever arm. Whose nobody tells soon is named without a code.
   void fell(const std::string& arm, const std::string& place, Time now);
   // What was let go of then is not counted where it should have fallen: it went where something of nobody's fell since.
   void uncounted(const std::string& arm, const std::string& load, Time let_go);
@@ -52,8 +52,13 @@ class Strays {
   void taken(std::uint32_t track);
   // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
   [[nodiscard]] const std::string* place_of(const std::string& code) const;
+  // Whether another than that load is astray: dropped by the arm not long ago, and nobody knows where.
+  [[nodiscard]] bool is_any_astray(const std::string& arm, const std::string& load, Time now) const;
   // It was found gone, and not seen since.
   [[nodiscard]] bool is_gone(const std::string& code) const;
+  // It was put back beside others, and since a curtain counted one of them no camera has seen it: what lies in its
+  // place may be another.
+  [[nodiscard]] bool may_have_fallen(const std::string& code) const;
   // The cups met nothing where it should lie. True once they have before, with no camera's having seen it meanwhile.
   [[nodiscard]] bool missed_twice(const std::string& code);
   // Those found gone since the last call.
@@ -86,6 +91,7 @@ class Strays {
   void fell_beside(const std::string& load, const std::string& place, Time now);
   [[nodiscard]] static bool has_stayed(const Doubted& one);
   void find_fallen();
+  void leave(const std::string& arm, const std::string& load, Time now, bool put_back);
   void leave_company(const std::string& load, Time now);
   void doubt_itself(const std::string& arm, const std::string& load, Time now, bool put_back);
   [[nodiscard]] const Doubted* of(const std::string& code) const;  // of one whose load was let go of

@@ -269,6 +269,9 @@ TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
 
   loses("B");
   look({box(12, "B", 0, 12)});
+  const std::vector<Stray> second = strays_.take_found_gone();
+  ASSERT_EQ(second.size(), 1U);
+  EXPECT_EQ(second[0].code, "") << "nobody's";
   loses("C");
   strays_.fell("arm", "chute_5", at(50));
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "one was seen again, and for the other it is too late";
@@ -293,6 +296,70 @@ TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
   look({}, 110);
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "who rode off is not doubted any more";
   EXPECT_EQ(place_of("C"), "");
+}
+
+// The cups open a while before it is known that they have.
+TEST_F(StraysTest, WhatACurtainCountsBeforeALoadIsPutBackMayBeTheLoad) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.fell("arm", "chute_2", at(10.9));
+  strays_.put_back("arm", "A", at(11));
+  look({});
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+  look({box(2, "B", 0, 11.5)});
+  look({box(2, "B", 0, 11.5)});
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "A");
+  EXPECT_EQ(gone[0].place, "chute_2");
+}
+
+TEST_F(StraysTest, OfTwoPutBackEitherMayHaveFallenUntilACameraSeesIt) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.put_back("arm", "A", at(11));
+  EXPECT_FALSE(strays_.may_have_fallen("A"));
+  strays_.fell("arm", "chute_1", at(12));
+  EXPECT_TRUE(strays_.may_have_fallen("A") && strays_.may_have_fallen("B"));
+  look({box(5, "A", 0, 12.5)});
+  EXPECT_FALSE(strays_.may_have_fallen("A"));
+  EXPECT_TRUE(strays_.may_have_fallen("B"));
+  carry({{3, "C", {0, 0}}});
+  look({});
+  EXPECT_EQ(place_of("C"), "chute_1");
+  EXPECT_FALSE(strays_.may_have_fallen("C")) << "it was never put back: it lies there, or went along";
+}
+
+TEST_F(StraysTest, WhatWasPutBackAndRidesOnMayFallWhereAnotherArmIs) {
+  strays_.put_back("arm", "A", at(11));
+  strays_.fell("other", "chute_4", at(13));
+  look({});
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "A");
+}
+
+TEST_F(StraysTest, WhatIsNobodysIsNamedWithoutACode) {
+  strays_.fell("arm", "chute_3", at(11));
+  look({}, 0, 15);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "somebody may still tell whose it is";
+  look({}, 0, 17);
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "");
+  EXPECT_EQ(gone[0].place, "chute_3");
+  look({}, 0, 30);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "once";
+}
+
+TEST_F(StraysTest, WhatWasDroppedIsAstrayForAWhileOrUntilItIsSeen) {
+  const auto any = [&](const char* arm, const char* load, double s) { return strays_.is_any_astray(arm, load, at(s)); };
+  EXPECT_FALSE(any("arm", "B", 11));
+  strays_.dropped("arm", "A", at(11));
+  EXPECT_TRUE(any("arm", "B", 20));
+  EXPECT_FALSE(any("arm", "A", 20)) << "itself";
+  EXPECT_FALSE(any("other", "B", 20));
+  EXPECT_FALSE(any("arm", "B", 50));
+  look({box(5, "A", 0, 12)});
+  EXPECT_FALSE(any("arm", "B", 20));
 }
 
 }  // namespace
