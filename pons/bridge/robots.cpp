@@ -113,12 +113,11 @@ task::Chance Bridge::chance(const Open& open, std::size_t robot) const {
 // What no robot that works can take any more is given to any: its skill says what has become of it. What waits for
 // something that a robot keeps which is gone, keeps nothing else from others meanwhile.
 Arbiter::Fits Bridge::fits() const {
-  if (robots_.size() == 1) return {};
   return [this, kept = kept_by_gone()](std::string_view id, std::size_t way) {
     const Open& open = *open_.find(id)->second;
     const std::size_t robot = open.robots[way];
     if (is_held(robot) || (!kept.empty() && needs_any(open, robot, kept))) return false;
-    if (open.begun || open.robots.size() == 1) return true;
+    if (open.begun) return true;
     const task::Chance own = chance(open, robot);
     if (own != task::Chance::kGone) return own == task::Chance::kNow;
     return std::ranges::all_of(open.robots, [&](std::size_t other) {

@@ -34,6 +34,8 @@ constexpr int kSeenBefore = 3;                        // at least: whoever asked
 constexpr double kStoodUp_m = 0.10;                   // of what leans, or lies on another, where that was not known
 constexpr double kBeside_m = 0.05, kBounces_m = 0.2;  // the belt, what falls: it comes to lie on it, or may
 constexpr double kInstant_s = 0.001;
+constexpr Duration kLingers = std::chrono::milliseconds(200);  // where another may have to come
+constexpr double kStands_m_s = 0.002;                          // a belt, by its encoder
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes
@@ -92,6 +94,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
     belt_acceleration_m_s2_ += share * (slope - belt_acceleration_m_s2_);
   }
   last_belt_speed_m_s_ = speed;
+  if (!belt_moved_ || speed > kStands_m_s) belt_moved_ = now;
   const auto ride = [&](ObjectBelief& object) {
     object.world_from_top.translation().x() += speed * passed_s;
     object.velocity_m_s.x() = speed;
@@ -340,6 +343,7 @@ double Cell::effort(const AxisVector& from, const AxisVector& to) const {
 void Cell::keep_clear(Time now) {
   if (!arm.operational() || now < arm.motion_end() || now < looked_at_ + kLookEvery) return;
   looked_at_ = now;
+  if (!held && now > arm.motion_end() + kLingers && stands_in_zone() && step_aside(now)) return;
   const Time from = arm.splice_time(now);
   const AxisVector rests = arm.planned(from).position;
   const Load* const load = held ? &held->load : nullptr;
@@ -381,8 +385,8 @@ task::Chance Cell::chance(std::string_view code) const {
   const double x_m = object->world_from_top.translation().x();
   const double rides_m = world.next_arm.empty() ? 0 : kTaking_s * belt_speed_m_s();
   if (x_m + rides_m > world.belt.pick_x_max_m) return task::Chance::kGone;
-  const bool comes = x_m < world.belt.pick_x_min_m - kComing_s * world.belt.speed_m_s;
-  return comes ? task::Chance::kNotYet : task::Chance::kNow;
+  const double coming_m = belt_stands() ? 0 : kComing_s * world.belt.speed_m_s;
+  return x_m < world.belt.pick_x_min_m - coming_m ? task::Chance::kNotYet : task::Chance::kNow;
 }
 
 bool Cell::stands_over(const world::Place& place) {

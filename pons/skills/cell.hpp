@@ -89,6 +89,8 @@ class Cell {
     const link::State& state = arm.state();
     return state.belt_travel_m + to_s(time - state.stamp) * state.belt_speed_m_s;
   }
+  // For a second at least: it waits for something.
+  [[nodiscard]] bool belt_stands() const { return belt_moved_ && now_ >= *belt_moved_ + kStandsAfter; }
   [[nodiscard]] double belt_acceleration_m_s2() const { return belt_acceleration_m_s2_; }
 
   // Whether a camera could see it on the belt there.
@@ -191,11 +193,13 @@ class Cell {
   // To rest, as softly as what is held was carried.
   [[nodiscard]] Expected<void> stop(Time now);
 
-  // For an arm that waits: up, with what it holds, before anything that rides along the belt meets it. Does nothing
-  // while it moves or where it is clear.
+  // For an arm that waits: with empty cups out of a zone between arms, where another may have to come; up, with what it
+  // holds, before anything that rides along the belt meets it. Does nothing while it moves or where it is clear.
   void keep_clear(Time now);
 
-  // Whether the arm could set out now to take that object off the belt. Of what nobody sees nothing is known: it could.
+  // Whether the arm could set out now to take that object off the belt. What is upstream of the pick zone of a belt
+  // that stands does not come: it may stand for something that this arm is to take first. Of what nobody sees nothing
+  // is known: it could.
   [[nodiscard]] task::Chance chance(std::string_view code) const;
   // Whether it stands where another arm may come once nobody holds the resource of that zone any more; any such zone.
   [[nodiscard]] bool stands_in(std::string_view zone);
@@ -241,6 +245,7 @@ class Cell {
   void add_unseen();
   [[nodiscard]] ObjectBelief across_belt(double from_m, double to_m, double width_m, double height_m) const;
 
+  static constexpr Duration kStandsAfter = std::chrono::seconds(1);
   static constexpr Duration kBeltHeldFor = std::chrono::milliseconds(50);
 
   [[nodiscard]] bool stands_over(const world::Place& place);
@@ -253,6 +258,7 @@ class Cell {
 
   double belt_acceleration_m_s2_ = 0;
   double last_belt_speed_m_s_ = 0;
+  std::optional<Time> belt_moved_;  // last
   std::vector<ObjectBelief> objects_;
   std::vector<Watched> watched_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_

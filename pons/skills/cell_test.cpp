@@ -97,6 +97,29 @@ TEST_F(RestTest, WhatItHoldsRisesToo) {
   EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.32 + 0.15 + 0.01);
 }
 
+// Another arm may have to come there, while what this one is to take does not come.
+using ZoneTest = ObedientArmTest;
+TEST_F(ZoneTest, AnArmThatWaitsLeavesTheZoneBetweenArms) {
+  world::Place& place = world_.places[0];
+  place.resource = "between";
+  opened_ = true;
+  stands(place.center_m + 0.3 * Vector3::UnitZ());
+  ASSERT_TRUE(cell_.stands_in_zone());
+  ASSERT_TRUE(cell_.arm.stop(now_)) << "it has come here just now";
+  const Time came = cell_.arm.motion_end();
+  const auto waits = [&](double s) {
+    for (const Time until = now_ + from_s(s); now_ < until; pass()) cell_.keep_clear(now_);
+  };
+  waits(0.15);
+  EXPECT_EQ(cell_.arm.motion_end(), came) << "it may be about to leave anyway";
+  cell_.held = held_;
+  waits(1);
+  EXPECT_TRUE(cell_.stands_in_zone()) << "what it holds has a place to go to";
+  cell_.held.reset();
+  waits(2);
+  EXPECT_FALSE(cell_.stands_in_zone());
+}
+
 class LeftOnBeltTest : public CarryTest {
  protected:
   void SetUp() override {

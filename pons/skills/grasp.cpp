@@ -172,6 +172,17 @@ std::optional<task::Progress> never_taken(const world::World& world, const Objec
   return Progress{Status::kFailed, "rode past the pick zone of " + world.arm, {}};  // another arm may take it
 }
 
+std::optional<task::Progress> better_left(const Cell& cell, const ObjectBelief& object) {
+  if (cell.strays->may_have_fallen(object.code)) return not_there(cell, object.code);
+  const world::Belt& belt = cell.world.belt;
+  const auto x_m = [](const ObjectBelief& one) { return one.world_from_top.translation().x(); };
+  if (x_m(object) >= belt.pick_x_min_m || !cell.belt_stands()) return std::nullopt;
+  const auto other = std::ranges::find_if(
+      cell.objects(), [&](const ObjectBelief& one) { return !one.code.empty() && belt.must_wait_for(x_m(one), 0); });
+  if (other == cell.objects().end()) return std::nullopt;
+  return task::Progress{task::Status::kFailed, "the belt waits for " + other->code, {}};
+}
+
 task::Progress not_there(const Cell& cell, const std::string& code) {
   using task::Progress, task::Status;
   if (cell.disputed(code)) return {Status::kFailed, "it shows two codes", {}};

@@ -53,6 +53,10 @@ struct GraspSearch {
 [[nodiscard]] Expected<Grasp> plan_grasp(Cell& cell, const AxisState& start, Time at, const ObjectBelief& object,
                                          const std::optional<Eigen::Matrix3d>& orientation, GraspSearch& search);
 
+// How the pick of one ends that may be another, or that waits upstream of the zone on a belt that waits for another:
+// the arm is needed for that one. Nothing: it goes on.
+[[nodiscard]] std::optional<task::Progress> better_left(const Cell& cell, const ObjectBelief& object);
+
 // How the pick of one ends that this arm can take no more, or never could; nothing if it can.
 [[nodiscard]] std::optional<task::Progress> never_taken(const world::World& world, const ObjectBelief& object);
 

@@ -147,7 +147,7 @@ class Pick final : public ArmSkill {
     const world::Belt& belt = cell_.world.belt;
     if (auto never = never_taken(cell_.world, *object)) return *std::move(never);
     if (must_look_again(*object, now)) return step_aside(now), Progress{};
-    if (cell_.strays->may_have_fallen(code_)) return not_there(cell_, code_);
+    if (auto left = better_left(cell_, *object)) return *std::move(left);
     if (const auto other = tied_to(cell_, *object)) {
       if (!untangles(now)) return {Status::kFailed, *other, {}};
       return step_aside(now), Progress{};

@@ -335,5 +335,20 @@ TEST_F(PickTest, WhenTheBeltStopsItComesNoFurtherThanIsClear) {
   EXPECT_LE(nearest_m, 0.01);
 }
 
+// What is at its end keeps the belt, and only this arm can take it.
+TEST_F(PickTest, WhatDoesNotComeIsLeftForWhatTheBeltWaitsFor) {
+  const double end_m = world_.belt.waits_at_m() + 0.01;
+  const auto all = [&] {
+    return std::vector{parcel(1, -0.9, 0, {0.2, 0.15, 0.1}), parcel(2, end_m, 0, {0.2, 0.15, 0.1})};
+  };
+  tick_with(all());
+  EXPECT_EQ(cell_.chance("P1"), task::Chance::kNow) << "it seems to come";
+  const Progress progress = take_first(all, 1, {});
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_EQ(progress.reason, "the belt waits for P2");
+  EXPECT_EQ(cell_.chance("P1"), task::Chance::kNotYet);
+  EXPECT_EQ(cell_.chance("P2"), task::Chance::kNow);
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -26,10 +26,6 @@ void Rest::tick(Time now) {
     if (now > cell_.arm.motion_end()) cell_.arm.control(link::Controller::kTracking);
     return;
   }
-  if (!cell_.held && cell_.stands_in_zone()) {
-    if (now > cell_.arm.motion_end()) (void)cell_.step_aside(now);
-    return;
-  }
   if (cell_.held && now >= since_ + kLeftAlone && !weighing_.tick(now)) return;
   cell_.keep_clear(now);
   if (!cell_.held || now < since_ + kLeftAlone) return;
