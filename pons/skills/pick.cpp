@@ -25,8 +25,7 @@ constexpr Duration kReplanEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(120);  // ahead of the hover point
 constexpr Duration kTryEvery = std::chrono::milliseconds(40);
 constexpr double kWayRound_s = 0.6;  // what a way round what is in the way may take longer
-constexpr Duration kBlockedFor = std::chrono::milliseconds(200);
-constexpr Duration kUnseenFor = std::chrono::milliseconds(1000);
+constexpr Duration kBlockedFor = std::chrono::milliseconds(200), kUnseenFor = std::chrono::milliseconds(1000);
 constexpr double kMoved_m = 0.0015;     // a prediction off by more is worth a new plan,
 constexpr double kElsewhere_m = 0.015;  // and by so much, when it is too late for one, another try
 constexpr double kDensity_kg_m3 = 150;  // of parcels, roughly: what the drives expect until then
@@ -170,8 +169,9 @@ class Pick final : public ArmSkill {
     if (!grasp) {
       if (cell_.router.spent()) return tried_.reset(), Progress{};
       ++quarters_;
-      // Out of reach upstream is a matter of waiting. Between neighbours it is one of letting them go first.
-      if (object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
+      // Out of reach or near an axis' limit is a matter of waiting, between neighbours one of letting them go first.
+      const bool rides = grasp.error().where == "motion" && cell_.belt_speed_m_s() > kStands_m_s;
+      if (rides || object->world_from_top.translation().x() < belt.pick_x_min_m) return {};
       if (!blocked_since_) blocked_since_ = now;
       return now - *blocked_since_ < kBlockedFor ? Progress{} : Progress{Status::kFailed, grasp.error().line(), {}};
     }

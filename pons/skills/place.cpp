@@ -340,10 +340,11 @@ class Place final : public ArmSkill {
     return {Status::kFailed, "dropped", std::move(detail)};
   }
 
-  // Grazed, a mouth counts, too, and the last one is where it went; unless another load lies on a rim: of two counts
-  // that of its own mouth is its own then, and the other that one's.
+  // Grazed, a mouth counts, too, and the last one is where it went; unless another hung on it, or lies on a rim: of two
+  // counts that of its own mouth is its own then, and the other that one's.
   void count(const world::Place& chute, Time now) {
-    const bool another = into_ != nullptr && cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
+    const bool two = !fallen_.alone || cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
+    const bool another = into_ != nullptr && two;
     const bool own_before = another && into_->name == name_;
     if (another) cell_.strays->fell(cell_.world.arm, own_before ? chute.name : into_->name, now);
     if (!own_before) into_ = &chute;

@@ -104,6 +104,27 @@ TEST_F(LostOverItsChuteTest, OfTwoCountsThatOfItsOwnMouthIsItsOwn) {
   }
 }
 
+// Who hung on it fell beside.
+TEST_F(LostOverItsChuteTest, OfTwoThatFellTheOneInItsOwnMouthIsTheLoad) {
+  pass();
+  cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0.2, 0}}});
+  cell_.lost = held_;
+  cell_.lost->falls = falls_;
+  cell_.lost->alone = false;
+  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+  fell_ = now_;
+  ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  for (const std::size_t place : {4U, 0U, 6U}) {
+    ++falls_[place];
+    pass();
+    ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  }
+  const Progress progress = ends(1.2, kThings);
+  EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+  ASSERT_NE(cell_.strays->place_of("P2"), nullptr);
+  EXPECT_EQ(*cell_.strays->place_of("P2"), "chute_7");
+}
+
 // It may still be falling.
 TEST_F(LostOverItsChuteTest, APictureOfTheNextMomentSaysNothing) {
   const Progress progress = ends(0.2, kThings);

@@ -109,7 +109,13 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
     return;
   }
   if (torn->put_back) return fell_beside(torn->load, place, now);
-  torn_.push_back({torn->load, place});
+  // Who grazes one mouth and falls into the next is counted twice.
+  const auto of_load = [&](const auto& one) { return one.load == torn->load; };
+  const auto last = std::ranges::find_if(torn_.rbegin(), torn_.rend(), of_load);
+  if (last != torn_.rend() && std::ranges::count_if(torn_, of_load) >= std::ranges::count_if(doubted_, of_load))
+    last->place = place;
+  else
+    torn_.push_back({torn->load, place});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;

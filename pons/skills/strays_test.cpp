@@ -313,6 +313,15 @@ TEST_F(StraysTest, WhatACurtainCountsBeforeALoadIsPutBackMayBeTheLoad) {
   EXPECT_EQ(gone[0].place, "chute_2");
 }
 
+TEST_F(StraysTest, WhoIsTornOffAndCountedTwiceGrazedTheFirst) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  look({box(2, "B", 0)});
+  strays_.fell("arm", "chute_5", at(10.5));
+  strays_.fell("arm", "chute_7", at(10.7));
+  strays_.let_go("A", "chute_1", at(11));
+  EXPECT_EQ(place_of("B"), "chute_7");
+}
+
 TEST_F(StraysTest, OfTwoPutBackEitherMayHaveFallenUntilACameraSeesIt) {
   strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
   strays_.put_back("arm", "A", at(11));
