@@ -132,11 +132,17 @@ class Judge {
   }
 
  private:
+  // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is
+  // nobody's.
+  [[nodiscard]] static bool is_given_up(const Entry& entry) {
+    return entry.tasks == 0 || (entry.ended && !entry.succeeded);
+  }
+
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
     if ((!entry.succeeded || entry.astray) && parcel.place == entry.fell_into) {
       undeserved(entry);
       find(parcel, entry, "fell into another chute, which the journal names");
-    } else if (entry.tasks == 0 && story_.unread_strays[parcel.place] > 0) {
+    } else if (is_given_up(entry) && story_.unread_strays[parcel.place] > 0) {
       --story_.unread_strays[parcel.place];
       undeserved(entry);
       find(parcel, entry, "fell into another chute, of which the journal says that an unread one did");

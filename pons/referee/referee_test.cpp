@@ -210,7 +210,21 @@ TEST_F(RefereeTest, OfThoseNobodyHasReadAsManyAreNamedAsTheJournalSays) {
       judge({parcel("C", Whereabouts::kChute, "chute_2"), parcel("A", Whereabouts::kChute, "chute_2"),
              parcel("B", Whereabouts::kChute, "chute_2")});
   EXPECT_EQ(verdict.undeserved, 1);
-  EXPECT_EQ(verdict.missorted, 2) << "one more, and one that was known";
+  EXPECT_EQ(verdict.missorted, 2) << "two more";
+}
+
+// Of two that fell together each may be taken for the other: the entry of one names the tray, where the other lies.
+TEST_F(RefereeTest, WhatWasGivenUpIsAccountedForByAnEntryOfNobodysToo) {
+  stray("", "chute_2");
+  stray("", "chute_3");
+  for (const char* const each : {"A", "B", "C"}) accept(each, each);
+  fell("A", "tray");
+  end("B", Outcome::kSucceeded);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_2"), parcel("B", Whereabouts::kChute, "chute_3"),
+             parcel("C", Whereabouts::kChute, "chute_3")});
+  EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.missorted, 2) << "one is told to be sorted, and the other to be at work";
 }
 
 TEST_F(RefereeTest, ExceptionNeedsAnEntryAndDeservesAReason) {

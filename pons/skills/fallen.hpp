@@ -24,6 +24,8 @@ class Fallen {
   // It lands about there, world frame, while `objects` are believed, and stands no higher than `top_m`.
   void fell(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m,
             const std::vector<ObjectBelief>& objects, Time now);
+  // The same beyond the cameras' view.
+  void fell_unseen(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m);
   // Each tick, with the belt having ridden on: the tracks that are recognised now, by their codes. Nothing is while two
   // might be it, or while anything as large that was believed then no longer is: it may be that, found again. What is
   // awaited in vain near the view's end lies beyond it, maybe.
@@ -32,8 +34,6 @@ class Fallen {
   // Of those recognised, by a side or two of which more was hidden, as it turns out now: tracks that are too large.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, std::string>> take_mistaken(
       const std::vector<ObjectBelief>& objects);
-  // The same beyond the cameras' view.
-  void fell_unseen(std::string code, const Vector3& size_m, const Vector3& lands_m, double top_m);
   // What lies there, without track and label, riding at that speed: room that may be taken.
   void add_unseen(std::vector<ObjectBelief>& objects, double speed_m_s, Time now) const;
   // It is known to lie elsewhere.
