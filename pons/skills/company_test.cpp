@@ -38,7 +38,8 @@ TEST(CompanyTest, IsWhatLiesCloseToIt) {
 class FeltTest : public testing::Test {
  protected:
   // Whose weight, of what hangs so far from the load's middle, tip frame.
-  [[nodiscard]] std::string felt(double mass_kg, double x_m, double y_m, std::optional<Hooked> before = {}) const {
+  [[nodiscard]] std::string felt(double mass_kg, double x_m, double y_m,
+                                 const std::optional<Hooked>& before = {}) const {
     const Weight weight{mass_kg, load_.offset_in_tip_m.head<2>() + Eigen::Vector2d(x_m, y_m)};
     return hangs_beside(load_, weight, company_, before).value_or(Beside{"nobody"}).whose;
   }
