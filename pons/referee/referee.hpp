@@ -24,7 +24,7 @@ struct Verdict {
   int offered = 0;
   int sorted = 0;              // in the ordered chute, and the journal says so
   std::vector<int> sorted_by;  // of those, each arm
-  int missorted = 0;           // in another chute than the order's
+  int missorted = 0;           // in another chute than the order's, and no entry accounts for it
   int lost = 0;                // no outcome, or not where the outcome says, or on floor or tray without an entry
   int duplicated = 0;          // handled twice by the journal
   int deserved = 0;            // exceptions that had a reason: label, mass, size

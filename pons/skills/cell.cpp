@@ -35,7 +35,6 @@ constexpr double kStoodUp_m = 0.10;                   // of what leans, or lies 
 constexpr double kBeside_m = 0.05, kBounces_m = 0.2;  // the belt, what falls: it comes to lie on it, or may
 constexpr double kInstant_s = 0.001;
 constexpr Duration kLingers = std::chrono::milliseconds(200);  // where another may have to come
-constexpr double kStands_m_s = 0.002;                          // a belt, by its encoder
 constexpr Duration kLookEvery = std::chrono::milliseconds(100);
 constexpr Duration kLookAhead = std::chrono::milliseconds(1500);
 constexpr double kHiddenShare = 0.6;  // of the belt's width: at its edges a load is let go into the chutes

@@ -32,6 +32,9 @@ namespace pons::skills {
 // What the tip may meet while cups press on a parcel, lift one whose mass is not known yet, or let go of one.
 inline constexpr double kHandling_n = 100;
 
+// So slow a belt stands, by its encoder.
+inline constexpr double kStands_m_s = 0.002;
+
 // The parcel on the cups.
 struct Held {
   std::string code;

@@ -42,8 +42,7 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 constexpr Duration kWeighAtRest = std::chrono::milliseconds(160);  // after a lift: the readings since its end
 constexpr Duration kUntangles = std::chrono::milliseconds(2000);
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
-constexpr double kStands_m_s = 0.002;  // a belt, by its encoder
-constexpr double kStops_m = 0.02;      // before where the belt waits, and so far before that it begins to stop
+constexpr double kStops_m = 0.02;  // before where the belt waits, and so far before that it begins to stop
 
 Progress overweight(double mass_kg) {
   return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};

@@ -232,7 +232,7 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
 bool Strays::is_any_astray(const std::string& arm, const std::string& load, Time now) const {
   return std::ranges::any_of(doubted_, [&](const Doubted& one) {
     const bool lies_somewhere = one.track == kNoTrack && !one.put_back && !one.told && one.seen == Time{};
-    return lies_somewhere && one.arm == arm && one.load != load && now < one.let_go.value_or(now) + kAstray;
+    return lies_somewhere && one.arm == arm && one.load != load && now < *one.let_go + kAstray;
   });
 }
 
