@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -65,10 +66,26 @@ TEST_F(FeltTest, AParcelMayBeUnevenUnlessAnotherHungOnItAndItIsHeavierStill) {
 // Put back because another hung on it, or seemed to.
 TEST_F(FeltTest, WhatIsFeltTimeAndAgainIsUneven) {
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 1}), "B") << "it may have hooked again";
-  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 2}), "nobody");
+  EXPECT_EQ(felt(1, -0.03, 0, Hooked{"A", 1, 1, 2}), "nobody");
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1, 1, 2}), "B") << "one box may show both codes";
+  EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 1.5, 1.5, 2}), "nobody") << "it came off B";
   EXPECT_EQ(felt(1, 0.05, 0, Hooked{"A", 1, 1, 2}), "B") << "no contents explain it";
   EXPECT_EQ(felt(1, -0.14, 0, Hooked{"A", 1.5, 1.5, 2}), "another") << "no parcel is that uneven";
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 0.8, 2}), "B") << "heavier: the neighbour bore a part of it then";
+}
+
+// A box of 0.46 m, of which 6 cm at one end were hidden when it was measured.
+TEST(ReachingTest, WhatANeighbourHidIsFeltByWhereItWeighs) {
+  const Load seen{.size_m = {0.40, 0.16, 0.08}, .yaw_in_tip_rad = 0.5 * std::numbers::pi, .offset_in_tip_m = {0, 0, 0}};
+  const Load whole = reaching(seen, {0.59, {0, -0.03}});
+  EXPECT_NEAR(whole.size_m.x(), 0.46, 1e-9);
+  EXPECT_NEAR(whole.size_m.y(), 0.16, 1e-9);
+  EXPECT_NEAR(whole.offset_in_tip_m.y(), -0.03, 1e-9) << "its middle is where it weighs";
+  EXPECT_NEAR(whole.offset_in_tip_m.x(), 0, 1e-9);
+  EXPECT_EQ(reaching(seen, {0.59, {0, -0.007}}).size_m, seen.size_m) << "so well is a load's middle known";
+  EXPECT_EQ(reaching(seen, {0.1, {0, -0.03}}).size_m, seen.size_m) << "the wrist does not feel so little";
+  EXPECT_EQ(reaching(seen, {0.59, {0, -0.07}}).size_m, seen.size_m) << "a neighbour bears it";
+  EXPECT_EQ(reaching(seen, {0.59, {0.03, 0}}).size_m, seen.size_m) << "it goes in lengthwise";
 }
 
 TEST_F(FeltTest, WhatIsTooHeavyForItsSizeDoesNotHangAlone) {

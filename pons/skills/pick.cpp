@@ -411,6 +411,8 @@ class Pick final : public ArmSkill {
     cell_.arm.expect_contact(0);
     if (!beside && mass <= limit && hooked && unseen_ && may_be_who_hung(mass, *hooked))
       return begin_put_back(now, kPutAside, {Status::kException, "it may be what hung on it: nobody has seen it", {}});
+    const bool hidden = target_.crowded && cell_.held->alone && !beside;  // an end, maybe, when it was measured
+    if (hidden && weighed) cell_.held->load = reaching(cell_.held->load, *weighed);
     if (!beside && mass <= limit) return success(now);
     cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
     const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
@@ -449,10 +451,9 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
-    Held& held = *cell_.held;
-    held.alone = true;
-    const int sealed = cell_.arm.cups().sealed_cups;
-    return {Status::kSucceeded, {}, {{"mass_kg", held.mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
+    cell_.held->alone = true;
+    const task::Json mass_kg = cell_.held->mass_kg, sealed = cell_.arm.cups().sealed_cups;
+    return {Status::kSucceeded, {}, {{"mass_kg", mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
   }
 
   Cell& cell_;

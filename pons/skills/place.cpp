@@ -253,7 +253,7 @@ class Place final : public ArmSkill {
       Pose pose = Cell::tip_down(tip, yaw);
       pose.rotate(Eigen::AngleAxisd(turn < 4 ? lean_rad : -lean_rad, tip_from_load * Vector3::UnitY()));
       // The middle of the load, not of its top face, over the middle of the mouth.
-      const Vector3 middle = pose.linear() * Vector3(0, 0, 0.5 * load.size_m.z());
+      const Vector3 middle = pose.linear() * (load.offset_in_tip_m + Vector3(0, 0, 0.5 * load.size_m.z()));
       pose.translation().head<2>() -= middle.head<2>();
       const auto q = cell_.model.inverse(pose, from);
       if (!q) continue;

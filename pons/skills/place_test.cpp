@@ -162,6 +162,24 @@ TEST_F(CarriedTest, WhatIsWideAndFarIsBroughtThereInTwoParts) {
   EXPECT_LT((tip_now() - world_.place("chute_6")->center_m).head<2>().norm(), 0.03);
 }
 
+// Leaning, one end first.
+TEST_F(CarriedTest, WhatHangsBesideTheCupsIsBroughtWithItsMiddleOverTheMouth) {
+  stands({0.3, -0.03, 1.3});
+  const Load load{.size_m = {0.46, 0.16, 0.08}, .yaw_in_tip_rad = 0, .offset_in_tip_m = {0.03, 0, 0}};
+  cell_.held = Held{"P1", load, 0.6};
+  const auto skill = type_.start(task::Json{{"place", "chute_2"}, {"object", "P1"}}, now_);
+  bool gone = false;
+  for (int i = 0; i < 1000 && !gone; ++i) {
+    pass();
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+    gone = lets_go();
+  }
+  ASSERT_TRUE(gone);
+  const Pose tip = cell_.model.world_from_tip(cell_.arm.state().position);
+  const Vector3 middle = tip * (load.offset_in_tip_m + Vector3(0, 0, 0.5 * load.size_m.z()));
+  EXPECT_LT((middle - world_.place("chute_2")->center_m).head<2>().norm(), 0.005);
+}
+
 // On its rim, or beside it.
 TEST_F(CarriedTest, WhatItsOwnCurtainDoesNotCountIsNamed) {
   ASSERT_EQ(world_.places[2].name, "chute_3");

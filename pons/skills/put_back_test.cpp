@@ -67,6 +67,22 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
   }
 }
 
+// A neighbour that lies against its end hid a part of it when it was measured.
+TEST_F(PickTest, WhatACrowdedParcelsWeightTellsOfItsSizeIsBelieved) {
+  for (const bool crowded : {false, true}) {
+    const auto all = [&] {
+      ObjectBelief seen = parcel(1, 0.1, 0, {0.30, 0.15, 0.1});
+      seen.crowded = crowded;
+      return std::vector{seen};
+    };
+    const Progress progress = take_first(all, 1, {0.02, 0, 0.05}, [] {});
+    ASSERT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    EXPECT_NEAR(cell_.held->load.size_m.maxCoeff(), crowded ? 0.34 : 0.30, 0.005);
+    grips_kg_.reset();
+    cell_.held.reset();
+  }
+}
+
 // Where no camera looks, the one that is left may be the other.
 TEST_F(PickTest, WhatMayBeWhatHungOnItRidesOn) {
   const Vector3 size_m{0.2, 0.15, 0.1};
@@ -134,7 +150,7 @@ TEST_F(PickTest, WhatDoesNotHangAloneIsLaidDown) {
   const Vector3 off = cell_.left()[0].world_from_top.translation() - Vector3(0.1, -0.05, world_.belt.surface_z_m + 0.1);
   EXPECT_LT(off.norm(), 0.02) << "where it was lifted from: who hangs on it fits there";
   cell_.strays->fell(world_.arm, "chute_2", now_);
-  tick_with({});
+  for (const Time fell = now_; now_ < fell + from_s(2);) tick_with({});
   EXPECT_TRUE(cell_.left().empty()) << "a light curtain tells where it went";
 }
 

@@ -71,15 +71,31 @@ std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const
   const bool uneven = as_before && beside_m.norm() < kUnevenMost_m;
   if (before && weight.mass_kg > kDensest_kg_m3 * load.size_m.prod()) return Beside{};
   const double moment_nm = weight.mass_kg * kGravity_m_s2 * beside_m.norm();
-  if (!uneven && beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
-    for (const Companion& companion : company)
-      if (beside_m.dot(companion.aside_m.normalized()) > kTowards * beside_m.norm())
-        return companion.code.empty() ? Beside{} : Beside{companion.code};
+  if (beside_m.norm() > kUneven_m && moment_nm > kFeltLeast_nm) {
+    for (const Companion& companion : company) {
+      const bool has_code = !companion.code.empty();
+      if (beside_m.dot(companion.aside_m.normalized()) > kTowards * beside_m.norm() &&
+          (!uneven || (has_code && !lighter)))
+        return has_code ? Beside{companion.code} : Beside{};
+    }
     if (heavier) return Beside{};
   }
   const Eigen::Vector2d in_load_m = Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * beside_m;
   const double share = in_load_m.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
   return share > kNearEdge && moment_nm > kFelt_nm ? std::optional(Beside{}) : std::nullopt;
+}
+
+// By so much more at one end as it weighs beside its middle, twice: farther beside, another bears it or hangs on it.
+Load reaching(const Load& load, const Weight& weight) {
+  const Eigen::Rotation2Dd tip_from_load(load.yaw_in_tip_rad);
+  const Eigen::Vector2d beside_m = weight.beside_tip_m - load.offset_in_tip_m.head<2>();
+  const Eigen::Vector2d along_m((tip_from_load.inverse() * beside_m).x(), 0);
+  const double felt_nm = weight.mass_kg * kGravity_m_s2 * along_m.norm();
+  if (along_m.norm() <= kUneven_m || felt_nm <= kFeltLeast_nm || beside_m.norm() > kUnevenMost_m) return load;
+  Load whole = load;
+  whole.size_m.x() += 2 * along_m.norm();
+  whole.offset_in_tip_m.head<2>() += tip_from_load * along_m;
+  return whole;
 }
 
 double weigh_now(Cell& cell) { return pull_n(cell) / kGravity_m_s2 - cell.world.robot.tool.mass_kg; }

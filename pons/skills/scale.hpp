@@ -24,13 +24,18 @@ struct Beside {
 // Felt, by how far beside the load's middle it hangs: near its edge or beyond, where no parcel is that uneven; or less
 // far, towards one of its company; or, where another was found on it `before` and it is heavier still, at all, or is
 // denser than parcels are. What was found so time and again and is no heavier now, or is far lighter than ever, and is
-// not so far off its middle that no contents explain it, is uneven by itself: only the first of these counts then.
+// not so far off its middle that no contents explain it, is uneven by itself: only the first of these counts then. But
+// if it never comes off a companion with a code of its own, the two may be one, and no weight tells whose code is right.
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                                  const std::optional<Hooked>& before);
 
 // Whether a load that is felt to hang alone now may be the one that hung on it: it is as heavy as what was felt beside
 // its middle the last time, and once both were heavier. Only a camera tells who is left.
 [[nodiscard]] bool may_be_who_hung(double mass_kg, const Hooked& before);
+
+// That load as far as it reaches where a neighbour hid an end of it from the cameras: by itself it weighs at its
+// middle.
+[[nodiscard]] Load reaching(const Load& load, const Weight& weight);
 
 // The load swings on its bellows, so no single force tells its mass; the impulse over a swing does:
 // ∫F dt = m (g T + v(T) − v(0)), v being the tip's measured vertical speed. The moment about the tip, over all

@@ -10,6 +10,7 @@ constexpr std::size_t kRemembered = 64;                         // of those who 
 constexpr Duration kTornOff = std::chrono::milliseconds(3000);  // off a rim, too, after the load was let go of
 constexpr Duration kFalls = std::chrono::milliseconds(1000);    // from letting go to a curtain, perhaps another's
 constexpr Duration kClaimed = std::chrono::seconds(5);          // what fell: by then, or nobody knows whose it was
+constexpr Duration kLooked = std::chrono::seconds(2);           // after a fall: who lies in view has been seen again
 constexpr Duration kAstray = std::chrono::seconds(30);          // after a load was dropped: something may push it
 constexpr std::uint32_t kNoTrack = 0xFFFF'FFFF;
 // Of the belt's travel, between what was to ride off and what a light curtain says did: pushed, it may have slid.
@@ -115,7 +116,7 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   if (last != torn_.rend() && std::ranges::count_if(torn_, of_load) >= std::ranges::count_if(doubted_, of_load))
     last->place = place;
   else
-    torn_.push_back({torn->load, place});
+    torn_.push_back({torn->load, arm, place, now});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
@@ -141,11 +142,34 @@ bool Strays::has_stayed(const Doubted& one) {
   return !one.put_back || one.fell || one.seen > *one.let_go + kTornOff;
 }
 
-void Strays::find_fallen() {
+// The last one to be seen again, of a load's company or of those that one fell beside, leaves a fall that was
+// another's.
+void Strays::forget_stayed() {
+  for (auto one = doubted_.begin(); one != doubted_.end();) {
+    if (!has_stayed(*one)) {
+      ++one;
+      continue;
+    }
+    const Doubted stayed = *one;
+    one = doubted_.erase(one);
+    if (stayed.fell && !stayed.told && may_have_fallen_of(stayed.load) == 0)
+      nobodys_.push_back({stayed.arm, stayed.stray.place, *stayed.fell});
+    const auto own = [&](const auto& each) { return each.load == stayed.load; };
+    if (std::ranges::any_of(doubted_, own)) continue;
+    for (const Torn& torn : torn_)
+      if (own(torn)) nobodys_.push_back({torn.arm, torn.place, torn.time});
+    std::erase_if(torn_, own);
+  }
+}
+
+std::ptrdiff_t Strays::may_have_fallen_of(const std::string& load) const {
+  return std::ranges::count_if(doubted_, [&](const Doubted& one) { return one.fell && one.load == load; });
+}
+
+void Strays::find_fallen(Time now) {
   for (Doubted& one : doubted_) {
-    if (!one.put_back || one.gone || one.stray.place.empty()) continue;
-    const auto may_have = [&](const Doubted& other) { return other.fell && other.load == one.load; };
-    if (std::ranges::count_if(doubted_, may_have) > 1) continue;
+    if (!one.put_back || one.gone || !one.fell || now < *one.fell + kLooked || may_have_fallen_of(one.load) > 1)
+      continue;
     one.gone = one.told = true;
     found_gone_.push_back(one.stray);
   }
@@ -190,8 +214,8 @@ void Strays::look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, 
       if (same && one.let_go && object.last_seen > *one.let_go) one.seen = std::max(one.seen, object.last_seen);
     }
   }
-  std::erase_if(doubted_, has_stayed);
-  find_fallen();
+  forget_stayed();
+  find_fallen(now);
   for (Doubted& one : doubted_) {
     const auto object = std::ranges::find(objects, one.track, &ObjectBelief::track);
     const bool believed = object != objects.end();

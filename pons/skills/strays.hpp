@@ -45,8 +45,9 @@ class Strays {
   // Something rode off the belt's end.
   void rode_off(double travel_m);
   // Each tick's beliefs: whoever is seen since the load was let go of has stayed, for until then who hangs beside it
-  // may be seen, too; of those put back, whoever is seen after a curtain's count, or much later. Who is believed to lie
-  // nowhere any more, and was to be seen, or should have ridden off the belt's end and did not, has gone.
+  // may be seen, too; of those put back, whoever is seen after a curtain's count, or much later: where all of them are,
+  // what was counted is nobody's. Who is believed to lie nowhere any more, and was to be seen, or should have ridden
+  // off the belt's end and did not, has gone.
   void look(const std::vector<ObjectBelief>& objects, const BeltAt& belt, Time now);
   // It was taken off the belt by itself.
   void taken(std::uint32_t track);
@@ -84,13 +85,16 @@ class Strays {
   };
   // One of a load's company, where a light curtain has told.
   struct Torn {
-    std::string load, place;
+    std::string load, arm, place;
+    Time time;
   };
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
   void fell_beside(const std::string& load, const std::string& place, Time now);
   [[nodiscard]] static bool has_stayed(const Doubted& one);
-  void find_fallen();
+  void forget_stayed();
+  [[nodiscard]] std::ptrdiff_t may_have_fallen_of(const std::string& load) const;
+  void find_fallen(Time now);
   void leave(const std::string& arm, const std::string& load, Time now, bool put_back);
   void leave_company(const std::string& load, Time now);
   void doubt_itself(const std::string& arm, const std::string& load, Time now, bool put_back);

@@ -359,6 +359,37 @@ TEST_F(StraysTest, WhatIsNobodysIsNamedWithoutACode) {
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "once";
 }
 
+// Another was lost from sight shortly before, and fell off a rim then.
+TEST_F(StraysTest, WhenAllThatWerePutBackAreSeenWhatWasCountedIsNobodys) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.put_back("arm", "A", at(11));
+  strays_.fell("arm", "chute_5", at(13));
+  look({box(2, "B", 0, 13.1)}, 0, 13.2);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "the arm may hide the other yet";
+  look({box(5, "A", 0, 14)}, 0, 14.1);
+  look({}, 0, 17.9);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "somebody may still tell whose it is";
+  look({}, 0, 18.1);
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "");
+  EXPECT_EQ(gone[0].place, "chute_5");
+}
+
+// Another hung there, of whom nobody knew: it was out of sight when the load was lifted.
+TEST_F(StraysTest, WhenAllOfTheCompanyStayedWhatWasTornOffIsNobodys) {
+  strays_.lifted("arm", "A", {{2, "B", {0.2, 0}}});
+  strays_.fell("arm", "chute_5", at(10.5));
+  strays_.let_go("A", "chute_1", at(11));
+  look({box(2, "B", 0, 11.1)}, 0, 11.2);
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "somebody may still tell whose it is";
+  look({}, 0, 16);
+  const std::vector<Stray> gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "");
+  EXPECT_EQ(gone[0].place, "chute_5");
+}
+
 TEST_F(StraysTest, WhatWasDroppedIsAstrayForAWhileOrUntilItIsSeen) {
   const auto any = [&](const char* arm, const char* load, double s) { return strays_.is_any_astray(arm, load, at(s)); };
   EXPECT_FALSE(any("arm", "B", 11));
