@@ -12,7 +12,7 @@ TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 # What reads bytes that others wrote: fuzz/NAME.cpp.
-FUZZERS = journal task tree
+FUZZERS = cdr journal task tree
 FUZZ_S ?= 30
 
 .PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers clean

@@ -156,8 +156,10 @@ Json Desk::submit(const std::string& task, Time now) {
   const auto admitted = bridge_.submit_all(task, now);
   if (!admitted) return gate::refusal(admitted.error());
   Json tasks = Json::array();
-  for (const bridge::Admission& one : *admitted)
+  for (const bridge::Admission& one : *admitted) {
     tasks.push_back({{"id", one.id}, {"accepted", one.accepted == bridge::Accepted::kNew ? "new" : "already"}});
+    if (!one.differences.empty()) tasks.back()["differences"] = one.differences;
+  }
   Json told{{"ok", true}, {"tasks", std::move(tasks)}};
   if (admitted->size() == 1) told.update(told.at("tasks").at(0));
   return told;

@@ -61,6 +61,8 @@ int submit(const TaskOptions& options) {
   for (const Json& one : answer->at("tasks")) {
     fmt::print("{}: {}\n", one.value("id", std::string{}),
                one.value("accepted", std::string{}) == "new" ? "accepted" : "already accepted");
+    for (const Json& difference : one.value("differences", Json::array()))
+      fmt::print("  other than BehaviorTree.CPP: {}\n", difference.get<std::string>());
   }
   return kExitGood;
 }

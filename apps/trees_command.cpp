@@ -23,6 +23,7 @@ void describe(const std::string& name, const tree::Program& program) {
   for (const auto& [entry, slot] : program.root) entries += (entries.empty() ? "" : ", ") + entry;
   fmt::print("{:<14} {} nodes; skills: {}; blackboard: {}\n", name, program.nodes.size(),
              skills.empty() ? "none" : skills, entries.empty() ? "nothing" : entries);
+  for (const std::string& difference : program.differences) fmt::print("  {}\n", difference);
 }
 
 int list(const std::string& world) {
@@ -44,7 +45,6 @@ int check(const std::string& file, const std::string& world) {
     const auto program = tree::compile(*document, name, (*cell)->registry);
     if (!program) return bad_input(program.error());
     describe(name, **program);
-    for (const std::string& difference : (*program)->differences) fmt::print("  {}\n", difference);
   }
   return kExitGood;
 }

@@ -113,6 +113,7 @@ void Bridge::let_go(const std::vector<Candidate>& candidates) {
 Expected<Admission> Bridge::take(Candidate candidate, Time now) {
   Admission admission{candidate.task.id, candidate.accepted};
   if (candidate.accepted == Accepted::kAlready) return admission;
+  if (candidate.program) admission.differences = candidate.program->differences;
   const auto accepted = journal_.accept(candidate.task, now);
   if (!accepted) {
     set_fault(accepted.error());

@@ -40,7 +40,8 @@ inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
 
 struct Admission {
   std::string id;
-  Accepted accepted = Accepted::kNew;  // kAlready: the same task was accepted earlier, nothing was queued
+  Accepted accepted = Accepted::kNew;         // kAlready: the same task was accepted earlier, nothing was queued
+  std::vector<std::string> differences = {};  // of a new one's tree: see tree::Program
 };
 
 struct OutcomeReport {

@@ -78,6 +78,13 @@ TEST_F(TreesOfTasks, OneOfTheWorldRunsWithTheInputsThatItWasGiven) {
   EXPECT_THAT(audit(*journal_), testing::IsEmpty());
 }
 
+TEST_F(TreesOfTasks, WhereItDiffersFromBehaviorTreeCppItsSenderHears) {
+  const auto admission = submit_sort("a");
+  ASSERT_TRUE(admission) << admission.error().line();
+  EXPECT_THAT(admission->differences, ElementsAre(HasSubstr("time stands while the task is paused")));
+  EXPECT_TRUE(submit_sort("a")->differences.empty()) << "it was told already";
+}
+
 TEST_F(TreesOfTasks, OneThatIsSentAlongRuns) {
   ASSERT_TRUE(submit_tree("T1", {{"xml", kSort}, {"inputs", {{"code", "P2"}}}}));
   EXPECT_EQ(run().at(0).outcome, Outcome::kSucceeded);

@@ -378,7 +378,9 @@ void BridgeSide::close(Time now) {
                  {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},
                  now, code);
   }
-  bridge_.note("closed", {{"never_identified", unseen.size()}, {"unlabelled_rides", unlabelled_}}, now);
+  bridge_.note("closed",
+               {{"never_identified", unseen.size()}, {"unlabelled_rides", unlabelled_}, {"refused", bridge_.refused()}},
+               now);
 }
 
 }  // namespace pons::runner

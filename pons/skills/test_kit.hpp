@@ -39,10 +39,11 @@ class ObedientArmTest : public testing::Test {
     stops_at(tip, link::StopCause::kCommanded);
     is_armed_at(tip);
   }
-  void stops_at(const Vector3& tip, link::StopCause cause) {
+  void stops_at(const Vector3& tip, link::StopCause cause,
+                link::SafetyState how_far = link::SafetyState::kProtectiveStop) {
     now_ += from_s(1);
     cause_ = cause;
-    safety_ = link::SafetyState::kProtectiveStop;
+    safety_ = how_far;
     stands(tip);
   }
   void is_armed_at(const Vector3& tip) {

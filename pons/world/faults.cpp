@@ -155,8 +155,8 @@ Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
   if (!fs::is_regular_file(file, code)) {
     std::string names = "none";
     for (const std::string& other : std::views::keys(plans)) names += ", " + other;
-    return fail(fmt::format("there is no plan '{}'", printable(named)),
-                (world.folder.parent_path() / "faults").string(),
+    const std::string what = fs::is_directory(file, code) ? "this is a folder: " : "there is no plan ";
+    return fail(fmt::format("{}'{}'", what, printable(named)), (world.folder.parent_path() / "faults").string(),
                 fmt::format("the plans are {}; or name a file", names));
   }
   try {

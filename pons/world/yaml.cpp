@@ -66,8 +66,7 @@ std::string read_bounded(const std::filesystem::path& file) {
   std::string text(kMaxFileBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kMaxFileBytes)
-    refuse_file(file, "is larger than 1 MiB", "a world's file is some kilobytes of YAML");
+  if (text.size() > kMaxFileBytes) refuse_file(file, "is larger than 1 MiB", "some kilobytes of YAML are usual");
   if (!is_utf8(text)) refuse_file(file, "is not UTF-8 text", "save it as UTF-8");
   return text;
 }
@@ -233,7 +232,7 @@ YamlValue read_yaml(const std::filesystem::path& file) {
     int documents = 0;
     while (parser.HandleNextDocument(no_aliases)) ++documents;
     if (documents != 1) {
-      refuse_file(file, fmt::format("holds {} YAML documents", documents), "a world's file holds one");
+      refuse_file(file, fmt::format("holds {} YAML documents", documents), "write one into it");
     }
     return {std::make_shared<const std::filesystem::path>(file), YAML::Load(text), ""};
   } catch (const YAML::Exception& broken) {

@@ -248,7 +248,9 @@ Expected<void> check_layout(Database& database) {
     const auto found = database.text("PRAGMA integrity_check");
     if (!found) return std::unexpected(found.error());
     if (*found == "ok") return {};
-    return fail("the journal is damaged: " + *found, database.shown(), "restore a copy");
+    std::string line = *found;
+    std::ranges::replace(line, '\n', ' ');
+    return fail("the journal is damaged: " + line, {}, "restore a copy");
   }
   // Pages the server checks as it reads them, where it has checksums; the rules may be dropped by whoever owns them.
   const auto rules = database.integer(fmt::format(

@@ -8,6 +8,8 @@
 #include <cassert>
 #include <cerrno>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 #include <utility>
 
 namespace pons::bridge {
@@ -24,13 +26,17 @@ int errno_of_log(sqlite3* database) {
   return reason;
 }
 
+std::unexpected<Error> no_journal(const std::string& file) {
+  return fail("this file is not a journal", file, "name another file, or move this one away");
+}
+
 // One clear line for each way a file can be wrong.
 std::unexpected<Error> failure(sqlite3* database, const std::string& file) {
   const int code = sqlite3_errcode(database);
   switch (code & 0xff) {
     case SQLITE_NOTADB:
     case SQLITE_FORMAT:
-      return fail("this file is not a journal", file, "name another file, or move this one away");
+      return no_journal(file);
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return fail("the journal is in use by another process", file, "end that one, or name another file");
@@ -84,6 +90,41 @@ Expected<void> check_place(const std::filesystem::path& file) {
     return fail("this is a folder", file.string(), "name a file for the journal");
   }
   return {};
+}
+
+std::uint64_t size_of(const std::string& file) {
+  std::error_code none;
+  const std::uint64_t size = std::filesystem::file_size(file, none);
+  return none ? 0 : size;
+}
+
+// SQLite takes a file that has lost its end for a whole one as long as it asks for nothing of that, and one of less
+// than a header for a new one. Not where a log or a rollback journal is to complete it.
+Expected<void> check_length(const std::string& file) {
+  constexpr std::string_view kMagic("SQLite format 3", 16);
+  constexpr std::size_t kHeader = 100;
+  const std::uint64_t size = size_of(file), log = size_of(file + "-wal");
+  if (size == 0 && log == 0) return {};
+  if (size_of(file + "-journal") > 0 || (size >= kHeader && log > 0)) return {};
+  std::string header(std::min<std::uint64_t>(size, kHeader), '\0');
+  std::ifstream(file, std::ios::binary).read(header.data(), static_cast<std::streamsize>(header.size()));
+  const std::size_t shared = std::min(header.size(), kMagic.size());
+  if (header.substr(0, shared) != kMagic.substr(0, shared)) return no_journal(file);
+  const auto number = [&](std::size_t at, int bytes) {
+    std::uint64_t value = 0;
+    for (int i = 0; i < bytes; ++i)
+      value = value << 8U | static_cast<std::uint8_t>(header[at + static_cast<std::size_t>(i)]);
+    return value;
+  };
+  std::uint64_t whole = kHeader;
+  if (size >= kHeader) {
+    const std::uint64_t page = number(16, 2) == 1 ? 65536 : number(16, 2);
+    const bool valid = number(24, 4) == number(92, 4);  // else an old SQLite wrote the number of pages
+    whole = valid ? page * number(28, 4) : 0;
+  }
+  if (size >= whole) return {};
+  return fail(fmt::format("the journal has lost its end: {} of at least {} bytes are there", size, whole), file,
+              "restore a copy, or name another file");
 }
 
 class SqliteStatement final : public Statement::Driver {
@@ -191,10 +232,7 @@ class SqliteDatabase final : public Database {
     rlimit most{};
     if (getrlimit(RLIMIT_FSIZE, &most) != 0 || most.rlim_cur == RLIM_INFINITY) return space.available;
     std::uint64_t large = 0;
-    for (const char* const beside : {"", "-wal"}) {
-      const std::uint64_t size = std::filesystem::file_size(shown_ + beside, unknown);
-      if (!unknown) large = std::max(large, size);
-    }
+    for (const char* const beside : {"", "-wal"}) large = std::max(large, size_of(shown_ + beside));
     return std::min<std::uint64_t>(space.available, most.rlim_cur > large ? most.rlim_cur - large : 0);
   }
 
@@ -213,6 +251,9 @@ Expected<std::unique_ptr<Database>> open_sqlite(const std::string& file, Mode mo
     return fail("there is no such journal", file, "name the file that a run was given with --journal");
   if (file != ":memory:") {
     if (auto place = check_place(file); !place) return std::unexpected(place.error());
+    if (vfs == nullptr) {
+      if (auto whole = check_length(file); !whole) return std::unexpected(whole.error());
+    }
   }
   auto database = std::make_unique<SqliteDatabase>();
   if (auto opened = database->open(file, mode, vfs); !opened) return std::unexpected(opened.error());

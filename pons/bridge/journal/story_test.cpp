@@ -132,7 +132,8 @@ TEST_F(JournalTest, AuditFindsAFileThatSqliteFindsDamaged) {
   ASSERT_TRUE(journal) << journal.error().line();
   const auto wrong = audit(**journal);
   ASSERT_FALSE(wrong.empty());
-  EXPECT_NE(wrong[0].find("damaged"), std::string::npos) << wrong[0];
+  EXPECT_EQ(wrong[0].find("the journal is damaged: "), 0U) << wrong[0];
+  EXPECT_EQ(wrong[0].find('\n'), std::string::npos) << wrong[0];
 }
 
 }  // namespace
