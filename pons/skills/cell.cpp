@@ -80,8 +80,6 @@ Cell::Cell(link::BridgeEnd& link, const world::World& cell_world, model::RobotMo
 void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Time> seen) {
   arm.refresh(now);
   router.refresh();
-  // What rides against an arm that brakes pushes it on: it does not come to rest.
-  if (arm.state().safety == link::SafetyState::kStopping) hold_belt(now);
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
     lost = held;

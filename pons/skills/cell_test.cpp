@@ -97,17 +97,6 @@ TEST_F(RestTest, WhatItHoldsRisesToo) {
   EXPECT_GT(highest_tip_m(), world_.belt.surface_z_m + 0.32 + 0.15 + 0.01);
 }
 
-// A box against the tool pushed on an arm that had been stopped, until its standstill was given up.
-using BrakingTest = ObedientArmTest;
-TEST_F(BrakingTest, TheBeltWaitsUntilTheArmIsAtRest) {
-  stands({0.1, 0, 1.1});
-  EXPECT_FALSE(cell_.holds_belt(now_));
-  stops_at({0.1, 0, 1.1}, link::StopCause::kFollowingError, link::SafetyState::kStopping);
-  EXPECT_TRUE(cell_.holds_belt(now_));
-  stops_at({0.1, 0, 1.1}, link::StopCause::kFollowingError);
-  EXPECT_FALSE(cell_.holds_belt(now_)) << "another arm may need it";
-}
-
 // Another arm may have to come there, while what this one is to take does not come.
 using ZoneTest = ObedientArmTest;
 TEST_F(ZoneTest, AnArmThatWaitsLeavesTheZoneBetweenArms) {

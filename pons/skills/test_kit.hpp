@@ -39,11 +39,10 @@ class ObedientArmTest : public testing::Test {
     stops_at(tip, link::StopCause::kCommanded);
     is_armed_at(tip);
   }
-  void stops_at(const Vector3& tip, link::StopCause cause,
-                link::SafetyState how_far = link::SafetyState::kProtectiveStop) {
+  void stops_at(const Vector3& tip, link::StopCause cause) {
     now_ += from_s(1);
     cause_ = cause;
-    safety_ = how_far;
+    safety_ = link::SafetyState::kProtectiveStop;
     stands(tip);
   }
   void is_armed_at(const Vector3& tip) {
