@@ -34,6 +34,10 @@ class Arm {
 
   [[nodiscard]] const link::State& state() const { return state_; }
   [[nodiscard]] bool operational() const { return state_.safety == link::SafetyState::kOperational; }
+  // Stopped by what it met: a blow, or something that held it off its way.
+  [[nodiscard]] bool has_struck() const {
+    return state_.cause == link::StopCause::kCollision || state_.cause == link::StopCause::kFollowingError;
+  }
 
   // How late the motion is by now; what was planned to happen with it happens so much later than it was planned then.
   [[nodiscard]] Duration late() const { return state_.late; }

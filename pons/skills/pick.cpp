@@ -57,7 +57,7 @@ class Pick final : public ArmSkill {
     move_along(delay_.take());
     if (!cell_.arm.operational()) {
       stopped_ = true;
-      if (cell_.arm.state().cause == link::StopCause::kCollision) cell_.struck(code_);
+      if (cell_.arm.has_struck()) cell_.struck(code_);
       return cancelled_ ? Progress{Status::kFailed, "cancelled while the arm was stopped", {}} : Progress{};
     }
     if (stopped_ && phase_ != Phase::kRetreat) {

@@ -112,9 +112,7 @@ class Place final : public ArmSkill {
   Progress stopped() {
     plan_anew();
     if (cancelled_) return {Status::kFailed, kCancelled, {}};
-    const link::StopCause cause = cell_.arm.state().cause;
-    const bool struck = cause == link::StopCause::kCollision || cause == link::StopCause::kFollowingError;
-    if (!std::exchange(stopped_, true) && struck) ++times_struck_;
+    if (!std::exchange(stopped_, true) && cell_.arm.has_struck()) ++times_struck_;
     return {};
   }
 
