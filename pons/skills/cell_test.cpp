@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "pons/skills/grip.hpp"
-#include "pons/skills/pick.hpp"
 #include "pons/skills/test_kit.hpp"
 
 namespace pons::skills {
@@ -282,25 +281,6 @@ TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
   EXPECT_EQ(cell_.find("P000001"), nullptr) << "what is seen there may be what it leans on";
   ASSERT_EQ(cell_.objects().size(), 2U);
   EXPECT_GT(cell_.objects()[1].world_from_top.translation().z(), world_.belt.surface_z_m + 0.19);
-}
-
-// Leaning on a taller neighbour it held the tool off its way, and the next try held the arm until a person was needed.
-using HeldOffTest = ObedientArmTest;
-TEST_F(HeldOffTest, WhatWasPutBackAndHoldsTheArmOffItsWayIsStruck) {
-  const Vector3 tip(0.1, 0.05, 1.2);
-  stands(tip);
-  cell_.held = held_;
-  cell_.left_on_belt(Cell::tip_down(tip, 0));
-  cell_.holds_nothing();
-  opened_ = true;
-  ASSERT_EQ(cell_.left().size(), 1U);
-  for (const link::StopCause cause : {link::StopCause::kCommanded, link::StopCause::kFollowingError}) {
-    const auto picks_it = pick(cell_).start(task::Json{{"object", held_.code}}, now_);
-    stops_at(tip, cause);
-    EXPECT_EQ(picks_it->tick(now_).status, task::Status::kRunning);
-    EXPECT_EQ(cell_.left().empty(), cause == link::StopCause::kFollowingError);
-    is_armed_at(tip);
-  }
 }
 
 // With a label of its own, and no higher. Its neighbour overlaps it a little at most, and what hooked may have come to
