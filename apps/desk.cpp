@@ -248,7 +248,7 @@ Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {
 Json Desk::describe() const {
   for (const runner::Arming* const arming : arming_) {
     Json robot = arming->describe();
-    if (robot.at("needs") != "") return robot;
+    if (!robot.at("needs").get<std::string>().empty()) return robot;
   }
   return arming_.front()->describe();
 }

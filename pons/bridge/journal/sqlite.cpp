@@ -101,7 +101,7 @@ std::uint64_t size_of(const std::string& file) {
 // SQLite takes a file that has lost its end for a whole one as long as it asks for nothing of that, and one of less
 // than a header for a new one. Not where a log or a rollback journal is to complete it.
 Expected<void> check_length(const std::string& file) {
-  constexpr std::string_view kMagic("SQLite format 3", 16);
+  constexpr std::string_view kMagic = "SQLite format 3";  // and a zero
   constexpr std::size_t kHeader = 100;
   const std::uint64_t size = size_of(file), log = size_of(file + "-wal");
   if (size == 0 && log == 0) return {};
