@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -56,6 +57,24 @@ TEST_F(Visitor, SubmitsAndReadsWhatBecameOfIt) {
   });
   EXPECT_THAT(show("home-1").out, HasSubstr("SUCCEEDED"));
   EXPECT_EQ(report_["parcels"]["lost"], 0);
+}
+
+TEST_F(Visitor, HearsWhereItsTreeRunsOtherwiseAndTheJournalHowManyWereRefused) {
+  const nlohmann::json tree{
+      {"id", "slow"},
+      {"tree", {{"xml", R"(<root BTCPP_format="4"><BehaviorTree ID="t"><Sleep msec="10"/></BehaviorTree></root>)"}}}};
+  during_a_run([&] {
+    EXPECT_THAT(submit(tree.dump()).out,
+                AllOf(HasSubstr("slow: accepted\n  other than BehaviorTree.CPP: "), HasSubstr("time stands while")));
+    EXPECT_NE(submit(R"({"id":"x","steps":[]})").code, 0);
+  });
+  const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
+  ASSERT_TRUE(journal) << journal.error().line();
+  const auto notes = (*journal)->notes();
+  ASSERT_TRUE(notes) << notes.error().line();
+  const auto closed = std::ranges::find(*notes, "closed", &bridge::Event::kind);
+  ASSERT_NE(closed, notes->end());
+  EXPECT_EQ(closed->detail.at("refused"), 1);
 }
 
 // The ids of all pages of two, gone through as each says.
