@@ -64,6 +64,7 @@ struct Hooked {
   std::string code;
   double mass_kg = 0, most_kg = 0;
   int times = 1;
+  std::string whose = {};  // by code, the last time; empty: nobody's that is known
 };
 
 class Cell {

@@ -74,6 +74,20 @@ TEST_F(FeltTest, WhatIsFeltTimeAndAgainIsUneven) {
   EXPECT_EQ(felt(1, 0.03, 0, Hooked{"A", 0.8, 0.8, 2}), "B") << "heavier: the neighbour bore a part of it then";
 }
 
+// A box that shows two codes was taken for two; it was felt to hang there three times, and then not, by a millimetre.
+TEST_F(FeltTest, OneReadingDoesNotPartWhatNeverCameApart) {
+  const Hooked thrice{"A", 0.54, 0.55, 3, "B"};
+  EXPECT_EQ(felt(0.54, 0.005, 0, thrice), "B");
+  EXPECT_EQ(felt(0.35, 0.005, 0, thrice), "nobody") << "B has come off";
+  EXPECT_EQ(felt(0.54, 0.005, 0, Hooked{"A", 0.54, 0.55, 1, "B"}), "nobody") << "once proves nothing";
+  EXPECT_EQ(felt(0.54, 0.005, 0, Hooked{"A", 0.54, 0.55, 3, "D"}), "nobody") << "D is not there any more";
+  const Hooked again = hooked_again("A", 0.5, Beside{"B"}, thrice);
+  EXPECT_EQ(again.times, 4);
+  EXPECT_EQ(again.most_kg, 0.55);
+  EXPECT_EQ(again.whose, "B");
+  EXPECT_EQ(hooked_again("A", 0.5, std::nullopt, std::nullopt).whose, "");
+}
+
 // A box of 0.46 m, of which 6 cm at one end were hidden when it was measured.
 TEST(ReachingTest, WhatANeighbourHidIsFeltByWhereItWeighs) {
   const Load seen{.size_m = {0.40, 0.16, 0.08}, .yaw_in_tip_rad = 0.5 * std::numbers::pi, .offset_in_tip_m = {0, 0, 0}};

@@ -414,7 +414,7 @@ class Pick final : public ArmSkill {
     const bool hidden = target_.crowded && cell_.held->alone && !beside;  // an end, maybe, when it was measured
     if (hidden && weighed) cell_.held->load = reaching(cell_.held->load, *weighed);
     if (!beside && mass <= limit) return success(now);
-    cell_.hooked = Hooked{code_, mass, std::max(mass, hooked ? hooked->most_kg : 0), hooked ? hooked->times + 1 : 1};
+    cell_.hooked = hooked_again(code_, mass, beside, hooked);
     const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
                                    : fmt::format("{:.2f} kg: another may hang on it", mass);
     return begin_put_back(now, 0, {Status::kRetry, why, {}});

@@ -80,9 +80,22 @@ std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const
     }
     if (heavier) return Beside{};
   }
+  const bool still_there = before && std::ranges::any_of(company, [&](const Companion& companion) {
+                             return !companion.code.empty() && companion.code == before->whose;
+                           });
+  if (still_there && as_before && !lighter) return Beside{before->whose};
   const Eigen::Vector2d in_load_m = Eigen::Rotation2Dd(-load.yaw_in_tip_rad) * beside_m;
   const double share = in_load_m.cwiseAbs().cwiseQuotient(0.5 * load.size_m.head<2>()).maxCoeff();
   return share > kNearEdge && moment_nm > kFelt_nm ? std::optional(Beside{}) : std::nullopt;
+}
+
+Hooked hooked_again(const std::string& code, double mass_kg, const std::optional<Beside>& beside,
+                    const std::optional<Hooked>& before) {
+  return {.code = code,
+          .mass_kg = mass_kg,
+          .most_kg = std::max(mass_kg, before ? before->most_kg : 0),
+          .times = before ? before->times + 1 : 1,
+          .whose = beside ? beside->whose : ""};
 }
 
 // By so much more at one end as it weighs beside its middle, twice: farther beside, another bears it or hangs on it.

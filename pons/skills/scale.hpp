@@ -25,9 +25,14 @@ struct Beside {
 // far, towards one of its company; or, where another was found on it `before` and it is heavier still, at all, or is
 // denser than parcels are. What was found so time and again and is no heavier now, or is far lighter than ever, and is
 // not so far off its middle that no contents explain it, is uneven by itself: only the first of these counts then. But
-// if it never comes off a companion with a code of its own, the two may be one, and no weight tells whose code is right.
+// if it never comes off a companion with a code of its own, the two may be one, and no weight tells whose code is
+// right: then one reading without it proves nothing, either.
 [[nodiscard]] std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
                                                  const std::optional<Hooked>& before);
+
+// What is known of a load by that code that is put back, for another hangs on it or may.
+[[nodiscard]] Hooked hooked_again(const std::string& code, double mass_kg, const std::optional<Beside>& beside,
+                                  const std::optional<Hooked>& before);
 
 // Whether a load that is felt to hang alone now may be the one that hung on it: it is as heavy as what was felt beside
 // its middle the last time, and once both were heavier. Only a camera tells who is left.
