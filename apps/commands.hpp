@@ -2,8 +2,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -32,6 +34,7 @@ void add_trees(CLI::App& app, Chosen& chosen);
 void add_task(CLI::App& app, Chosen& chosen);
 void add_journal(CLI::App& app, Chosen& chosen);
 void add_book(CLI::App& app, Chosen& chosen);
+void add_recording(CLI::App& app, Chosen& chosen);
 void add_robot(CLI::App& app, Chosen& chosen);
 void add_health(CLI::App& app, Chosen& chosen);
 void add_doctor(CLI::App& app, Chosen& chosen);
@@ -39,6 +42,10 @@ void add_completion(CLI::App& app, Chosen& chosen);
 
 // Whether `pons run WORDS` would begin: all that can be told before anything is built. Errors: what it would say.
 [[nodiscard]] Expected<void> check_run(const std::vector<std::string>& words);
+
+// Of an option: a whole number from 0 to `most`. The parser's own conversion clamps what does not fit, and its own
+// range from 0 on names the largest double there is.
+[[nodiscard]] CLI::Validator whole_number(std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
 
 // A line for a person, on stdout or stderr. Never throws.
 void say(std::FILE* out, const std::string& text);

@@ -83,7 +83,9 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
   for (gate::Request& request : visitors_->poll()) {
-    auto asked = gate::asked_from(request.text);
+    auto asked =
+        request.refused ? Expected<gate::Asked>(std::unexpected(*request.refused)) : gate::asked_from(request.text);
+    if (!asked) note_refusal(request.text, asked.error(), now);
     if (asked && asked->operation == gate::Operation::kWatch && watchers_.size() < kWatchersMost) {
       watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
       continue;
@@ -100,6 +102,11 @@ void Desk::attend(Time now) {
   const auto kept = of_tasks.empty() || !bridge_.unkept() ? Expected<void>{} : bridge_.commit(now);
   for (auto& [request, answered] : of_tasks) request.reply(kept ? answered : gate::refusal(kept.error()));
   tell_watchers(now);
+}
+
+// What is no question may have been a task: the journal has it like those that the bridge itself refuses.
+void Desk::note_refusal(const std::string& text, const Error& why, Time now) {
+  if (const auto id = gate::submission_in(text)) bridge_.refuse(text, *id, why, now);
 }
 
 // What is durable, and nothing else.

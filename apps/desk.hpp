@@ -32,6 +32,7 @@ class Desk {
 
  private:
   [[nodiscard]] bridge::Json answer(const gate::Asked& asked, Time now);
+  void note_refusal(const std::string& text, const Error& why, Time now);
   [[nodiscard]] bridge::Json submit(const std::string& task, Time now);
   // The bridge knows more of an open task than the journal's row.
   [[nodiscard]] bridge::Json with_state(const bridge::TaskRecord& record) const;

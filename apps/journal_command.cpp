@@ -1,11 +1,14 @@
-// pons journal: whether one is whole, less of it, and one of an older version.
+// pons journal: whether one is whole, what was refused, less of it, and one of an older version.
 
 #include <fmt/format.h>
 #include <filesystem>
 
 #include "apps/commands.hpp"
+#include "apps/story_text.hpp"
+#include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/bridge/journal/story.hpp"
+#include "pons/task/json_value.hpp"
 
 namespace pons::apps {
 namespace {
@@ -32,6 +35,24 @@ int check(const JournalOptions& options) {
       fmt::format("whole: {} tasks ({} succeeded, {} failed, {} cancelled, {} exceptions, {} open), {} events\n",
                   counts->accepted, counts->succeeded, counts->failed, counts->cancelled, counts->exception,
                   counts->open, counts->events));
+  return kExitGood;
+}
+
+int refused(const JournalOptions& options) {
+  const auto journal = Journal::open_to_read(options.file);
+  if (!journal) return bad_input(journal.error());
+  const auto notes = (*journal)->notes();
+  if (!notes) return bad_run(notes.error());
+  std::int64_t told = 0;
+  for (const bridge::Event& note : *notes) {
+    if (note.kind != bridge::kRefusedEvent) continue;
+    ++told;
+    say(stdout, story_line({{"time_s", note.stamp.s()},
+                            {"task", task::text_of(note.detail, "id")},
+                            {"kind", note.kind},
+                            {"detail", note.detail}}));
+  }
+  if (told == 0) say(stdout, "nothing was refused\n");
   return kExitGood;
 }
 
@@ -67,7 +88,7 @@ int upgrade(const JournalOptions& options) {
 
 void add_journal(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<JournalOptions>();
-  CLI::App* journal = app.add_subcommand("journal", "Check, shorten, or upgrade a journal that no run owns");
+  CLI::App* journal = app.add_subcommand("journal", "Check, read, shorten, or upgrade a journal that no run owns");
   journal->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, int (*run)(const JournalOptions&)) {
     CLI::App* command = journal->add_subcommand(name, what);
@@ -77,9 +98,10 @@ void add_journal(CLI::App& app, Chosen& chosen) {
     return command;
   };
   add("check", "Whether it is whole: the file, each task's story, each record", check);
+  add("refused", "What was sent that no task could be made of or that might not be done, and why", refused);
   add("compact", "Drop what happened to ended tasks between acceptance and outcome", compact)
       ->add_option("--keep", options->keep, "All of so many tasks that ended last (0)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(whole_number(1'000'000'000'000));
   add("upgrade", "Bring one of an older version to this program's", upgrade);
 }
 

@@ -125,6 +125,13 @@ std::string preempting(const Json& d) { return "for " + text(d, "by"); }
 
 std::string held(const Json& d) { return "stopped: " + text(d, "cause"); }
 
+// A submission, or a step that was not begun.
+std::string refused(const Json& d) {
+  const std::string sent = text(d, "text"), untold = text(d, "untold");
+  return fmt::format("{}{}{}{}{}", reason(d), sent.empty() ? "" : "; sent: ", sent, untold.empty() ? "" : "; and ",
+                     untold.empty() ? "" : untold + " more before it");
+}
+
 std::string asked(const Json& d) {
   const auto wanted = d.is_object() ? d.find("wanted") : d.end();
   if (wanted == d.end() || !wanted->is_array()) return {};
@@ -167,7 +174,7 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"held", held},
     {"preempting", preempting},
     {"ended", ended},
-    {"refused", reason},
+    {"refused", refused},
     {"asked", asked},
     {"allowed", allowed},
     {"stopped", stopped},

@@ -243,7 +243,7 @@ void add_task(CLI::App& app, Chosen& chosen) {
   list_command->add_flag("--ended", options->ended, "Only those that have ended, the last accepted first");
   list_command->add_option("--limit", options->limit, "At most so many (100)")->check(CLI::Range(1, 1000));
   list_command->add_option("--after", options->after, "On from there; the page before says from where")
-      ->check(CLI::NonNegativeNumber);
+      ->check(whole_number(1'000'000'000'000));
   list_command->callback([options, &chosen] { chosen = [options] { return list(*options); }; });
 
   CLI::App* show_command = task->add_subcommand("show", "Show one task and what happened to it");

@@ -16,13 +16,14 @@ namespace {
 namespace tree = bridge::tree;
 
 void describe(const std::string& name, const tree::Program& program) {
-  std::string skills, entries;
+  std::string skills, entries, needs;
   for (const tree::SkillUse& use : program.uses) {
     if (skills.find(use.type->name) == skills.npos) skills += (skills.empty() ? "" : ", ") + use.type->name;
   }
   for (const auto& [entry, slot] : program.root) entries += (entries.empty() ? "" : ", ") + entry;
-  fmt::print("{:<14} {} nodes; skills: {}; blackboard: {}\n", name, program.nodes.size(),
-             skills.empty() ? "none" : skills, entries.empty() ? "nothing" : entries);
+  for (const std::string& entry : program.needs) needs += (needs.empty() ? "; to be given: " : ", ") + entry;
+  fmt::print("{:<14} {} nodes; skills: {}; blackboard: {}{}\n", name, program.nodes.size(),
+             skills.empty() ? "none" : skills, entries.empty() ? "nothing" : entries, needs);
   for (const std::string& difference : program.differences) fmt::print("  {}\n", difference);
 }
 

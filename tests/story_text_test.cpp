@@ -40,6 +40,13 @@ TEST(StoryText, SaysHowATaskEnded) {
             "FAILED: dropped; standstill CONFIRMED");
 }
 
+TEST(StoryText, SaysWhatWasRefused) {
+  EXPECT_EQ(told("refused", {{"id", "P1"}, {"reason", "not JSON"}, {"text", "{"}}), "not JSON; sent: {");
+  EXPECT_EQ(told("refused", {{"id", ""}, {"reason", "not JSON"}, {"text", "{"}, {"untold", 30}}),
+            "not JSON; sent: {; and 30 more before it");
+  EXPECT_EQ(told("refused", {{"skill", "pick"}, {"reason", "too heavy"}}), "too heavy");
+}
+
 TEST(StoryText, WhatItDoesNotKnowIsShownAsItIs) {
   EXPECT_EQ(told("novel", {{"a", 1}}), "{\"a\":1}");
   EXPECT_EQ(told("stray", "no object"), "its chute's light curtain has not counted it");

@@ -41,6 +41,18 @@ SweepLock::~SweepLock() {
   if (file_ >= 0) close(file_);
 }
 
+// Never closed here, and inherited: the kernel lets go of it when the last of these processes ends.
+Expected<void> keep_run(const fs::path& folder, const std::function<bool()>& interrupted) {
+  const fs::path file = folder / kLogFile;
+  const int opened = open(file.c_str(), O_RDWR | O_CREAT | O_APPEND, 0666);
+  if (opened < 0) return fail(std::strerror(errno), file.string(), "see that its folder can be written");
+  // A file system without locks has none to wait for.
+  while (flock(opened, LOCK_EX) != 0 && errno == EINTR) {
+    if (interrupted()) return fail("interrupted while another process makes this run", file.string());
+  }
+  return {};
+}
+
 Expected<void> prepare(const fs::path& sweep, const SweepPlan& plan) {
   std::error_code error;
   const bool there = fs::exists(fs::symlink_status(sweep, error));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "apps/sweep/plan.hpp"
@@ -23,6 +24,11 @@ class SweepLock {
   explicit SweepLock(int file) : file_(file) {}
   int file_;
 };
+
+// Waits until nobody makes the run of that folder any more, and then keeps it for this process and those that it
+// starts: whoever gets it next finds none of them at work. Its log is what is locked. Error: that cannot be opened, or
+// `interrupted` said so while it waited.
+[[nodiscard]] Expected<void> keep_run(const std::filesystem::path& folder, const std::function<bool()>& interrupted);
 
 // The folder with this plan in it: an empty or new one gets it, one that has it goes on. Errors, and nothing is written
 // then: it holds another plan, or what is no sweep's; it cannot be written.

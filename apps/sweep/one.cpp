@@ -1,21 +1,18 @@
 #include "apps/sweep/one.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <climits>
 #include <csignal>
-#include <cstring>
 #include <system_error>
 
 #include "apps/commands.hpp"
 #include "apps/run_kit.hpp"
 #include "apps/sweep/children.hpp"
+#include "apps/sweep/folder.hpp"
 #include "apps/sweep/outcome.hpp"
 #include "apps/sweep/plan.hpp"
 
@@ -26,31 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr double kLook_s = 1;
 constexpr int kSignalCode = 128;  // as shells have it
-
-// The log, locked. The run inherits it as its output: as long as any process writes there, nobody else does.
-class LockedLog {
- public:
-  explicit LockedLog(const fs::path& file) : file_(open(file.c_str(), O_RDWR | O_CREAT | O_APPEND, 0666)) {}
-  ~LockedLog() {
-    if (file_ >= 0) close(file_);
-  }
-  LockedLog(const LockedLog&) = delete;
-  LockedLog& operator=(const LockedLog&) = delete;
-
-  // Waits for whoever has it. A file system without locks has none to wait for. Error: the file cannot be opened, or
-  // this process was interrupted.
-  [[nodiscard]] Expected<void> lock(const fs::path& file) const {
-    if (file_ < 0) return fail(std::strerror(errno), file.string(), "see that its folder can be written");
-    while (flock(file_, LOCK_EX) != 0 && errno == EINTR) {
-      if (interrupted()) return fail("interrupted while another process makes this run", file.string());
-    }
-    return {};
-  }
-  void empty() const { (void)!ftruncate(file_, 0); }
-
- private:
-  int file_;
-};
 
 std::string host_name() {
   std::array<char, HOST_NAME_MAX + 1> name{};
@@ -101,13 +73,12 @@ Expected<int> make(const fs::path& sweep, const std::string& name) {
   const fs::path folder = sweep / run->name;
   fs::create_directories(folder, error);
   if (error) return fail(error.message(), folder.string(), "see that the sweep's folder can be written");
-  const LockedLog log(folder / kLogFile);
-  if (auto locked = log.lock(folder / kLogFile); !locked) return std::unexpected(locked.error());
+  if (auto kept = keep_run(folder, interrupted); !kept) return std::unexpected(kept.error());
   const Basis basis{*program, *files};
   if (const auto before = look_at(sweep, *plan, *run, basis); has_result(before))
     return before.fate == record::Fate::kGood ? kExitGood : kExitBadRun;
   for (const char* old : {kOutcomeFile, kReportFile, kLoopFile}) fs::remove(folder / old, error);
-  log.empty();
+  fs::resize_file(folder / kLogFile, 0, error);
 
   const auto ended = run_to_its_end(*plan, *run, folder);
   if (!ended) return std::unexpected(ended.error());

@@ -7,11 +7,23 @@
 
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/open_task.hpp"
+#include "pons/task/json_text.hpp"
 
 namespace pons::bridge {
 namespace {
 
-constexpr std::string_view kRefusedEvent = "refused";  // {"id","reason"}, and {"untold"} before it
+constexpr std::size_t kReasonBytes = 1024, kTextBytes = 200;
+
+// The id of the task that is no task: the one that the error is about, where several were sent.
+std::string id_of(std::string_view text, const Error& why) {
+  constexpr std::string_view kSeveral = "/tasks/";
+  const bool several = why.where.starts_with(kSeveral);
+  const std::string place = (several ? why.where.substr(0, why.where.find('/', kSeveral.size())) : "") + "/id";
+  const std::string_view looked = place;
+  const auto seen = task::glimpse(text, {&looked, 1});
+  const auto id = seen.find(place);
+  return id != seen.end() && task::is_id(id->second) ? id->second : std::string{};
+}
 
 }  // namespace
 
@@ -27,10 +39,10 @@ Expected<std::vector<Admission>> Bridge::submit_all(std::string_view json, Time 
     if (!tasks) return std::unexpected(tasks.error());
     // Before any work is done for them.
     if (auto counted = review_.rules().count_tasks(tasks->size(), now); !counted) {
-      note_refused(tasks->front().id, tasks->front().order, counted.error().line(), now);
+      note_refused({tasks->front().id, tasks->front().order, json}, counted.error(), now);
       return std::unexpected(counted.error());
     }
-    return admit(*std::move(tasks), now);
+    return admit(*std::move(tasks), json, now);
   }();
   if (!admissions) ++refused_;
   return admissions;
@@ -39,21 +51,30 @@ Expected<std::vector<Admission>> Bridge::submit_all(std::string_view json, Time 
 Expected<std::vector<task::Task>> Bridge::parse(std::string_view json, Time now) {
   if (fault_) return fail("the bridge has stopped: " + fault_->line(), {}, "start it again");
   auto tasks = Review::parse(json);
-  if (!tasks) note_refused({}, {}, tasks.error().line(), now);
+  if (!tasks) note_refused({id_of(json, tasks.error()), {}, json}, tasks.error(), now);
   return tasks;
+}
+
+void Bridge::refuse(std::string_view text, const std::string& id, const Error& why, Time now) {
+  ++refused_;
+  if (!fault_) note_refused({id, {}, text}, why, now);
 }
 
 Expected<Admission> Bridge::admit_one(std::string_view json, Time now) {
   auto tasks = parse(json, now);
   if (!tasks) return std::unexpected(tasks.error());
-  if (tasks->size() > 1) return fail("several tasks where one is asked for", "/tasks", "give one");
-  auto admissions = admit(*std::move(tasks), now);
+  if (tasks->size() > 1) {
+    auto several = fail("several tasks where one is asked for", "/tasks", "give one");
+    note_refused({{}, {}, json}, several.error(), now);
+    return several;
+  }
+  auto admissions = admit(*std::move(tasks), json, now);
   if (!admissions) return std::unexpected(admissions.error());
   return std::move(admissions->front());
 }
 
-Expected<std::vector<Admission>> Bridge::admit(std::vector<task::Task> tasks, Time now) {
-  auto candidates = examine_all(std::move(tasks), now);
+Expected<std::vector<Admission>> Bridge::admit(std::vector<task::Task> tasks, std::string_view text, Time now) {
+  auto candidates = examine_all(std::move(tasks), text, now);
   if (!candidates) return std::unexpected(candidates.error());
   std::vector<Admission> admissions;
   for (Candidate& candidate : *candidates) {
@@ -64,7 +85,8 @@ Expected<std::vector<Admission>> Bridge::admit(std::vector<task::Task> tasks, Ti
   return admissions;
 }
 
-Expected<std::vector<Bridge::Candidate>> Bridge::examine_all(std::vector<task::Task> tasks, Time now) {
+Expected<std::vector<Bridge::Candidate>> Bridge::examine_all(std::vector<task::Task> tasks, std::string_view text,
+                                                             Time now) {
   std::vector<Candidate> candidates;
   std::set<std::string> ids;
   const bool several = tasks.size() > 1;
@@ -76,7 +98,7 @@ Expected<std::vector<Bridge::Candidate>> Bridge::examine_all(std::vector<task::T
                               : fail(fmt::format("the id '{}' is there twice", id), "/id", "give each task its own");
     if (!candidate) {
       if (several) candidate.error().where = fmt::format("/tasks/{}{}", candidates.size(), candidate.error().where);
-      note_refused(id, order, candidate.error().line(), now);
+      note_refused({id, order, text}, candidate.error(), now);
       let_go(candidates);
       return std::unexpected(candidate.error());
     }
@@ -130,15 +152,17 @@ Expected<Admission> Bridge::take(Candidate candidate, Time now) {
 }
 
 // Not for good at once: nobody waits for it.
-void Bridge::note_refused(const std::string& id, const std::string& order, const std::string& reason, Time now) {
+void Bridge::note_refused(const Sent& sent, const Error& why, Time now) {
   if (refusals_.wait(now) > Duration{0}) {
     ++untold_refusals_;
     return;
   }
   refusals_.count(now);
-  Json detail{{"id", id}, {"reason", reason}};
+  Json detail{{"id", sent.id},
+              {"reason", task::excerpt(why.line(), kReasonBytes)},
+              {"text", task::excerpt(sent.text, kTextBytes)}};
   if (untold_refusals_ > 0) detail["untold"] = std::exchange(untold_refusals_, 0);
-  note(kRefusedEvent, detail, now, order.empty() ? id : order);
+  note(kRefusedEvent, detail, now, sent.order.empty() ? sent.id : sent.order);
 }
 
 }  // namespace pons::bridge

@@ -72,6 +72,47 @@ TEST_F(Approvals, TheJournalTellsOfSoManyRefusalsAndCountsTheRest) {
   EXPECT_EQ(bridge_->refused(), 51);
 }
 
+TEST_F(Approvals, TheJournalSaysOfWhatIsNoTaskWhatAndWhereAndHowItBegan) {
+  open({});
+  const auto last = [&] { return journal_->notes().value().back(); };
+  EXPECT_FALSE(submit_text(R"({"id":"a","steps":[],"colour":"red"})"));
+  EXPECT_EQ(last().order, "a");
+  EXPECT_EQ(last().detail.at("reason"),
+            R"('colour' does not belong there; use only deadline_s, id, order, priority, steps, tree)");
+  EXPECT_EQ(last().detail.at("text"), R"({"id":"a","steps":[],"colour":"red"})");
+  // Of several, the one that is none.
+  EXPECT_FALSE(
+      bridge_->submit_all(R"({"tasks":[{"id":"b","steps":[{"skill":"pick"}]},{"id":"c","priority":-1}]})", now_));
+  EXPECT_EQ(last().order, "c");
+  EXPECT_THAT(last().detail.at("reason").get<std::string>(), HasSubstr("/tasks/1/priority: "));
+  EXPECT_FALSE(
+      submit_text(R"({"tasks":[{"id":"b","steps":[{"skill":"pick"}]},{"id":"d","steps":[{"skill":"pick"}]}]})"));
+  EXPECT_EQ(last().order, "");
+  EXPECT_THAT(last().detail.at("reason").get<std::string>(), HasSubstr("several tasks where one is asked for"));
+  // What was long is cut, and what is no name is no id.
+  EXPECT_FALSE(submit_text(R"({"id":"../e","x":")" + std::string(5000, 'x') + "\n"));
+  EXPECT_EQ(last().order, "");
+  EXPECT_EQ(last().detail.at("id"), "");
+  EXPECT_LT(last().detail.dump().size(), 500U);
+  EXPECT_TRUE(bridge_->idle());
+}
+
+TEST_F(Approvals, WhatASenderCouldNotEvenSayIsCountedAndToldInTheSameWay) {
+  open({});
+  bridge_->refuse("{\"op\":", "a", {"not JSON", "byte 7", "send JSON"}, now_);
+  const Event told = journal_->notes().value().back();
+  EXPECT_EQ(told.kind, kRefusedEvent);
+  EXPECT_EQ(told.order, "a");
+  EXPECT_EQ(told.detail, (Json{{"id", "a"}, {"reason", "byte 7: not JSON; send JSON"}, {"text", "{\"op\":"}}));
+  for (int i = 0; i < 50; ++i) bridge_->refuse("x", {}, {"not JSON", {}, {}}, now_);
+  EXPECT_EQ(kinds("").size(), 20U);
+  now_ += from_s(60);
+  EXPECT_FALSE(submit_text("{}")) << "one bound for both";
+  EXPECT_EQ(journal_->notes().value().back().detail.at("untold"), 31);
+  EXPECT_EQ(bridge_->refused(), 52);
+  EXPECT_TRUE(audit(*journal_).empty());
+}
+
 TEST_F(Approvals, WhatWasRightWhenItWasTakenIsLookedAtAgainWhenItStarts) {
   open({.rules = {{.name = "heavy", .skills = {"pick"}, .when = {"object.mass_kg > 2"}, .refuse = "too heavy"}}});
   masses_ = {{"crate", 1.0}};

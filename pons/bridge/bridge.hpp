@@ -37,6 +37,9 @@ inline constexpr std::size_t kMaxUrgent = 10'100;  // until there are so many, a
 inline constexpr std::size_t kMostEvents = 512, kLastEvents = 256;
 // A skill that was cancelled, or ran out of time, and has not ended after this long is given up: see Bridge::fault().
 inline constexpr Duration kCancelGrace = std::chrono::seconds(30);
+// A note of what was refused: {"id","reason","text"}, the beginning of what was sent; and where the notes before it do
+// not tell of all, "untold", how many they left out.
+inline constexpr std::string_view kRefusedEvent = "refused";
 
 struct Admission {
   std::string id;
@@ -87,6 +90,9 @@ class Bridge {
   [[nodiscard]] Expected<Admission> submit(std::string_view json, Time now);
   // A reply from outside, a task or {"tasks":[…]}: all of it or nothing; and no more often than the rules say.
   [[nodiscard]] Expected<std::vector<Admission>> submit_all(std::string_view json, Time now);
+  // A submission whose text nobody could make a task of, as whoever brought it has found: counted and journaled as
+  // those that submit() refuses are. `id` is that of its task, or empty where none can be read.
+  void refuse(std::string_view text, const std::string& id, const Error& why, Time now);
   // Takes up what the journal's last owner left open, before the first tick. Tasks not begun wait again; of those
   // begun, `resume` says which go on, with the first step that is not known to have succeeded and before all others,
   // and which end, and how. A task that was begun stays with its robot. Error: the journal cannot be read or written.
@@ -180,12 +186,18 @@ class Bridge {
   // admission.cpp
   [[nodiscard]] Expected<std::vector<task::Task>> parse(std::string_view json, Time now);
   [[nodiscard]] Expected<Admission> admit_one(std::string_view json, Time now);
-  [[nodiscard]] Expected<std::vector<Admission>> admit(std::vector<task::Task> tasks, Time now);
-  [[nodiscard]] Expected<std::vector<Candidate>> examine_all(std::vector<task::Task> tasks, Time now);
+  [[nodiscard]] Expected<std::vector<Admission>> admit(std::vector<task::Task> tasks, std::string_view text, Time now);
+  [[nodiscard]] Expected<std::vector<Candidate>> examine_all(std::vector<task::Task> tasks, std::string_view text,
+                                                             Time now);
   [[nodiscard]] Expected<Candidate> examine(task::Task task, std::size_t others, Time now);
   [[nodiscard]] Expected<Admission> take(Candidate candidate, Time now);
   void let_go(const std::vector<Candidate>& candidates);
-  void note_refused(const std::string& id, const std::string& order, const std::string& reason, Time now);
+  // Whose submission, as far as that is known, and its text.
+  struct Sent {
+    std::string id, order;
+    std::string_view text;
+  };
+  void note_refused(const Sent& sent, const Error& why, Time now);
   [[nodiscard]] Open& add_open(task::Task task, std::shared_ptr<const tree::Program> program, Time accepted,
                                std::int64_t sequence);
   [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,

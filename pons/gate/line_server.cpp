@@ -20,12 +20,12 @@ bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || 
 
 }  // namespace
 
-void Mailbox::deliver(LineName name, std::string line) {
+void Mailbox::deliver(Line line) {
   const std::scoped_lock lock(mutex_);
-  lines_.emplace_back(name, std::move(line));
+  lines_.push_back(std::move(line));
 }
 
-std::vector<std::pair<LineName, std::string>> Mailbox::take_lines() {
+std::vector<Line> Mailbox::take_lines() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(lines_, {});
 }
@@ -183,7 +183,12 @@ void LineServer::deliver_line(std::uint64_t id, Client& client) {
   for (;;) {
     const std::size_t end = client.in.find('\n');
     if (std::min(end, client.in.size()) > limits_.line_bytes) {
-      refuse(client, fmt::format("a line has at most {} bytes", limits_.line_bytes));
+      client.closing = true;
+      client.waiting = true;
+      client.in.resize(limits_.line_bytes);
+      mailbox_->deliver({{id, ++client.line},
+                         std::exchange(client.in, {}),
+                         Error{fmt::format("a line has at most {} bytes", limits_.line_bytes), {}, {}}});
       return;
     }
     if (end == std::string::npos) return;
@@ -192,7 +197,7 @@ void LineServer::deliver_line(std::uint64_t id, Client& client) {
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (line.empty()) continue;
     client.waiting = true;
-    mailbox_->deliver({id, ++client.line}, std::move(line));
+    mailbox_->deliver({{id, ++client.line}, std::move(line)});
     return;
   }
 }

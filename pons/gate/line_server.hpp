@@ -22,14 +22,20 @@ struct LineName {
   bool operator==(const LineName&) const = default;
 };
 
+struct Line {
+  LineName name;
+  std::string text;
+  std::optional<Error> refused = {};  // as a Request's
+};
+
 // What the thread and the runner share.
 class Mailbox {
  public:
   // `wake` is an eventfd.
   explicit Mailbox(Descriptor wake) : wake_(std::move(wake)) {}
 
-  void deliver(LineName name, std::string line);
-  [[nodiscard]] std::vector<std::pair<LineName, std::string>> take_lines();
+  void deliver(Line line);
+  [[nodiscard]] std::vector<Line> take_lines();
   void answer(LineName name, std::string text);
   [[nodiscard]] std::vector<std::pair<LineName, std::string>> take_answers();
 
@@ -40,7 +46,8 @@ class Mailbox {
  private:
   Descriptor wake_;
   std::mutex mutex_;
-  std::vector<std::pair<LineName, std::string>> lines_, answers_;  // under mutex_
+  std::vector<Line> lines_;                                // under mutex_
+  std::vector<std::pair<LineName, std::string>> answers_;  // likewise
 };
 
 class LineServer {

@@ -32,9 +32,9 @@ Expected<void> clear_stale(const std::filesystem::path& path, const sockaddr_un&
   return fail(fmt::format("the stale socket cannot be removed: {}", std::strerror(errno)), path.string(), "remove it");
 }
 
-std::string dump_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'; }
-
 }  // namespace
+
+std::string dump_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n'; }
 
 struct LocalSocket::Server {
   std::filesystem::path path;
@@ -86,10 +86,12 @@ LocalSocket::~LocalSocket() {
 
 std::vector<Request> LocalSocket::poll() {
   std::vector<Request> requests;
-  for (auto& [name, line] : server_->mailbox->take_lines()) {
-    requests.push_back({std::move(line), [mailbox = server_->mailbox, name = name](const Json& answer) {
+  for (Line& line : server_->mailbox->take_lines()) {
+    requests.push_back({std::move(line.text),
+                        [mailbox = server_->mailbox, name = line.name](const Json& answer) {
                           mailbox->answer(name, dump_line(answer));
-                        }});
+                        },
+                        std::move(line.refused)});
   }
   return requests;
 }

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,10 +25,11 @@ using Json = nlohmann::json;
 struct Request {
   std::string text;
   std::function<void(const Json&)> reply;
+  std::optional<Error> refused = {};  // why it was not read to its end: `text` is its beginning; no line follows
 };
 
 struct SocketLimits {
-  std::size_t line_bytes = 64UL * 1024;          // a longer line: an error line back, and the end of the connection
+  std::size_t line_bytes = 64UL * 1024;          // a longer line is refused, and its answer ends the connection
   std::size_t clients = 32;                      // one more is told so and closed
   std::size_t reply_bytes = 16UL * 1024 * 1024;  // waiting for one client; more ends the connection
   std::chrono::milliseconds patience{10'000};    // for half a line, and for a client to read what waits for it
@@ -59,6 +61,9 @@ class LocalSocket final : public Visitors {
   explicit LocalSocket(std::unique_ptr<Server> server);
   std::unique_ptr<Server> server_;
 };
+
+// As a line: what is no text becomes U+FFFD.
+[[nodiscard]] std::string dump_line(const Json& json);
 
 // Sends one request and waits for its answer. Errors: nobody listens, no answer in time, an answer that is not JSON.
 [[nodiscard]] Expected<Json> ask(const std::filesystem::path& path, const Json& request,

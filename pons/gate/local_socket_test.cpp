@@ -158,11 +158,22 @@ TEST_F(LocalSocketTest, RefusesLongLines) {
   RawClient exact(path_), above(path_), endless(path_);
   exact.send(std::string(100, 'a') + "\n");
   EXPECT_EQ(wait_for_requests(*socket).at(0).text.size(), 100u);
-  above.send(std::string(101, 'a') + "\n");
-  EXPECT_EQ(above.line(), R"({"error":"a line has at most 100 bytes","ok":false})");
+  const auto refuse = [&] {
+    const std::vector<Request> requests = wait_for_requests(*socket);
+    ASSERT_EQ(requests.size(), 1u);
+    EXPECT_EQ(requests[0].text, std::string(100, 'a'));
+    ASSERT_TRUE(requests[0].refused);
+    EXPECT_EQ(requests[0].refused->line(), "a line has at most 100 bytes");
+    requests[0].reply("no");
+  };
+  above.send(std::string(101, 'a') + "\nb\n");
+  refuse();
+  EXPECT_EQ(above.line(), "\"no\"");
   EXPECT_EQ(above.line(), "");
   endless.send(std::string(5000, 'a'));
-  EXPECT_EQ(endless.line(), R"({"error":"a line has at most 100 bytes","ok":false})");
+  refuse();
+  EXPECT_EQ(endless.line(), "\"no\"");
+  EXPECT_EQ(endless.line(), "");
   EXPECT_TRUE(socket->poll().empty());
 }
 

@@ -140,6 +140,17 @@ Expected<Asked> asked_from(std::string_view text) {
   return Asked{.operation = kBare.at(operation)};
 }
 
+std::optional<std::string> submission_in(std::string_view text) {
+  constexpr std::array<std::string_view, 5> kPlaces = {"/op", "/id", "/task", "/tasks", "/task/id"};
+  const auto seen = task::glimpse(text, kPlaces);
+  const auto operation = seen.find("/op");
+  const bool brings = seen.contains("/task") || seen.contains("/tasks");
+  if (operation != seen.end() && operation->second != "submit" && !brings) return std::nullopt;
+  // A task that was sent without the request round it has its own.
+  const auto id = seen.find(operation == seen.end() && !brings ? "/id" : "/task/id");
+  return id != seen.end() && task::is_id(id->second) ? id->second : std::string{};
+}
+
 Json refusal(const Error& error) { return {{"ok", false}, {"error", error.line()}}; }
 
 }  // namespace pons::gate

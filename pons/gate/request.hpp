@@ -30,6 +30,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -80,6 +81,10 @@ struct Asked {
 // Hostile text to a question: bounded, no unknown operation, no unknown member. Error chunk_size (by `where`): an
 // action of more axes than any robot has.
 [[nodiscard]] Expected<Asked> asked_from(std::string_view text);
+
+// Whether a text that asked_from() refuses was to submit a task: the id of that, or empty where none can be read.
+// Nothing: it was something else, for it names another operation and brings no task.
+[[nodiscard]] std::optional<std::string> submission_in(std::string_view text);
 
 [[nodiscard]] task::Json refusal(const Error& error);
 

@@ -103,5 +103,22 @@ TEST(AskedFrom, RefusesEverythingElse) {
   }
 }
 
+TEST(SubmissionIn, TellsWhatWasToBeATaskFromQuestions) {
+  for (const char* text :
+       {R"({"op":"list","id":"a"})", R"({"op":"show","id":"a)", R"({"op":"dance","id":"a"})", R"({"op":"stop"}x)"})
+    EXPECT_FALSE(submission_in(text)) << text;
+  const std::string deep(500, '[');
+  for (const std::string& text :
+       {R"({"op":"submit","task":{"id":"a","steps":)" + deep,
+        std::string(R"({"op":"submit","task":{"id":"a"},"by":"Kim"})"),
+        std::string(R"({"op":"dance","task":{"id":"a"}})"), std::string(R"({"task":{"id":"a"},"op":"list"})"),
+        std::string(R"({"id":"a","steps":[]})")})
+    EXPECT_EQ(submission_in(text), "a") << text;
+  for (const char* text : {"", "hello", "[]", "{}", R"({"op":"submit"})", R"({"op":"submit","id":"a"})",
+                           R"({"op":"submit","tasks":[{"id":"a"},7]})", R"({"op":"submit","task":{"id":"a b"}})",
+                           R"({"op":"submit","task":{"id":7}})"})
+    EXPECT_EQ(submission_in(text), "") << text;
+}
+
 }  // namespace
 }  // namespace pons::gate

@@ -9,8 +9,8 @@ Time PeriodicLoop::sleep_until(Time scheduled) {
   timespec deadline = clock_.absolute(scheduled);
   leashed_ns_ = 0;
   for (std::int64_t asleep_ns = 0;;) {
-    const auto woken = word_.wait(seen_, deadline);
-    const std::int64_t raw_ns = MonotonicClock::raw_ns();
+    const auto woken = sleeper_.wait(word_, seen_, deadline);
+    const std::int64_t raw_ns = sleeper_.raw_ns();
     const Time now = clock_.now();
     late_ = Duration(raw_ns - deadline.tv_sec * 1'000'000'000LL - deadline.tv_nsec);
     // A look at a clock that stands still takes a moment more than it should; beyond that the thread was held up.
@@ -24,7 +24,7 @@ Time PeriodicLoop::sleep_until(Time scheduled) {
 }
 
 void PeriodicLoop::begin_tick() {
-  const std::int64_t now_ns = MonotonicClock::raw_ns();
+  const std::int64_t now_ns = sleeper_.raw_ns();
   gap_ = begun_ns_ == 0 ? Duration{0} : Duration(now_ns - begun_ns_ - leashed_ns_);
   begun_ns_ = now_ns;
 }

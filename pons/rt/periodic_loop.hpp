@@ -11,6 +11,18 @@
 
 namespace pons::rt {
 
+// What a loop sleeps by. Tests hand in one of their own, whose time is what they say.
+class Sleeper {
+ public:
+  virtual ~Sleeper() = default;
+  // CLOCK_MONOTONIC, in nanoseconds.
+  [[nodiscard]] virtual std::int64_t raw_ns() const { return MonotonicClock::raw_ns(); }
+  // As WakeWord::wait().
+  [[nodiscard]] virtual WakeWord::Woken wait(const WakeWord& word, std::uint32_t seen, const timespec& deadline) const {
+    return word.wait(seen, deadline);
+  }
+};
+
 // Runs a tick at start + k·period by absolute deadlines on CLOCK_MONOTONIC. A tick whose time has passed when it would
 // begin is skipped and counted, never replayed: replaying spreads one delay over many ticks. One thread owns it.
 class PeriodicLoop {
@@ -19,6 +31,9 @@ class PeriodicLoop {
   // Whoever changes `word` gets a tick at once, beside the schedule, which stays as it is. `word` must outlive this.
   PeriodicLoop(const MonotonicClock& clock, Duration period, const WakeWord& word)
       : clock_(clock), period_(period), word_(word) {}
+  // For tests; `sleeper` must outlive this.
+  PeriodicLoop(const MonotonicClock& clock, Duration period, const Sleeper& sleeper)
+      : clock_(clock), period_(period), word_(never_), sleeper_(sleeper) {}
   PeriodicLoop(const PeriodicLoop&) = delete;
   PeriodicLoop& operator=(const PeriodicLoop&) = delete;
 
@@ -46,6 +61,8 @@ class PeriodicLoop {
   const Duration period_;
   const WakeWord never_;  // changes for nobody
   const WakeWord& word_;
+  const Sleeper usual_;
+  const Sleeper& sleeper_ = usual_;
   std::uint32_t seen_ = 0;  // of the word
   std::uint64_t ticks_ = 0, missed_ = 0, woken_ = 0;
   Duration late_{0}, gap_{0};

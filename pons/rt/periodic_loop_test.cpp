@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <deque>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace pons::rt {
@@ -61,28 +63,66 @@ TEST(PeriodicLoop, TicksOnAClockThatStandsStill) {
   EXPECT_EQ(loop.missed(), 7U);
 }
 
-// Nobody holds the thread up: that its clock stands still is told apart from that.
-TEST(PeriodicLoop, WhatItWaitsForItsClockIsNoGap) {
-  constexpr Duration kPeriod{500'000}, kStill{100'000'000};
-  MonotonicClock clock(4 * kPeriod);
-  const std::int64_t until_ns = MonotonicClock::raw_ns() + kStill.count();
-  std::thread pacer([&] {
-    while (MonotonicClock::raw_ns() < until_ns) {
+// Its sleeps are over at once; by its own time they took as long as they should, and so much longer as it is told. It
+// paces the clock, too.
+class ToldSleeper final : public Sleeper {
+ public:
+  static constexpr Duration kPeriod{500'000}, kLeash{2'000'000};
+
+  explicit ToldSleeper(MonotonicClock& clock) : clock_(clock) {}
+
+  [[nodiscard]] std::int64_t raw_ns() const override { return raw_ns_; }
+  [[nodiscard]] WakeWord::Woken wait(const WakeWord&, std::uint32_t, const timespec& deadline) const override {
+    const std::int64_t late_ns = late_ns_.empty() ? 0 : late_ns_.front();
+    if (!late_ns_.empty()) late_ns_.pop_front();
+    const std::int64_t until_ns = deadline.tv_sec * 1'000'000'000LL + deadline.tv_nsec;
+    raw_ns_ = std::max(raw_ns_, until_ns) + late_ns;
+    if (late_ns_.empty()) move_on();
+    return WakeWord::Woken::kDeadline;
+  }
+  // Of the waits to come. With the last of them the clock goes on by a period and stands there.
+  void are_late_by(std::deque<std::int64_t> late_ns) { late_ns_ = std::move(late_ns); }
+
+ private:
+  void move_on() const {
+    const Time to = clock_.now() + kPeriod;
+    clock_.reach(to - kLeash);
+    while (clock_.now() < to) {
     }
-    clock.let_go();
-  });
-  PeriodicLoop loop(clock, kPeriod);
-  Duration longest_gap{0}, longest_between{0};
-  std::int64_t last_ns = MonotonicClock::raw_ns();
+  }
+
+  MonotonicClock& clock_;
+  mutable std::int64_t raw_ns_ = MonotonicClock::raw_ns();
+  mutable std::deque<std::int64_t> late_ns_;
+};
+
+// That its clock stands still is told apart from somebody who holds the thread up; no time of this computer counts
+// here.
+TEST(PeriodicLoop, WhatItWaitsForItsClockIsNoGap) {
+  constexpr std::int64_t kLook_ns = 200'000;
+  MonotonicClock clock(ToldSleeper::kLeash);
+  while (clock.now() < Time(ToldSleeper::kLeash)) {
+  }
+  ToldSleeper sleeper(clock);
+  PeriodicLoop loop(clock, ToldSleeper::kPeriod, sleeper);
+  std::vector<std::int64_t> gaps_ns, between_ns;
+  std::int64_t last_ns = 0;
   loop.run([&](Time) {
-    longest_gap = std::max(longest_gap, loop.gap());
-    longest_between = std::max(longest_between, Duration(loop.begun_ns() - last_ns));
+    gaps_ns.push_back(loop.gap().count());
+    between_ns.push_back(loop.begun_ns() - last_ns);
     last_ns = loop.begun_ns();
-    return last_ns < until_ns;
+    // The first wait is the sleep to the tick; those after it look at a clock that stands still.
+    if (gaps_ns.size() == 1) sleeper.are_late_by({0, 0, 0, 0, 0});
+    if (gaps_ns.size() == 2) sleeper.are_late_by({7'000'000});
+    if (gaps_ns.size() == 3) sleeper.are_late_by({0, 50'000, 9'000'000});
+    return gaps_ns.size() < 4;
   });
-  pacer.join();
-  EXPECT_GT(longest_between, kStill / 2);
-  EXPECT_LT(longest_gap, kStill / 2);
+  ASSERT_EQ(gaps_ns.size(), 4U);
+  EXPECT_EQ(gaps_ns[0], 0) << "there is none before it";
+  EXPECT_EQ(between_ns[1] - gaps_ns[1], 4 * kLook_ns) << "looks take what they should";
+  EXPECT_EQ(gaps_ns[2], between_ns[2]) << "nobody waited for the clock: it was held up in its sleep";
+  EXPECT_EQ(between_ns[3] - gaps_ns[3], kLook_ns + 50'000 + 1'000'000) << "what a look takes beyond a millisecond is";
+  EXPECT_EQ(loop.missed(), 0U);
 }
 
 // Far apart ticks, so that the one the word asks for cannot be one of the schedule's.

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace pons::task {
@@ -54,6 +57,76 @@ class Bounds final : public nlohmann::json_sax<Json> {
   std::vector<std::set<std::string>> names_;  // of the objects now open; arrays have an empty set
 };
 
+// Knows where it is, as deep as anybody asks.
+class Glimpser final : public nlohmann::json_sax<Json> {
+ public:
+  explicit Glimpser(std::span<const std::string_view> places) : places_(places) {}
+
+  std::map<std::string, std::string, std::less<>> seen;
+
+  bool null() override { return scalar({}); }
+  bool boolean(bool) override { return scalar({}); }
+  bool number_integer(number_integer_t) override { return scalar({}); }
+  bool number_unsigned(number_unsigned_t) override { return scalar({}); }
+  bool number_float(number_float_t, const string_t&) override { return scalar({}); }
+  bool string(string_t& value) override { return scalar(value); }
+  bool binary(binary_t&) override { return scalar({}); }
+  bool start_object(std::size_t) override { return enter(Level::kObject); }
+  bool end_object() override { return leave(); }
+  bool start_array(std::size_t) override { return enter(Level::kArray); }
+  bool end_array() override { return leave(); }
+  bool key(string_t& name) override {
+    // No place has "~": a name with a '/' is none of those that are looked for.
+    if (deeper_ == 0) levels_.back().name = name.find_first_of("/~") == name.npos ? name : "~";
+    return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception&) override { return false; }
+
+ private:
+  static constexpr std::size_t kDeepest = 3;
+  struct Level {
+    enum Of : std::uint8_t { kObject, kArray } of = kObject;
+    std::size_t index = 0;
+    std::string name;
+  };
+
+  void look(std::string_view value) {
+    std::string here;
+    for (const Level& level : levels_)
+      here += '/' + (level.of == Level::kArray ? std::to_string(level.index) : level.name);
+    if (std::ranges::find(places_, here) != places_.end()) seen.emplace(here, value);
+  }
+  bool scalar(std::string_view value) {
+    if (deeper_ == 0) look(value);
+    return next();
+  }
+  bool next() {
+    if (deeper_ == 0 && !levels_.empty()) ++levels_.back().index;
+    return true;
+  }
+  bool enter(Level::Of of) {
+    if (deeper_ == 0) look({});
+    if (deeper_ > 0 || levels_.size() == kDeepest) {
+      ++deeper_;
+    } else {
+      levels_.push_back({of, 0, {}});
+    }
+    return true;
+  }
+  bool leave() {
+    if (deeper_ > 0) {
+      --deeper_;
+    } else {
+      levels_.pop_back();
+    }
+    return next();
+  }
+
+  std::span<const std::string_view> places_;
+  std::vector<Level> levels_;
+  std::size_t deeper_ = 0;  // so many are open below the last of these
+};
+
 }  // namespace
 
 Expected<Json> parse_json(std::string_view text) {
@@ -67,6 +140,14 @@ Expected<Json> parse_json(std::string_view text) {
   Bounds bounds;
   if (!Json::sax_parse(text, &bounds)) return fail(bounds.problem, {}, "send one JSON value (RFC 8259)");
   return Json::parse(text);
+}
+
+std::map<std::string, std::string, std::less<>> glimpse(std::string_view text,
+                                                        std::span<const std::string_view> places) {
+  text = text.substr(0, kMaxJsonBytes);
+  Glimpser glimpser(places);
+  (void)Json::sax_parse(text.substr(0, text.find('\0')), &glimpser);
+  return std::move(glimpser.seen);
 }
 
 std::string excerpt(std::string_view text, std::size_t bytes) {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <functional>
+#include <map>
 #include <string>
 
 namespace pons::task {
@@ -70,6 +73,33 @@ TEST(ParseJson, RefusesWhatIsNotUtf8OrNotJson) {
 
 TEST(ParseJson, RefusesNumbersBeyondADouble) {
   EXPECT_EQ(parse_json("[1e999]").error().what, "number out of range at byte 6");
+}
+
+using Seen = std::map<std::string, std::string, std::less<>>;
+
+Seen seen(std::string_view text) {
+  constexpr std::array<std::string_view, 4> kPlaces = {"/op", "/task", "/task/id", "/tasks/1/id"};
+  return glimpse(text, kPlaces);
+}
+
+TEST(Glimpse, SeesWhatIsAtItsPlacesOnly) {
+  EXPECT_EQ(seen(R"({"x":{"op":"no"},"op":"submit","task":{"steps":[{"id":"no"},1],"id":"a"},"id":"no"})"),
+            (Seen{{"/op", "submit"}, {"/task", ""}, {"/task/id", "a"}}));
+  EXPECT_EQ(seen(R"({"tasks":[{"id":"a","x":[[1],{"y":2}]},{"x":{},"id":"b"},{"id":"c"}]})"),
+            (Seen{{"/tasks/1/id", "b"}}));
+  EXPECT_EQ(seen(R"({"task/id":"a","op":1,"op":"second"})"), (Seen{{"/op", ""}}));
+  EXPECT_EQ(seen(R"(["op",{"op":"x"}])"), Seen{});
+}
+
+TEST(Glimpse, SeesAsFarAsTheTextCanBeRead) {
+  EXPECT_EQ(seen(R"({"op":"submit","task":{"id":"a","steps":[)"),
+            (Seen{{"/op", "submit"}, {"/task", ""}, {"/task/id", "a"}}));
+  EXPECT_EQ(seen("{\"op\":\"submit\",\"task\":{\"x\":\"\xff\",\"id\":\"a\"}}"),
+            (Seen{{"/op", "submit"}, {"/task", ""}}));
+  EXPECT_EQ(seen(R"({"task":{"x":)" + nested(1000) + R"(,"id":"a"}})"), (Seen{{"/task", ""}, {"/task/id", "a"}}));
+  EXPECT_EQ(seen(R"({"op":"a","x":")" + std::string(kMaxJsonBytes, 'x') + R"(","task":1})"), (Seen{{"/op", "a"}}));
+  EXPECT_EQ(seen(std::string("{\"op\":\"a\"\0,\"task\":1}", 20)), (Seen{{"/op", "a"}}));
+  for (const char* text : {"", "{", "]", "op"}) EXPECT_EQ(seen(text), Seen{}) << text;
 }
 
 TEST(Excerpt, CutsBetweenCharactersAndShowsControls) {

@@ -63,6 +63,11 @@ Expected<Outcome> outcome_from(std::string_view name) {
   return fail(fmt::format("'{}' is no outcome", excerpt(name)), {}, "use SUCCEEDED, FAILED, CANCELLED or EXCEPTION");
 }
 
+bool is_id(std::string_view text) {
+  constexpr std::string_view kAllowed = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._:-";
+  return !text.empty() && text.size() <= 64 && text.find_first_not_of(kAllowed) == text.npos;
+}
+
 Json to_json(const Task& task) {
   Json json{{"id", task.id}, {"priority", task.priority}};
   if (!task.order.empty()) json["order"] = task.order;

@@ -47,6 +47,9 @@ enum class Outcome : std::uint8_t { kSucceeded, kFailed, kCancelled, kException 
 [[nodiscard]] std::string_view name(Outcome outcome);
 [[nodiscard]] Expected<Outcome> outcome_from(std::string_view name);
 
+// Whether it may be the id of a task, as the schema says.
+[[nodiscard]] bool is_id(std::string_view text);
+
 [[nodiscard]] Json to_json(const Task& task);
 // Shape and ranges only; which skills exist and what they take, the bridge's review knows.
 [[nodiscard]] Expected<Task> task_from(const Json& json);

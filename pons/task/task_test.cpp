@@ -29,6 +29,22 @@ TEST(Task, SurvivesTheWayThroughJson) {
   EXPECT_EQ(to_json(*task_from(to_json(*task))), good());
 }
 
+TEST(Task, KnowsAnIdAsTheSchemaDoes) {
+  const auto both = [](const std::string& id) {
+    Json json = good();
+    json["id"] = id;
+    EXPECT_EQ(is_id(id), task_from(json).has_value()) << id;
+    return is_id(id);
+  };
+  int allowed = 0;
+  for (int c = 1; c < 128; ++c) allowed += both(std::string("a") + static_cast<char>(c)) ? 1 : 0;
+  EXPECT_EQ(allowed, 26 + 26 + 10 + 4);
+  EXPECT_TRUE(both(std::string(64, 'a')));
+  EXPECT_FALSE(both(std::string(65, 'a')));
+  EXPECT_FALSE(both(""));
+  EXPECT_FALSE(both("ü"));
+}
+
 // The text of a task is what the journal holds: coming back from it changes nothing, however late the deadline.
 TEST(Task, KeepsADeadlineOnEveryWayThroughText) {
   for (const double deadline_s :

@@ -101,6 +101,33 @@ TEST_F(BadInput, NothingGivenOrTooMuch) {
   expect_refused({"run", "parcel_cell", "--parcels", "99999999999999999999"}, {"--parcels", "99999999999999999999"});
 }
 
+TEST_F(BadInput, CountsThatAreNone) {
+  for (const char* const count : {"-3", "1.5", "1e3", "many", "1000000000001", "99999999999999999999999"}) {
+    const std::string says = std::string("'") + count + "' is not a whole number from 0 to 1000000000000; ";
+    expect_refused({"task", "list", "--ended", "--after", count}, {"pons: --after: " + says});
+    expect_refused({"journal", "compact", folder_ / "none.db", "--keep", count}, {"pons: --keep: " + says});
+  }
+}
+
+TEST_F(BadInput, TreesThatCannotRunOrDoOtherThanTheySay) {
+  const auto check = [&](const std::string& nodes) {
+    write_text(folder_ / "tree.xml", "<root BTCPP_format=\"4\" main_tree_to_execute=\"A\">" + nodes + "</root>");
+    return run_pons({"trees", "check", folder_ / "tree.xml"});
+  };
+  const Finished slip = check(R"(<BehaviorTree ID="A"><AlwaysSuccess _onSucces="x := 1"/></BehaviorTree>)");
+  EXPECT_EQ(slip.code, 2);
+  EXPECT_EQ(slip.err, "pons: tree.xml:1: there is no attribute '_onSucces'; did you mean '_onSuccess'?\n");
+  const Finished told = check(R"(<BehaviorTree ID="A"><Sequence _colour="red"><SubTree ID="B"/>
+      <Script code="x := RED + mass"/></Sequence></BehaviorTree>
+      <BehaviorTree ID="B"><Script code="x := RED"/></BehaviorTree>)");
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.out,
+            "A              4 nodes; skills: none; blackboard: RED, mass, x; to be given: RED, mass\n"
+            "  tree.xml:1: the attribute '_colour' means nothing\n"
+            "  tree.xml:3: nothing sets 'B/RED', which is read here\n"
+            "B              1 nodes; skills: none; blackboard: RED, x; to be given: RED\n");
+}
+
 TEST_F(BadInput, OneFileForTwoThings) {
   const std::string file = folder_ / "one", same = folder_ / "./one";
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--report", file, "--journal", same},

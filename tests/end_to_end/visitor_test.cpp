@@ -1,9 +1,11 @@
 // What a visitor with a socket may ask of a run, and what it must not do to the run's own work.
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 
 #include <algorithm>
 #include <set>
@@ -13,6 +15,7 @@
 
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/gate/unix_address.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::tests {
@@ -75,6 +78,49 @@ TEST_F(Visitor, HearsWhereItsTreeRunsOtherwiseAndTheJournalHowManyWereRefused) {
   const auto closed = std::ranges::find(*notes, "closed", &bridge::Event::kind);
   ASSERT_NE(closed, notes->end());
   EXPECT_EQ(closed->detail.at("refused"), 1);
+}
+
+// What comes back for those bytes, whatever they are; the sender says that no more will come.
+std::string answer_to(const std::string& socket_path, const std::string& bytes) {
+  const gate::Descriptor socket = gate::unix_socket();
+  EXPECT_EQ(gate::connect_to(socket, gate::unix_address(socket_path).value()), 0);
+  EXPECT_EQ(::fcntl(socket.get(), F_SETFL, 0), 0) << "it waits";
+  EXPECT_EQ(::send(socket.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL), std::ssize(bytes));
+  EXPECT_EQ(::shutdown(socket.get(), SHUT_WR), 0);
+  std::string answer;
+  char buffer[4096];
+  for (ssize_t got = 0; (got = ::recv(socket.get(), buffer, sizeof buffer, 0)) > 0;)
+    answer.append(buffer, static_cast<std::size_t>(got));
+  return answer;
+}
+
+// Whatever it is that keeps a submission from becoming a task. Questions leave nothing.
+TEST_F(Visitor, FindsInTheJournalWhatWasRefusedAndHowItBegan) {
+  during_a_run([&] {
+    const auto told = [&](const std::string& bytes) { return answer_to(folder_ / "s", bytes); };
+    EXPECT_THAT(told(R"({"op":"submit","task":{"id":"cut","steps":[)"), HasSubstr("not JSON"));
+    EXPECT_THAT(told(R"({"op":"submit","task":{"id":"deep","x":)" + std::string(100, '[')), HasSubstr("deeper"));
+    EXPECT_THAT(told(R"({"op":"sumbit","task":{"id":"odd"}})"), HasSubstr("/op: not one of the choices"));
+    EXPECT_THAT(told(R"({"op":"submit","task":{"id":"form","steps":[],"colour":1}})"), HasSubstr("'colour'"));
+    EXPECT_THAT(told(R"({"op":"submit","task":{"id":"long","x":")" + std::string(70'000, 'x')), HasSubstr("at most"));
+    EXPECT_THAT(told("hello"), HasSubstr("not JSON"));
+    EXPECT_THAT(told(R"({"op":"list","colour":1})"), HasSubstr("'colour'"));
+    EXPECT_THAT(told(R"({"op":"sing"})"), HasSubstr("/op: not one of the choices"));
+  });
+  const auto history = [&](const std::string& id) {
+    return run_pons({"task", "history", id, "--journal", folder_ / "j.db"}).out;
+  };
+  EXPECT_THAT(history("cut"), AllOf(HasSubstr("refused       not JSON in UTF-8 at byte 44"),
+                                    HasSubstr(R"(; sent: {"op":"submit","task":{"id":"cut","steps":[)")));
+  EXPECT_THAT(history("deep"), HasSubstr("nested deeper than 16 levels"));
+  EXPECT_THAT(history("odd"), HasSubstr("sumbit"));
+  EXPECT_THAT(history("form"), HasSubstr("'colour' does not belong there"));
+  EXPECT_THAT(history("long"), HasSubstr("a line has at most 65536 bytes"));
+  const std::string all = run_pons({"journal", "refused", folder_ / "j.db"}).out;
+  EXPECT_THAT(all, AllOf(HasSubstr("cut"), HasSubstr("deep"), HasSubstr("sent: hello\n"), Not(HasSubstr("sing"))));
+  EXPECT_EQ(std::ranges::count(all, '\n'), 6) << all;
+  EXPECT_LT(all.size(), 3000U);
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
 }
 
 // The ids of all pages of two, gone through as each says.

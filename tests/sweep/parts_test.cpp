@@ -1,9 +1,14 @@
 // Of a sweep, what can be asked without running it.
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <filesystem>
 #include <string>
@@ -206,6 +211,31 @@ TEST(SweepFolder, BelongsToOneSweepAtATime) {
     EXPECT_THAT(SweepLock::take(folder.path()).error().line(), HasSubstr("another sweep works here"));
   }
   EXPECT_TRUE(SweepLock::take(folder.path()));
+}
+
+// Not only until the call is over that makes the run: who comes next would find that process still at work.
+TEST(SweepFolder, ARunIsKeptUntilTheProcessEnds) {
+  const Folder folder;
+  const pid_t keeper = fork();
+  if (keeper == 0) {
+    const bool kept = keep_run(folder.path(), [] { return true; }).has_value();
+    (void)raise(SIGSTOP);
+    _exit(kept ? 0 : 1);
+  }
+  ASSERT_GT(keeper, 0);
+  int status = 0;
+  ASSERT_EQ(waitpid(keeper, &status, WUNTRACED), keeper);
+  ASSERT_TRUE(WIFSTOPPED(status));
+  const int log = open((folder / kLogFile).c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_GE(log, 0);
+  EXPECT_NE(flock(log, LOCK_EX | LOCK_NB), 0);
+  EXPECT_EQ(errno, EWOULDBLOCK);
+  kill(keeper, SIGCONT);
+  ASSERT_EQ(waitpid(keeper, &status, 0), keeper);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  EXPECT_EQ(flock(log, LOCK_EX | LOCK_NB), 0);
+  close(log);
+  EXPECT_THAT(keep_run(folder / "none", [] { return false; }).error().line(), HasSubstr("its folder can be written"));
 }
 
 TEST(SweepFolder, ClockAndLastLines) {

@@ -4,29 +4,14 @@
 
 #include <algorithm>
 #include <iterator>
-#include <numeric>
 
 #include "pons/task/json_text.hpp"
+#include "pons/task/spelling.hpp"
 
 namespace pons::bridge {
 namespace {
 
 constexpr std::size_t kMostInReply = 64;
-
-// Levenshtein (1966), one row at a time.
-std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
-    }
-  }
-  return row.back();
-}
 
 std::string skill_hint(std::string_view wrong, const task::SkillRegistry& skills) {
   std::string_view nearest;
@@ -34,7 +19,7 @@ std::string skill_hint(std::string_view wrong, const task::SkillRegistry& skills
   std::vector<std::string_view> names;
   for (const auto& [name, type] : skills.all()) {
     names.push_back(name);
-    if (const std::size_t distance = edits(wrong, name); distance < fewest) {
+    if (const std::size_t distance = task::edits(wrong, name); distance < fewest) {
       fewest = distance;
       nearest = name;
     }

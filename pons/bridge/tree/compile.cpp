@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <map>
 #include <utility>
 
+#include "pons/bridge/tree/differences.hpp"
+#include "pons/bridge/tree/entry_uses.hpp"
+#include "pons/bridge/tree/markup.hpp"
 #include "pons/bridge/tree/node_kinds.hpp"
 #include "pons/bridge/tree/program.hpp"
 #include "pons/task/json_text.hpp"
@@ -18,41 +21,10 @@ using task::excerpt;
 constexpr std::size_t kMostDepth = 256;  // nodes inside one another, through all SubTrees
 constexpr std::size_t kMostPath = 160;   // of a name for people: SubTrees are as deep as that
 
-constexpr std::array kConditionNames{
-    std::pair{std::string_view("_failureIf"), &Conditions::failure_if},
-    std::pair{std::string_view("_successIf"), &Conditions::success_if},
-    std::pair{std::string_view("_skipIf"), &Conditions::skip_if},
-    std::pair{std::string_view("_while"), &Conditions::while_true},
-    std::pair{std::string_view("_onHalted"), &Conditions::on_halted},
-    std::pair{std::string_view("_onFailure"), &Conditions::on_failure},
-    std::pair{std::string_view("_onSuccess"), &Conditions::on_success},
-    std::pair{std::string_view("_post"), &Conditions::post},
-};
-
-// The name in "{name}"; empty when it is none, but an object in JSON, say. "{=}" is the port's own.
-std::string_view entry_in(std::string_view text, std::string_view port) {
-  const std::size_t first = text.find_first_not_of(' ');
-  if (first == text.npos) return {};
-  text = text.substr(first, text.find_last_not_of(' ') + 1 - first);
-  if (text == "{=}" || text == "=") return port;
-  if (text.size() < 3 || text.front() != '{' || text.back() != '}' || text[1] == '"') return {};
-  return text.substr(1, text.size() - 2);
-}
-
 // FNV-1a (Fowler, Noll, Vo).
 void stir(std::uint64_t& hash, std::string_view text) {
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   hash = (hash ^ 0xffU) * 0x100000001b3U;
-}
-
-std::optional<Value> status_of(std::string_view text) {
-  constexpr std::array kNames{std::pair{std::string_view("SUCCESS"), NodeStatus::kSuccess},
-                              std::pair{std::string_view("FAILURE"), NodeStatus::kFailure},
-                              std::pair{std::string_view("SKIPPED"), NodeStatus::kSkipped},
-                              std::pair{std::string_view("RUNNING"), NodeStatus::kRunning}};
-  const auto* found = std::ranges::find(kNames, text, [](const auto& pair) { return pair.first; });
-  if (found == kNames.end()) return {};
-  return std::int64_t{std::to_underlying(found->second)};
 }
 
 // Of "a/b/c/", only its end where it is long: each node has its own.
@@ -78,7 +50,7 @@ class Compiler {
     std::map<std::string, std::int32_t, std::less<>> own;
   };
 
-  void tell_differences(const Element& element, const Node& node);
+  void tell_unset();
   Expected<void> tree(std::string_view id, std::int32_t scope, const std::string& where);
   Expected<void> node(const Element& element, std::int32_t scope);
   Expected<void> subtree(const Element& element, std::int32_t scope);
@@ -104,8 +76,8 @@ class Compiler {
   std::vector<std::string> within_;  // the trees that this one stands in
   std::size_t depth_ = 0;
   int halting_ = 0;  // so many of the nodes above may halt this one
-  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8 };
-  int told_ = 0;
+  Differences differences_;
+  EntryUses uses_;
   std::size_t bytes_ = 0;
 };
 
@@ -118,6 +90,8 @@ Expected<std::shared_ptr<const Program>> Compiler::compile(std::string_view main
   scopes_.emplace_back();
   if (auto done = tree(main, 0, {}); !done) return std::unexpected(done.error());
   program_.root = scopes_[0].own;
+  tell_unset();
+  program_.differences = differences_.take();
   return std::make_shared<const Program>(std::move(program_));
 }
 
@@ -174,7 +148,7 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
   program_.nodes.push_back({.kind = info != nullptr ? info->kind : Kind::kSkill});
   Node made = program_.nodes.back();
   made.children = static_cast<std::int32_t>(element.children.size());
-  tell_differences(element, made);
+  differences_.look(element, made.kind, halting_);
   const bool halts = may_halt(made.kind) || element.attribute("_while") != nullptr;
   halting_ += halts ? 1 : 0;
   if (auto done = conditions(element, scope, made); !done) return done;
@@ -206,26 +180,21 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
   return done;
 }
 
-// Each the first time.
-void Compiler::tell_differences(const Element& element, const Node& node) {
-  const auto tell = [&](Told what, std::string_view text) {
-    if ((std::exchange(told_, told_ | what) & what) == 0)
-      program_.differences.push_back(fmt::format("{}: {}", element.where, text));
-  };
-  if (node.kind == Kind::kSkill && halting_ > 0)
-    tell(kSkill,
-         "a skill that a node above halts leaves the world safe first, while the tree goes on; what needs the same "
-         "waits");
-  if (node.kind == Kind::kTimeout || node.kind == Kind::kDelay || node.kind == Kind::kSleep)
-    tell(kTime, "time stands while the task is paused, and while the robot is stopped");
-  if (node.kind == Kind::kPrecondition && halting_ > 0)
-    tell(kPrecondition, "a Precondition that was halted asks its condition anew; there it goes on as if that held");
-  const auto asynchronous = std::ranges::count(element.children, "AsyncSequence", &Element::tag);
-  if (node.kind == Kind::kReactiveSequence && asynchronous > 1)
-    tell(kReactive, "more than one AsyncSequence in a ReactiveSequence; BehaviorTree.CPP refuses that");
-}
-
 // ---- blackboards ----
+
+// An entry of the main tree may be given by whoever asks for it; one of a SubTree's own by nobody.
+void Compiler::tell_unset() {
+  std::map<std::int32_t, std::string_view> roots;
+  for (const auto& [name, slot] : program_.root) roots.emplace(slot, name);
+  for (const auto& [slot, where] : uses_.unset()) {
+    if (const auto root = roots.find(slot); root != roots.end()) {
+      program_.needs.emplace_back(root->second);
+    } else {
+      const std::string& name = program_.entries[static_cast<std::size_t>(slot)].name;
+      differences_.add(where, fmt::format("nothing sets '{}', which is read here", excerpt(name, kMostPath)));
+    }
+  }
+}
 
 // As Blackboard::getEntry finds it there: its own entries first, then what was remapped, then, if all is, the parent's.
 Expected<std::int32_t> Compiler::slot(std::int32_t scope, std::string_view name) {
@@ -303,6 +272,7 @@ Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::st
     return fail(fmt::format("the blackboards have more than {} entries", kMaxSlots));
   inner.own.emplace(name, static_cast<std::int32_t>(program_.entries.size()));
   program_.entries.push_back({inner.path + std::string(name), value_of_literal(value), true});
+  uses_.set(static_cast<std::int32_t>(program_.entries.size() - 1));
   return {};
 }
 
@@ -319,28 +289,24 @@ Expected<std::int32_t> Compiler::script(const std::string& text, std::int32_t sc
     parsed.error().where = where;
     return std::unexpected(parsed.error());
   }
+  uses_.by(*parsed, where);
   program_.scripts.push_back(*std::move(parsed));
   return static_cast<std::int32_t>(program_.scripts.size() - 1);
 }
 
 Expected<void> Compiler::conditions(const Element& element, std::int32_t scope, Node& node) {
-  const auto lower = [](std::string_view text) {
-    std::string result(text);
-    std::ranges::transform(result, result.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
-    return result;
-  };
   Conditions found;
   bool any = false;
   for (const auto& [name, text] : element.attributes) {
-    for (const auto& [known, member] : kConditionNames) {
-      if (name != known && lower(name) == lower(known))
-        return fail(fmt::format("there is no attribute '{}'", name), element.where, fmt::format("write {}", known));
-      if (name != known) continue;
-      const auto made = script(text, scope, element.where);
-      if (!made) return std::unexpected(made.error());
-      found.*member = *made;
-      any = true;
+    const auto named = std::ranges::find(condition_names(), name, &ConditionName::name);
+    if (named == condition_names().end()) {
+      if (auto good = differences_.look_at_attribute(name, element.where); !good) return good;
+      continue;
     }
+    const auto made = script(text, scope, element.where);
+    if (!made) return std::unexpected(made.error());
+    found.*named->script = *made;
+    any = true;
   }
   if (!any) return {};
   node.conditions = static_cast<std::int32_t>(program_.conditions.size());
@@ -391,6 +357,7 @@ Expected<Port> Compiler::port(const Element& element, const PortType& type, cons
     if (node.kind == Kind::kSetBlackboard && !entry.empty()) return wrong("write the entry's name without braces");
     const auto found = slot(scope, entry.empty() ? std::string_view(text) : entry);
     if (!found) return wrong(found.error().what);
+    if (node.kind == Kind::kSetBlackboard) uses_.set(*found);
     return Port{.slot = *found};
   }
   if (type.of == Of::kQueue) {
@@ -404,6 +371,11 @@ Expected<Port> Compiler::port(const Element& element, const PortType& type, cons
     if (type.of == Of::kBoolean || type.of == Of::kStatus) return wrong("it must be a constant");
     const auto found = slot_of_port(scope, entry, element.where);
     if (!found) return std::unexpected(found.error());
+    if (type.of == Of::kOut) {
+      uses_.set(*found);
+    } else {
+      uses_.read(*found, element.where);
+    }
     return Port{.slot = *found};
   }
   Port made;
@@ -463,7 +435,9 @@ Expected<void> Compiler::skill(const Element& element, std::int32_t scope, const
     if (!found) return std::unexpected(found.error());
     if (is_output) {
       use.outputs.push_back({name, *found});
+      uses_.set(*found);
     } else {
+      uses_.read(*found, element.where);
       use.bound.push_back({name, properties.at(name), *found});
     }
   }

@@ -1,9 +1,11 @@
 // What a document may hold is settled before anything runs; and which blackboard a name is on.
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pons/bridge/tree/node_kinds.hpp"
@@ -122,10 +124,63 @@ TEST_F(Compiling, PortsAreThoseOfTheNode) {
   EXPECT_EQ(refused("<Script/>"), "test:1: the port 'code' of this Script is missing; add it");
   EXPECT_EQ(refused("<SetBlackboard value=\"1\"/>"),
             "test:1: the port 'output_key' of this SetBlackboard is missing; add it");
-  EXPECT_EQ(refused("<AlwaysSuccess _skipif=\"true\"/>"), "test:1: there is no attribute '_skipif'; write _skipIf");
+  EXPECT_EQ(refused("<AlwaysSuccess _skipif=\"true\"/>"),
+            "test:1: there is no attribute '_skipif'; did you mean '_skipIf'?");
   EXPECT_EQ(refused("<AlwaysSuccess _ONFAILURE=\"true\"/>"),
-            "test:1: there is no attribute '_ONFAILURE'; write _onFailure");
+            "test:1: there is no attribute '_ONFAILURE'; did you mean '_onFailure'?");
   EXPECT_EQ(refused("<AlwaysSuccess name=\"n\" _uid=\"7\" _description=\"d\"/>"), "taken") << "as Groot2 writes it";
+}
+
+TEST_F(Compiling, ASlipInAnAttributeIsNoOtherAttribute) {
+  for (const auto& [wrong, right] : std::vector<std::pair<std::string, std::string>>{{"_onSucces", "_onSuccess"},
+                                                                                     {"_OnSucess", "_onSuccess"},
+                                                                                     {"_onFalure", "_onFailure"},
+                                                                                     {"_onHalt", "_onHalted"},
+                                                                                     {"_sucessIf", "_successIf"},
+                                                                                     {"_failIf", ""},
+                                                                                     {"_failureif", "_failureIf"},
+                                                                                     {"_skiplf", "_skipIf"},
+                                                                                     {"_wihle", ""},
+                                                                                     {"_whlle", "_while"},
+                                                                                     {"_POST", "_post"},
+                                                                                     {"_autoRemap", "_autoremap"},
+                                                                                     {"_auto_remap", "_autoremap"}}) {
+    const std::string line = refused(fmt::format("<AlwaysSuccess {}=\"true\"/>", wrong));
+    EXPECT_EQ(line, right.empty()
+                        ? "taken"
+                        : fmt::format("test:1: there is no attribute '{}'; did you mean '{}'?", wrong, right));
+  }
+  EXPECT_EQ(refused("<Sequence>\n<SubTree ID=\"Main\" _autoremp=\"1\"/></Sequence>"),
+            "test:2: there is no attribute '_autoremp'; did you mean '_autoremap'?");
+}
+
+std::vector<std::string> differences_of(const std::string& text) {
+  const auto document = read_document(text, "test");
+  const auto program = document ? compile(*document, "", {}) : std::unexpected(document.error());
+  EXPECT_TRUE(program) << program.error().line();
+  return program ? (*program)->differences : std::vector<std::string>{};
+}
+
+TEST_F(Compiling, AnAttributeThatMeansNothingIsTold) {
+  using ::testing::ElementsAre;
+  using ::testing::IsEmpty;
+  EXPECT_THAT(
+      differences_of(in_document("<Sequence _uid=\"1\" _fullpath=\"\" _fullPath=\"\" _description=\"x\">"
+                                 "<Script code=\"x := 1\" _skipIf=\"false\" _failureIf=\"false\""
+                                 " _successIf=\"false\" _while=\"true\" _onSuccess=\"x = 2\" _onFailure=\"x = 2\""
+                                 " _onHalted=\"x = 2\" _post=\"x = 2\"/></Sequence>")),
+      IsEmpty());
+  EXPECT_THAT(differences_of(in_document("<Sequence>\n<AlwaysSuccess _colour=\"red\" _pose=\"1\"/>\n"
+                                         "<AlwaysSuccess _colour=\"blue\"/></Sequence>")),
+              ElementsAre("test:2: the attribute '_colour' means nothing",
+                          "test:2: the attribute '_pose' means nothing; did you mean '_post'?"));
+  // However many there are, and however long.
+  std::string many = fmt::format("<AlwaysSuccess _{}=\"1\"/>", std::string(30'000, 'x'));
+  for (int i = 0; i < 1000; ++i) many += fmt::format("<AlwaysSuccess _colour{}=\"red\"/>", i);
+  const auto told = differences_of(in_document("<Sequence>" + many + "</Sequence>"));
+  ASSERT_EQ(told.size(), 33U);
+  EXPECT_LT(told.front().size(), 120U);
+  EXPECT_EQ(told.back(), "and 1 more");
 }
 
 TEST_F(Compiling, ValuesAreOfThePortsType) {
@@ -337,6 +392,57 @@ TEST_F(Compiling, TwoSubTreesOfOneTreeHaveBlackboardsOfTheirOwn) {
                                               "<SubTree ID=\"A\" by=\"2\"/><SubTree ID=\"A\" by=\"3\"/></Sequence>") +
                                    tree_named("A", "<Script code=\"mine := 0; mine += by; @log += 'm' .. mine\"/>"))),
             R"({"log":"m1m2m3"})");
+}
+
+TEST_F(Compiling, WhatNothingSetsIsToldOrLeftToWhoeverAsksForTheTree) {
+  using ::testing::ElementsAre;
+  using ::testing::IsEmpty;
+  const auto needs = [&](const std::string& text) {
+    const auto document = read_document(text, "test");
+    const auto program = compile(document.value(), "", skills_);
+    EXPECT_TRUE(program) << program.error().line();
+    return program.value()->needs;
+  };
+  const auto with_sub_tree = [](const std::string& attributes, const std::string& nodes,
+                                const std::string& before = "<AlwaysSuccess/>") {
+    return trees(tree_named("Main", fmt::format("<Sequence>{}<SubTree ID=\"A\" {}/></Sequence>", before, attributes)) +
+                 tree_named("A", nodes));
+  };
+  // An enumeration of BehaviorTree.CPP is a name like others here.
+  const std::string red = "<Script code=\"x := RED\"/>";
+  EXPECT_THAT(differences_of(in_document(red)), IsEmpty()) << "it may be given";
+  EXPECT_THAT(needs(in_document(red)), ElementsAre("RED"));
+  EXPECT_THAT(differences_of(with_sub_tree("", red)), ElementsAre("test:3: nothing sets 'A/RED', which is read here"));
+  EXPECT_THAT(differences_of(with_sub_tree("name=\"colour\"", "<Sleep msec=\"{ms}\"/>")),
+              ::testing::Contains("test:3: nothing sets 'colour/ms', which is read here"));
+  // Who could set it: whoever gives it to the SubTree, a constant, any node that writes to it.
+  for (const char* attributes : {"RED=\"{RED}\"", "RED=\"{=}\"", "RED=\"{other}\"", "_autoremap=\"true\""}) {
+    EXPECT_THAT(differences_of(with_sub_tree(attributes, red)), IsEmpty()) << attributes;
+    EXPECT_EQ(needs(with_sub_tree(attributes, red)).size(), 1U) << attributes;
+  }
+  EXPECT_THAT(differences_of(with_sub_tree("RED=\"1\"", red)), IsEmpty());
+  EXPECT_THAT(needs(with_sub_tree("RED=\"1\"", red)), IsEmpty());
+  EXPECT_THAT(needs(with_sub_tree("RED=\"{r}\"", red, "<SetBlackboard value=\"1\" output_key=\"r\"/>")), IsEmpty());
+  for (const char* setter :
+       {"<Script code=\"RED := 1\"/>", "<Script code=\"RED = 1\"/>", "<Script code=\"RED += 1\"/>",
+        "<SetBlackboard value=\"1\" output_key=\"RED\"/>", "<AlwaysSuccess _post=\"y := (RED := 1)\"/>",
+        "<LoopInt queue=\"1;2\" value=\"{RED}\"><AlwaysSuccess/></LoopInt>"}) {
+    const std::string text = with_sub_tree("", fmt::format("<Sequence>{}{}</Sequence>", red, setter));
+    EXPECT_THAT(differences_of(text), IsEmpty()) << setter;
+    EXPECT_THAT(needs(text), IsEmpty()) << setter;
+  }
+  EXPECT_THAT(needs(in_document("<Sequence><Script code=\"x := 1; z := y ? x : 2\"/><SkipUnlessUpdated entry=\"w\">"
+                                "<Sleep msec=\"{v}\"/></SkipUnlessUpdated></Sequence>")),
+              ElementsAre("y", "v"));
+}
+
+TEST_F(Compiling, WhatASkillIsGivenIsReadAndWhatItTellsIsSet) {
+  Actor pick{"pick", {{}}};
+  add(pick);
+  const auto document = read_document(
+      in_document(R"(<Sequence><pick object="{code}" mass_kg="{mass}"/><Script code="x := mass"/></Sequence>)"),
+      "test");
+  EXPECT_THAT(compile(document.value(), "", skills_).value()->needs, ::testing::ElementsAre("code"));
 }
 
 // ---- nodes of the blackboard ----

@@ -150,9 +150,10 @@ struct Program {
   std::vector<SkillUse> uses;                             // in the order of the nodes
   std::vector<Entry> entries;                             // the blackboard's, by slot
   std::map<std::string, std::int32_t, std::less<>> root;  // slots of the main tree by name: what it may be given
-  std::vector<std::string> resources;                     // that its skills need
-  std::vector<std::string> differences;                   // from what BehaviorTree.CPP does with it, a line each
-  std::uint64_t fingerprint = 0;  // of the document; what was written down of one program fits no other
+  std::vector<std::string> needs;      // of those, what a node reads and none sets: whoever asks for the tree gives it
+  std::vector<std::string> resources;  // that its skills need
+  std::vector<std::string> differences;  // from what BehaviorTree.CPP does with it, a line each
+  std::uint64_t fingerprint = 0;         // of the document; what was written down of one program fits no other
 };
 
 // `main` names the tree; empty: the document's. `skills` must outlive the program. Errors name the line: no such tree,

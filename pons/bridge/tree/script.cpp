@@ -205,6 +205,26 @@ bool Script::is_condition() const {
          std::ranges::none_of(expressions_, [](const Expression& each) { return each.op >= Operator::kCreate; });
 }
 
+std::vector<std::int32_t> Script::reads() const {
+  std::vector<bool> assigned(expressions_.size());
+  for (const Expression& each : expressions_) {
+    if (each.op >= Operator::kCreate) assigned[static_cast<std::size_t>(each.left)] = true;
+  }
+  std::vector<std::int32_t> slots;
+  for (std::size_t i = 0; i < expressions_.size(); ++i) {
+    if (expressions_[i].op == Operator::kVariable && !assigned[i]) slots.push_back(expressions_[i].slot);
+  }
+  return slots;
+}
+
+std::vector<std::int32_t> Script::writes() const {
+  std::vector<std::int32_t> slots;
+  for (const Expression& each : expressions_) {
+    if (each.op >= Operator::kCreate) slots.push_back(each.slot);
+  }
+  return slots;
+}
+
 Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slots) const {
   Slot& slot = slots[static_cast<std::size_t>(expression.slot)];
   const std::string& name = names_[static_cast<std::size_t>(expression.left)];

@@ -77,6 +77,9 @@ class Script {
   [[nodiscard]] Expected<bool> holds(std::span<Slot> slots) const;
   // Whether it is one statement that writes to no variable.
   [[nodiscard]] bool is_condition() const;
+  // The slots that it reads, but for what an assignment adds to and the like; and those that it assigns to.
+  [[nodiscard]] std::vector<std::int32_t> reads() const;
+  [[nodiscard]] std::vector<std::int32_t> writes() const;
   // How much there is to do.
   [[nodiscard]] std::size_t size() const { return expressions_.size(); }
 

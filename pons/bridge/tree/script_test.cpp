@@ -246,5 +246,23 @@ TEST_F(Scripts, ATextDoesNotGrowWithoutEnd) {
   EXPECT_EQ(said("s .. 1"), "a text would have more than 16384 bytes in the script 's .. 1'");
 }
 
+TEST(ScriptSlots, AreReadOrWritten) {
+  std::vector<std::string> names;
+  const auto script = Script::parse("a := b + a; c += d; e = -f == 1 ? g : 'h'", [&](std::string_view name) {
+    const auto found = std::ranges::find(names, name);
+    const auto slot = static_cast<int>(found - names.begin());
+    if (found == names.end()) names.emplace_back(name);
+    return Expected<int>(slot);
+  });
+  ASSERT_TRUE(script) << script.error().line();
+  const auto named = [&](const std::vector<std::int32_t>& slots) {
+    std::string all;
+    for (const std::int32_t slot : slots) all += names[static_cast<std::size_t>(slot)];
+    return all;
+  };
+  EXPECT_EQ(named(script->reads()), "badfg");
+  EXPECT_EQ(named(script->writes()), "ace");
+}
+
 }  // namespace
 }  // namespace pons::bridge::tree

@@ -1,0 +1,55 @@
+#include "pons/bridge/tree/differences.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "pons/bridge/tree/markup.hpp"
+#include "pons/task/json_text.hpp"
+
+namespace pons::bridge::tree {
+
+void Differences::add(std::string_view where, std::string_view what) {
+  if (lines_.size() < kMost) {
+    lines_.push_back(fmt::format("{}: {}", where, what));
+  } else {
+    ++more_;
+  }
+}
+
+void Differences::look(const Element& element, Kind kind, int halting) {
+  const auto tell = [&](Told what, std::string_view text) {
+    if ((std::exchange(told_, told_ | what) & what) == 0) add(element.where, text);
+  };
+  if (kind == Kind::kSkill && halting > 0)
+    tell(kSkill,
+         "a skill that a node above halts leaves the world safe first, while the tree goes on; what needs the same "
+         "waits");
+  if (kind == Kind::kTimeout || kind == Kind::kDelay || kind == Kind::kSleep)
+    tell(kTime, "time stands while the task is paused, and while the robot is stopped");
+  if (kind == Kind::kPrecondition && halting > 0)
+    tell(kPrecondition, "a Precondition that was halted asks its condition anew; there it goes on as if that held");
+  const auto asynchronous = std::ranges::count(element.children, "AsyncSequence", &Element::tag);
+  if (kind == Kind::kReactiveSequence && asynchronous > 1)
+    tell(kReactive, "more than one AsyncSequence in a ReactiveSequence; BehaviorTree.CPP refuses that");
+}
+
+Expected<void> Differences::look_at_attribute(const std::string& name, const std::string& where) {
+  if (!name.starts_with('_')) return {};
+  const auto stray = stray_attribute(name);
+  if (!stray) return {};
+  const std::string shown = task::excerpt(name);
+  const std::string hint = stray->meant.empty() ? "" : fmt::format("did you mean '{}'?", stray->meant);
+  if (stray->is == Stray::Is::kMistake) return fail(fmt::format("there is no attribute '{}'", shown), where, hint);
+  if (strays_.size() <= kMost && strays_.insert(shown).second)
+    add(where, fmt::format("the attribute '{}' means nothing{}{}", shown, hint.empty() ? "" : "; ", hint));
+  return {};
+}
+
+std::vector<std::string> Differences::take() {
+  if (more_ > 0) lines_.push_back(fmt::format("and {} more", std::exchange(more_, 0)));
+  return std::exchange(lines_, {});
+}
+
+}  // namespace pons::bridge::tree

@@ -1,0 +1,39 @@
+// What a tree does here that it does not in BehaviorTree.CPP, and what of it does nothing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/bridge/tree/document.hpp"
+#include "pons/bridge/tree/program.hpp"
+#include "pons/core/error.hpp"
+
+namespace pons::bridge::tree {
+
+class Differences {
+ public:
+  static constexpr std::size_t kMost = 32;  // lines; a tree that somebody sends may be full of them
+
+  // A node that so many above it may halt. Of each sort of difference the first is told.
+  void look(const Element& element, Kind kind, int halting);
+  // An attribute that is no port's. What means nothing is told once for each name. Error: one that begins with an
+  // underscore and is so near to a name that means something that it must be a slip.
+  [[nodiscard]] Expected<void> look_at_attribute(const std::string& name, const std::string& where);
+  void add(std::string_view where, std::string_view what);
+
+  // A line each, and how many more there are.
+  [[nodiscard]] std::vector<std::string> take();
+
+ private:
+  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8 };
+  int told_ = 0;
+  std::set<std::string> strays_;  // attributes that were told of
+  std::vector<std::string> lines_;
+  std::size_t more_ = 0;
+};
+
+}  // namespace pons::bridge::tree
