@@ -140,6 +140,9 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     if (!listening) return std::unexpected(listening.error());
     socket = std::move(*listening);
   }
+  if (options.ros) {
+    if (auto opened = self->open_ros(world, *options.ros); !opened) return std::unexpected(opened.error());
+  }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, registry, world);
@@ -159,17 +162,32 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
       std::make_unique<brain::PolicyRunner>(policies_of(self->cell().world, self->cell().model), *self->inference);
   const auto visitors = [half = self.get()](Time now) {
     half->policies->attend(half->cell().stream, now);
+    if (half->ros) half->ros->show(now);
     if (half->desk) half->desk->attend(now);
   };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
-  if (socket) {
+  if (socket || self->ros) {
+    std::unique_ptr<gate::Visitors> asked = std::move(socket);
+    if (self->ros) asked = self->ros->visitors(std::move(asked));
     self->desk =
-        std::make_unique<Desk>(std::move(socket), *self->bridge, *self->journal, self->bridge_side->armings(),
+        std::make_unique<Desk>(std::move(asked), *self->bridge, *self->journal, self->bridge_side->armings(),
                                self->bridge_side->health(), [half = self.get()] { return half->cell().stream; });
   }
   return self;
+}
+
+Expected<void> BridgeHalf::open_ros(const world::World& world, const gate::ros::NodeSettings& settings) {
+  std::vector<RosView::Robot> robots;
+  const auto stations = world.arms();
+  for (std::size_t i = 0; i < arms.size(); ++i)
+    robots.push_back({arms.size() > 1 ? stations[i].arm : std::string(), arms[i]->cell.model.copy(),
+                      [&cell = arms[i]->cell]() -> const link::State& { return cell.arm.state(); }});
+  auto view = RosView::open(settings, std::move(robots));
+  if (!view) return std::unexpected(view.error());
+  ros = std::move(*view);
+  return {};
 }
 
 Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& meeting) {
@@ -321,6 +339,7 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
 Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
   BridgeOptions bridge{.journal = options_.journal,
                        .socket = options_.socket,
+                       .ros = options_.ros,
                        .recovery = options_.recovery,
                        .keep_free = options_.keep_free,
                        .comes = comes,

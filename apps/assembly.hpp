@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/desk.hpp"
+#include "apps/ros_view.hpp"
 #include "pons/brain/dispatcher.hpp"
 #include "pons/brain/far_brain.hpp"
 #include "pons/brain/liar.hpp"
@@ -85,6 +86,7 @@ class BodyHalf {
 struct BridgeOptions {
   std::string journal;                          // a place as in journal/place.hpp; ":memory:" for none on disk
   std::optional<std::filesystem::path> socket;  // where visitors may ask
+  std::optional<gate::ros::NodeSettings> ros;   // likewise, and see
   // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
   // holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
@@ -133,11 +135,13 @@ class BridgeHalf {
   std::unique_ptr<brain::PolicyRunner> policies;
   std::unique_ptr<runner::Observer> observer;
   std::unique_ptr<runner::BridgeSide> bridge_side;
+  std::unique_ptr<RosView> ros;
   std::unique_ptr<Desk> desk;
 
  private:
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
+  [[nodiscard]] Expected<void> open_ros(const world::World& world, const gate::ros::NodeSettings& settings);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
   // As the bridge hears it.
   [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,
@@ -147,6 +151,7 @@ class BridgeHalf {
 struct AssemblyOptions {
   std::string journal;                          // as in BridgeOptions
   std::optional<std::filesystem::path> socket;  // likewise
+  std::optional<gate::ros::NodeSettings> ros;   // likewise
   BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;
   runner::Recovery recovery = runner::Recovery::kRefused;

@@ -11,6 +11,7 @@
 #include "apps/meeting.hpp"
 #include "apps/paths.hpp"
 #include "apps/progress.hpp"
+#include "apps/ros_options.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
@@ -26,6 +27,7 @@ struct BridgeCommandOptions {
   std::string journal;
   fs::path socket;
   std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
+  RosOptions ros;
   double wait_s = 10;
   bool quiet = false, recover = false;
 };
@@ -39,9 +41,15 @@ int failed(const Error& error) {
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
                const MeetingPlace& place) {
   link::Border& border = place.border();
+  auto ros = ros_settings(options.ros);
+  if (!ros) return bad_input(ros.error());
   const BridgeOptions half_options{
-      options.journal, options.socket.empty() ? default_socket() : options.socket, border.body,
-      options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused, bytes_of(options.keep_free_mib)};
+      .journal = options.journal,
+      .socket = options.socket.empty() ? default_socket() : options.socket,
+      .ros = *std::move(ros),
+      .body = border.body,
+      .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused,
+      .keep_free = bytes_of(options.keep_free_mib)};
   auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
   if (!half) return bad_input(half.error());
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
@@ -58,6 +66,9 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
       .progress =
           [&](Time now) {
             const auto& [sorted, settled] = (*half)->dispatcher->tally();
+            if ((*half)->ros) {
+              for (const std::string& warning : (*half)->ros->take_warnings()) progress.put(ros_line(warning));
+            }
             if (options.quiet) return;
             progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
           },
@@ -136,6 +147,7 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
                       "of the same body is "
                       "taken up");
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
+  add_ros_options(*command, options->ros);
   command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
       ->check(CLI::Range(0.0, 86400.0));
   add_keep_free(*command, options->keep_free_mib);

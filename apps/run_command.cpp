@@ -14,6 +14,7 @@
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
+#include "apps/ros_options.hpp"
 #include "apps/rounds_run.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/bridge/journal/place.hpp"
@@ -31,6 +32,7 @@ struct RunOptions {
   std::string journal;
   fs::path report, log, picture, socket, speech;
   std::vector<std::string> tasks;
+  RosOptions ros;
   std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
   bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
 };
@@ -63,6 +65,9 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                 const auto& [sorted, settled] = cell.above->dispatcher->tally();
                 const std::int64_t done = std::min(settled, total);
                 if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
+                if (cell.above->ros) {
+                  for (const std::string& warning : cell.above->ros->take_warnings()) progress.put(ros_line(warning));
+                }
                 // With something on the cups, halfway: that is what the cell looks like.
                 if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
                     done * 2 >= total) {
@@ -135,6 +140,7 @@ RoundsOptions rounds_options(const RunOptions& options) {
   if (!options.body.arm_at.empty()) rounds.of_a_cell = "--arm-at";
   if (options.body.faults != world::FaultPlan{}.name) rounds.of_a_cell = "--faults";
   if (options.recover) rounds.of_a_cell = "--recover";
+  if (options.ros.on) rounds.of_a_cell = "--ros";
   return rounds;
 }
 
@@ -186,6 +192,9 @@ int run(const RunOptions& options) {
   } else if (options.realtime) {
     assembly.socket = default_socket();
   }
+  auto ros = ros_settings(options.ros);
+  if (!ros) return bad_input(ros.error());
+  assembly.ros = *std::move(ros);
   auto cell = Assembly::build(std::move(*world), manifest, assembly);
   if (!cell) return bad_input(cell.error());
   return run_cell(options, **cell, static_cast<std::int64_t>(manifest.size()));
@@ -204,6 +213,7 @@ void add_options(CLI::App& command, RunOptions& options) {
   command.add_option("--log", options.log, "Text file for what the control loop did: stops, arming, refused commands");
   command.add_option("--picture", options.picture, "PNG file for a picture of the cell at work");
   command.add_option("--socket", options.socket, "Where `pons task` reaches this run (on by default with --realtime)");
+  add_ros_options(command, options.ros);
   command.add_option("--task", options.tasks,
                      "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
   command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");

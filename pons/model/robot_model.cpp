@@ -68,6 +68,7 @@ struct RobotModel::Impl {
   pinocchio::SE3 last_joint_from_tip;
   pinocchio::Inertia last_inertia;  // last link and tool, without payload
   std::vector<pinocchio::FrameIndex> capsule_frames;
+  std::vector<std::pair<pinocchio::FrameIndex, pinocchio::FrameIndex>> links;  // each with the one it hangs on
   Eigen::VectorXd q, v, a;
   Eigen::VectorXd placed_at;  // the q that data.oMi holds; not a number: none
   bool axes_placed = false;   // and data.J
@@ -90,6 +91,7 @@ struct RobotModel::Impl {
     model.inertias[last_joint] = last_inertia;
     for (const auto& capsule : robot.capsules)
       capsule_frames.push_back(model.getFrameId(capsule.link, pinocchio::BODY));
+    find_links();
     q = v = a = placed_at = Eigen::VectorXd::Zero(model.nv);
     forget();
     inverse.emplace(chain());
@@ -105,6 +107,7 @@ struct RobotModel::Impl {
         last_joint_from_tip(other.last_joint_from_tip),
         last_inertia(other.last_inertia),
         capsule_frames(other.capsule_frames),
+        links(other.links),
         q(other.q),
         v(other.v),
         a(other.a),
@@ -114,6 +117,15 @@ struct RobotModel::Impl {
   }
   Impl& operator=(const Impl&) = delete;
   ~Impl() = default;
+
+  void find_links() {
+    for (pinocchio::FrameIndex index = 1; index < model.frames.size(); ++index) {
+      if (model.frames[index].type != pinocchio::BODY) continue;
+      auto parent = model.frames[index].parentFrame;  // a joint's
+      while (parent != 0 && model.frames[parent].type != pinocchio::BODY) parent = model.frames[parent].parentFrame;
+      if (parent != 0) links.emplace_back(index, parent);
+    }
+  }
 
   // The payload joins the inertia of the last moving link.
   void carry(const Payload& payload) PONS_NONBLOCKING {
@@ -361,6 +373,29 @@ void RobotModel::inverse_all(const Pose& world_from_tip, const AxisVector& seed,
 Branch RobotModel::branch(const AxisVector& q) const { return impl_->inverse->branch(q); }
 
 const Chain& RobotModel::chain() const { return impl_->inverse->chain(); }
+
+std::vector<std::string> RobotModel::axis_names() const {
+  return {impl_->model.names.begin() + 1, impl_->model.names.end()};  // the first is the universe's
+}
+
+std::vector<RobotModel::Link> RobotModel::links() const {
+  const auto& frames = impl_->model.frames;
+  std::vector<Link> links;
+  for (const auto& [frame, parent] : impl_->links)
+    links.push_back({frames[frame].name, frames[parent].name, frames[frame].parentJoint == frames[parent].parentJoint});
+  return links;
+}
+
+void RobotModel::place_links(const AxisVector& q, std::vector<Pose>& parent_from_link) {
+  impl_->place_links(q);
+  parent_from_link.clear();
+  const auto base_from = [&](pinocchio::FrameIndex index) {
+    const auto& frame = impl_->model.frames[index];
+    return impl_->data.oMi[frame.parentJoint] * frame.placement;
+  };
+  for (const auto& [frame, parent] : impl_->links)
+    parent_from_link.push_back(pose_of(base_from(parent).actInv(base_from(frame))));
+}
 
 std::vector<int> RobotModel::capsule_axes() const {
   std::vector<int> axes;

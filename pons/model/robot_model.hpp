@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "pons/core/axes.hpp"
@@ -71,6 +72,17 @@ class RobotModel {
   void inverse_all(const Pose& world_from_tip, const AxisVector& seed, BranchSolutions& found) const;
   // The branch that q is on; all zero for an arm without closed form.
   [[nodiscard]] Branch branch(const AxisVector& q) const;
+
+  // Its axes' names, of the URDF's joints.
+  [[nodiscard]] std::vector<std::string> axis_names() const;
+  // The URDF's links, each after the one it hangs on; and where each is from that one at q, in that order. The first
+  // hangs on nothing, and is not among them.
+  struct Link {
+    std::string name, parent;
+    bool fixed = false;  // no axis moves it there
+  };
+  [[nodiscard]] std::vector<Link> links() const;
+  void place_links(const AxisVector& q, std::vector<Pose>& parent_from_link);
 
   // Its axes when all of them are at zero.
   [[nodiscard]] const Chain& chain() const;

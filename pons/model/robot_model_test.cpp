@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -42,6 +44,28 @@ TEST(RobotModel, ForwardKinematicsFollowThePublishedParameters) {
     const Pose expected = hanging_arm().world_from_base * denavit_hartenberg(q) * hanging_arm().tool.flange_from_tip;
     ASSERT_TRUE(model.world_from_tip(q).matrix().isApprox(expected.matrix(), 1e-10)) << q.transpose();
   }
+}
+
+TEST(RobotModel, LinksOnTopOfEachOtherComeToTheFlange) {
+  auto model = RobotModel::load(hanging_arm()).value();
+  const auto links = model.links();
+  EXPECT_EQ(model.axis_names().front(), "shoulder_pan_joint");
+  EXPECT_EQ(model.axis_names().size(), 6U);
+  Random random(3);
+  for (int i = 0; i < 20; ++i) {
+    const AxisVector q = random_axes(random, 3);
+    std::vector<Pose> parent_from_link;
+    model.place_links(q, parent_from_link);
+    ASSERT_EQ(parent_from_link.size(), links.size());
+    std::map<std::string, Pose> base_from{{links.front().parent, Pose::Identity()}};
+    for (std::size_t link = 0; link < links.size(); ++link) {
+      ASSERT_TRUE(base_from.contains(links[link].parent)) << links[link].name << " comes before " << links[link].parent;
+      base_from.emplace(links[link].name, base_from.at(links[link].parent) * parent_from_link[link]);
+    }
+    const Pose tip = hanging_arm().world_from_base * base_from.at("tool0") * hanging_arm().tool.flange_from_tip;
+    EXPECT_TRUE(tip.isApprox(model.world_from_tip(q), 1e-9));
+  }
+  EXPECT_EQ(std::ranges::count_if(links, [](const RobotModel::Link& link) { return !link.fixed; }), 6);
 }
 
 TEST(RobotModel, JacobianIsTheDerivativeOfTheTip) {

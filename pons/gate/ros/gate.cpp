@@ -1,0 +1,124 @@
+#include "pons/gate/ros/gate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+
+#include "pons/gate/request.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+constexpr std::chrono::milliseconds kLooksAtLeast{200};  // though nothing wakes it
+
+}  // namespace
+
+Expected<std::unique_ptr<Gate>> Gate::open(const NodeSettings& settings) {
+  auto node = Node::open(settings);
+  if (!node) return std::unexpected(node.error());
+  return std::unique_ptr<Gate>(new Gate(std::move(*node)));
+}
+
+Gate::Gate(std::unique_ptr<Node> node) : node_(std::move(node)) { answers_->node = node_.get(); }
+
+Gate::~Gate() {
+  stop_ = true;
+  node_->wake();
+  if (thread_.joinable()) thread_.join();
+  const std::scoped_lock lock(answers_->mutex);
+  answers_->node = nullptr;
+}
+
+void Gate::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void Gate::run() {
+  while (!stop_) {
+    node_->spin_for(kLooksAtLeast);
+    take_answers();
+    write_all();
+    auto lines = node_->take_warnings();
+    const std::scoped_lock lock(mutex_);
+    std::ranges::move(lines, std::back_inserter(warnings_));
+  }
+  write_all();
+}
+
+void Gate::send(std::size_t writer, std::vector<std::byte> bytes) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (queued_bytes_ + bytes.size() > kQueuedMost) {
+      ++dropped_;
+      return;
+    }
+    queued_bytes_ += bytes.size();
+    queued_.emplace_back(writer, std::move(bytes));
+  }
+  node_->wake();
+}
+
+void Gate::write_all() {
+  decltype(queued_) queued;
+  {
+    const std::scoped_lock lock(mutex_);
+    queued.swap(queued_);
+    queued_bytes_ = 0;
+  }
+  for (const auto& [writer, bytes] : queued)
+    if (!writers_[writer]->write(bytes)) ++dropped_;
+}
+
+void Gate::ask(std::string request, std::function<void(const Json&)> answered) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (asked_.size() < kAskedMost) {
+      asked_.push_back({std::move(request), ++numbers_});
+      open_.emplace_back(numbers_, std::move(answered));
+      return;
+    }
+  }
+  answered(refusal({fmt::format("{} requests wait already", kAskedMost), "ROS 2", "ask again later"}));
+}
+
+std::vector<Request> Gate::poll() {
+  std::vector<Asked> asked;
+  {
+    const std::scoped_lock lock(mutex_);
+    asked.swap(asked_);
+  }
+  std::vector<Request> requests;
+  for (Asked& each : asked) {
+    requests.push_back({std::move(each.text), [answers = answers_, number = each.number](const Json& answer) {
+                          const std::scoped_lock lock(answers->mutex);
+                          if (answers->node == nullptr) return;
+                          answers->came.emplace_back(number, answer);
+                          answers->node->wake();
+                        }});
+  }
+  return requests;
+}
+
+void Gate::take_answers() {
+  decltype(answers_->came) came;
+  {
+    const std::scoped_lock lock(answers_->mutex);
+    came.swap(answers_->came);
+  }
+  for (const auto& [number, answer] : came) {
+    const auto open = std::ranges::find(open_, number, &decltype(open_)::value_type::first);
+    if (open == open_.end()) continue;
+    const auto answered = std::move(open->second);
+    open_.erase(open);
+    answered(answer);
+  }
+}
+
+std::vector<std::string> Gate::take_warnings() {
+  const std::scoped_lock lock(mutex_);
+  return std::exchange(warnings_, {});
+}
+
+}  // namespace pons::gate::ros

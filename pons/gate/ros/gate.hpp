@@ -1,0 +1,122 @@
+// A ROS 2 node on a thread of its own, beside whoever runs: what is put into its outlets is published, what is asked of
+// its services becomes requests for whoever polls, in the words of pons/gate/request.hpp.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/gate/local_socket.hpp"
+#include "pons/gate/ros/node.hpp"
+
+namespace pons::gate::ros {
+
+class Gate;
+
+// Belongs to one thread, any. Outlived by its gate.
+template <wire::Message T>
+class Outlet {
+ public:
+  Outlet(Gate& gate, std::size_t writer) : gate_(&gate), writer_(writer) {}
+  // Encodes it here and leaves it to the node's thread. Waits for nothing; what finds no room is dropped and counted.
+  void put(const T& message);
+
+ private:
+  Gate* gate_;
+  std::size_t writer_;
+};
+
+class Gate final : public Visitors {
+ public:
+  static constexpr std::size_t kQueuedMost = 32UL << 20U;  // bytes that wait to be sent
+  static constexpr std::size_t kAskedMost = 1024;          // requests that wait to be polled; more are refused at once
+
+  // Errors: those of Node::open().
+  [[nodiscard]] static Expected<std::unique_ptr<Gate>> open(const NodeSettings& settings);
+  ~Gate() override;
+  Gate(const Gate&) = delete;
+  Gate& operator=(const Gate&) = delete;
+
+  // ---- before start(), on the thread that made it ----
+
+  // Errors: those of Node::advertise().
+  template <wire::Message T>
+  [[nodiscard]] Expected<Outlet<T>> outlet(std::string_view topic, const Qos& qos = kTopicQos) {
+    auto writer = node_->add_writer(topic, Use::kTopic, T::kName, T::kHash, qos);
+    if (!writer) return std::unexpected(writer.error());
+    writers_.push_back(std::move(*writer));
+    return Outlet<T>(*this, writers_.size() - 1);
+  }
+  // What it is told to do is done on its thread from start() on.
+  [[nodiscard]] Node& node() { return *node_; }
+  void start();
+
+  // ---- on the thread of whoever answers ----
+
+  // At most all that were asked since the last call; answers may come from any thread, also when the gate has gone.
+  [[nodiscard]] std::vector<Request> poll() override;
+  // What people should know, a line each.
+  [[nodiscard]] std::vector<std::string> take_warnings();
+  // Messages that found no room.
+  [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+
+  // ---- on the node's thread ----
+
+  // `answered` is called on the node's thread, once, unless whoever polls goes without answering.
+  void ask(const Json& request, std::function<void(const Json&)> answered) {
+    ask(dump_line(request), std::move(answered));
+  }
+  void ask(std::string request, std::function<void(const Json&)> answered);
+
+ private:
+  template <wire::Message T>
+  friend class Outlet;
+  struct Asked {
+    std::string text;
+    std::uint64_t number;
+  };
+  // What the two sides share; the answers' part may outlive the gate.
+  struct Answers {
+    std::mutex mutex;
+    std::vector<std::pair<std::uint64_t, Json>> came;  // under mutex, as is:
+    Node* node = nullptr;                              // to wake; null once it has gone
+  };
+
+  explicit Gate(std::unique_ptr<Node> node);
+  void send(std::size_t writer, std::vector<std::byte> bytes);
+  void run();
+  void write_all();
+  void take_answers();
+
+  std::unique_ptr<Node> node_;
+  std::vector<std::unique_ptr<Writer>> writers_;
+  std::vector<std::pair<std::uint64_t, std::function<void(const Json&)>>> open_;  // of the node's thread, as is:
+  std::uint64_t numbers_ = 0;
+  std::shared_ptr<Answers> answers_ = std::make_shared<Answers>();
+  std::mutex mutex_;
+  std::deque<std::pair<std::size_t, std::vector<std::byte>>> queued_;  // under mutex_, as are:
+  std::size_t queued_bytes_ = 0;
+  std::vector<Asked> asked_;
+  std::vector<std::string> warnings_;
+  std::atomic<std::uint64_t> dropped_ = 0;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;
+};
+
+template <wire::Message T>
+void Outlet<T>::put(const T& message) {
+  std::vector<std::byte> bytes;
+  if (wire::encode(message, bytes)) gate_->send(writer_, std::move(bytes));
+}
+
+}  // namespace pons::gate::ros

@@ -1,0 +1,170 @@
+#include "pons/gate/ros/graph.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "pons/wire/types/rmw_dds_common/msg/participant_entities_info.hpp"
+#include "pons/wire/types/rmw_dds_common_humble/msg/participant_entities_info.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using Jazzy = wire::rmw_dds_common::msg::ParticipantEntitiesInfo;
+using Humble = wire::rmw_dds_common_humble::msg::ParticipantEntitiesInfo;
+
+// A hostile participant could make us remember without end.
+constexpr std::size_t kWarningsMost = 1000;
+constexpr std::size_t kEndpointsMost = 100'000;
+
+template <typename Gid>
+Gid to_gid(const Guid& guid) {
+  Gid gid;
+  std::ranges::copy(guid, gid.data.begin());
+  return gid;
+}
+
+template <typename Gid>
+Guid from_gid(const Gid& gid) {
+  Guid guid;
+  std::copy_n(gid.data.begin(), guid.size(), guid.begin());
+  return guid;
+}
+
+template <typename Info>
+std::vector<std::byte> announce(const NodeName& node, const Guid& participant, const std::vector<Endpoint>& endpoints) {
+  Info info;
+  info.gid = to_gid<decltype(info.gid)>(participant);
+  auto& entry = info.node_entities_info_seq.emplace_back();
+  entry.node_namespace = node.space;
+  entry.node_name = node.name;
+  for (const Endpoint& each : endpoints)
+    (each.writes ? entry.writer_gid_seq : entry.reader_gid_seq).push_back(to_gid<decltype(info.gid)>(each.guid));
+  std::vector<std::byte> bytes;
+  (void)wire::encode(info, bytes);  // names are shorter than its bounds: node_name() and the sequences have none
+  return bytes;
+}
+
+std::string qualities(const Qos& qos) {
+  return fmt::format("{}, {}", qos.reliability == Qos::Reliability::kReliable ? "reliable" : "best effort",
+                     qos.durability == Qos::Durability::kVolatile ? "volatile" : "transient local");
+}
+
+}  // namespace
+
+void Graph::add_own(Endpoint endpoint) {
+  for (const auto& [guid, other] : others_) compare(endpoint, other);
+  own_.push_back(std::move(endpoint));
+  changed_ = true;
+}
+
+void Graph::heard(const Heard& heard) {
+  switch (heard.kind) {
+    case Heard::Kind::kParticipant:
+      return;
+    case Heard::Kind::kGone:
+      others_.erase(heard.guid);
+      peers_.erase(heard.guid);
+      return;
+    case Heard::Kind::kIncompatible: {
+      const auto own = std::ranges::find(own_, heard.guid, &Endpoint::guid);
+      const char* const what =
+          own != own_.end() && own->writes ? "a reader wants more than we offer" : "a writer offers less than we want";
+      const std::string ours = own == own_.end() ? "" : fmt::format(" (ours: {})", qualities(own->qos));
+      return warn(fmt::format("{}: {}: {} does not fit{}; give both the same qualities of service", heard.topic, what,
+                              heard.policy, ours));
+    }
+    case Heard::Kind::kWriter:
+    case Heard::Kind::kReader:
+      if (others_.size() >= kEndpointsMost) return warn(fmt::format("more than {} endpoints", kEndpointsMost));
+      Endpoint other{.guid = heard.guid,
+                     .writes = heard.kind == Heard::Kind::kWriter,
+                     .topic = heard.topic,
+                     .type = heard.type,
+                     .user_data = heard.user_data,
+                     .qos = heard.qos};
+      for (const Endpoint& own : own_) compare(own, other);
+      others_.insert_or_assign(heard.guid, std::move(other));
+  }
+}
+
+void Graph::compare(const Endpoint& own, const Endpoint& other) {
+  if (own.topic != other.topic || own.writes == other.writes) return;
+  if (own.type != other.type)
+    return warn(fmt::format("{}: {} has the type {} there, ours is {}; nothing goes between them", own.topic,
+                            owner_of(other.guid), other.type, own.type));
+  const std::string_view ours = value_of(own.user_data, "typehash"), theirs = value_of(other.user_data, "typehash");
+  if (!ours.empty() && !theirs.empty() && ours != theirs)
+    warn(fmt::format("{}: {} has another definition of {} ({}, ours is {}); build both from the same interface file",
+                     own.topic, owner_of(other.guid), own.type, theirs, ours));
+}
+
+std::string Graph::owner_of(const Guid& endpoint) const {
+  const auto peer = peers_.find(participant_of(endpoint));
+  if (peer == peers_.end()) return "somebody";
+  for (const Node& node : peer->second.nodes)
+    if (std::ranges::find(node.endpoints, endpoint) != node.endpoints.end()) return node.name.full();
+  return "somebody";
+}
+
+Expected<void> Graph::told(std::span<const std::byte> message, const SampleId& id) {
+  const Guid sender = participant_of(id.writer);
+  if (sender == participant_) return {};
+  const auto learn_from = [&](const auto& info, Form form) {
+    Peer peer{.form = form};
+    for (const auto& node : info.node_entities_info_seq) {
+      Node& known = peer.nodes.emplace_back(Node{.name = {node.node_namespace, node.node_name}});
+      std::ranges::transform(node.reader_gid_seq, std::back_inserter(known.endpoints),
+                             [](const auto& gid) { return from_gid(gid); });
+      std::ranges::transform(node.writer_gid_seq, std::back_inserter(known.endpoints),
+                             [](const auto& gid) { return from_gid(gid); });
+    }
+    learn(sender, std::move(peer));
+  };
+  // Each tells its own identifier: read in the wrong form, it is not followed by what makes sense up to the last byte.
+  Jazzy jazzy;
+  if (wire::decode(message, jazzy)) return learn_from(jazzy, Form::kJazzy), Expected<void>{};
+  Humble humble;
+  auto read = wire::decode(message, humble);
+  if (!read) return std::unexpected(read.error());
+  learn_from(humble, Form::kHumble);
+  return {};
+}
+
+void Graph::learn(const Guid& participant, Peer peer) {
+  for (const Node& node : peer.nodes)
+    if (node.name == node_)
+      warn(fmt::format("{}: another node of that name is in the graph; give one of them another name or domain",
+                       node_.full()));
+  if (peer.form != form_) {
+    const bool mixed = std::ranges::any_of(
+        peers_, [&](const auto& each) { return each.first != participant && each.second.form == form_; });
+    if (mixed)
+      warn(
+          "nodes of ROS 2 Humble and of Iron or later are on one domain: they do not read each other's names; each "
+          "sees ours while its kind came last");
+    form_ = peer.form;
+    changed_ = true;
+  }
+  peers_.insert_or_assign(participant, std::move(peer));
+}
+
+std::vector<std::byte> Graph::announcement() const {
+  return form_ == Form::kJazzy ? announce<Jazzy>(node_, participant_, own_)
+                               : announce<Humble>(node_, participant_, own_);
+}
+
+std::vector<std::string> Graph::nodes() const {
+  std::vector<std::string> names;
+  for (const auto& [participant, peer] : peers_)
+    for (const Node& node : peer.nodes) names.push_back(node.name.full());
+  return names;
+}
+
+void Graph::warn(std::string line) {
+  if (warned_.size() < kWarningsMost && warned_.insert(line).second) warnings_.push_back(std::move(line));
+}
+
+}  // namespace pons::gate::ros

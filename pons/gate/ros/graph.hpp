@@ -1,0 +1,84 @@
+// Who is in the ROS 2 graph: what others tell of themselves (DDS discovery, and the topic ros_discovery_info, in which
+// participants say which endpoint is which node's), and what we tell. No network, no clock; one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/gate/ros/names.hpp"
+#include "pons/gate/ros/participant.hpp"
+
+namespace pons::gate::ros {
+
+inline constexpr std::string_view kDiscoveryTopic = "ros_discovery_info";
+
+// How long the identifiers of ros_discovery_info are: 16 bytes since ROS 2 Iron, 24 before. Who reads the other form
+// sees endpoints, but no names of nodes.
+enum class Form : std::uint8_t { kJazzy, kHumble };
+
+// Of ours or of others'.
+struct Endpoint {
+  Guid guid{};
+  bool writes = false;
+  std::string topic, type;  // on the wire
+  std::string user_data;
+  Qos qos;
+};
+
+class Graph {
+ public:
+  Graph(NodeName node, const Guid& participant) : node_(std::move(node)), participant_(participant) {}
+
+  void add_own(Endpoint endpoint);
+  void heard(const Heard& heard);
+  // A message of ros_discovery_info. Error: it is of neither form.
+  [[nodiscard]] Expected<void> told(std::span<const std::byte> message, const SampleId& id);
+
+  // What we tell, with the encapsulation.
+  [[nodiscard]] std::vector<std::byte> announcement() const;
+  // True once after what we tell, or how, has changed.
+  [[nodiscard]] bool take_changed() { return std::exchange(changed_, false); }
+  // That of the others; where there are both, of those that came last; Jazzy's while there is nobody.
+  [[nodiscard]] Form form() const { return form_; }
+
+  // By identifier; of others.
+  [[nodiscard]] const std::map<Guid, Endpoint>& endpoints() const { return others_; }
+  // Full names, of others; several of one name are told as often.
+  [[nodiscard]] std::vector<std::string> nodes() const;
+  // What stands in the way of speaking with somebody, a line each, told once: another type or definition of it,
+  // qualities of service that do not fit, a node of our name, two forms of ROS 2.
+  [[nodiscard]] std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
+
+ private:
+  struct Node {
+    NodeName name;
+    std::vector<Guid> endpoints;
+  };
+  struct Peer {
+    Form form = Form::kJazzy;
+    std::vector<Node> nodes;
+  };
+
+  void compare(const Endpoint& own, const Endpoint& other);
+  [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
+  void learn(const Guid& participant, Peer peer);
+  void warn(std::string line);
+
+  NodeName node_;
+  Guid participant_;
+  std::vector<Endpoint> own_;
+  std::map<Guid, Endpoint> others_;
+  std::map<Guid, Peer> peers_;  // by participant
+  Form form_ = Form::kJazzy;
+  bool changed_ = true;
+  std::vector<std::string> warnings_;
+  std::set<std::string> warned_;
+};
+
+}  // namespace pons::gate::ros

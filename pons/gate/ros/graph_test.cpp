@@ -1,0 +1,144 @@
+#include "pons/gate/ros/graph.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "pons/wire/types/rmw_dds_common/msg/participant_entities_info.hpp"
+#include "pons/wire/types/rmw_dds_common_humble/msg/participant_entities_info.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Guid guid(std::uint8_t participant, std::uint8_t entity) {
+  Guid made{};
+  made[0] = 1;
+  made[1] = 0x0f;
+  made[11] = participant;
+  made[14] = entity;
+  made[15] = 4;
+  return made;
+}
+
+const Guid kOurs = participant_of(guid(1, 0)), kTheirs = participant_of(guid(2, 0)),
+           kOthers = participant_of(guid(3, 0));
+const NodeName kNode{"/", "pons"};
+
+template <typename Info>
+std::vector<std::byte> info_of(const Guid& participant, const std::string& node, const std::vector<Guid>& writers) {
+  Info info;
+  std::ranges::copy(participant, info.gid.data.begin());
+  auto& entry = info.node_entities_info_seq.emplace_back();
+  entry.node_namespace = "/";
+  entry.node_name = node;
+  for (const Guid& each : writers) std::ranges::copy(each, entry.writer_gid_seq.emplace_back().data.begin());
+  std::vector<std::byte> bytes;
+  EXPECT_TRUE(wire::encode(info, bytes));
+  return bytes;
+}
+using wire::rmw_dds_common::msg::ParticipantEntitiesInfo;
+using HumbleInfo = wire::rmw_dds_common_humble::msg::ParticipantEntitiesInfo;
+
+Heard reader(const std::string& hash) {
+  return {.kind = Heard::Kind::kReader,
+          .guid = guid(2, 7),
+          .topic = "rt/scan",
+          .type = "std_msgs::msg::dds_::String_",
+          .user_data = "typehash=" + hash + ";"};
+}
+const Endpoint kWriter{.guid = guid(1, 5),
+                       .writes = true,
+                       .topic = "rt/scan",
+                       .type = "std_msgs::msg::dds_::String_",
+                       .user_data = "typehash=RIHS01_aa;"};
+
+TEST(Graph, SpeaksTheFormOfItsPeers) {
+  Graph graph(kNode, kOurs);
+  graph.add_own(kWriter);
+  EXPECT_TRUE(graph.take_changed());
+  EXPECT_FALSE(graph.take_changed());
+  ParticipantEntitiesInfo jazzy;
+  ASSERT_TRUE(wire::decode(graph.announcement(), jazzy));
+  EXPECT_EQ(jazzy.node_entities_info_seq.at(0).node_name, "pons");
+  EXPECT_EQ(jazzy.node_entities_info_seq.at(0).writer_gid_seq.at(0).data, kWriter.guid);
+
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "talker", {guid(2, 1), guid(2, 2)}), {guid(2, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kHumble);
+  EXPECT_TRUE(graph.take_changed());
+  HumbleInfo humble;
+  ASSERT_TRUE(wire::decode(graph.announcement(), humble));
+  EXPECT_TRUE(std::ranges::equal(std::span(humble.gid.data).first(16), kOurs));
+  EXPECT_THAT(graph.nodes(), ElementsAre("/talker"));
+  EXPECT_THAT(graph.take_warnings(), IsEmpty());
+
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kOthers, "listener", {}), {guid(3, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("Humble")));
+}
+
+TEST(Graph, NodesAreThoseOfTheNewestWordAndGoWithTheirParticipant) {
+  Graph graph(kNode, kOurs);
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "one", {}), {guid(2, 9), 1}));
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "two", {}), {guid(2, 9), 2}));
+  EXPECT_THAT(graph.nodes(), ElementsAre("/two"));
+  graph.heard({.kind = Heard::Kind::kGone, .guid = kTheirs});
+  EXPECT_THAT(graph.nodes(), IsEmpty());
+}
+
+TEST(Graph, WhatIsOfNeitherFormIsRefused) {
+  Graph graph(kNode, kOurs);
+  auto bytes = info_of<ParticipantEntitiesInfo>(kTheirs, "one", {guid(2, 1)});
+  for (std::size_t cut = 0; cut < bytes.size(); ++cut)
+    EXPECT_FALSE(graph.told(std::span(bytes).first(cut), {guid(2, 9), 1})) << cut;
+  EXPECT_THAT(graph.nodes(), IsEmpty());
+}
+
+TEST(Graph, AnotherDefinitionOfATypeIsToldOnceWithItsNode) {
+  Graph graph(kNode, kOurs);
+  graph.add_own(kWriter);
+  graph.heard(reader("RIHS01_aa"));
+  EXPECT_THAT(graph.take_warnings(), IsEmpty());
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "listener", {guid(2, 7)}), {guid(2, 9), 1}));
+  graph.heard(reader("RIHS01_bb"));
+  graph.heard(reader("RIHS01_bb"));
+  EXPECT_THAT(graph.take_warnings(), ElementsAre(AllOf(HasSubstr("/listener"), HasSubstr("RIHS01_bb"))));
+}
+
+TEST(Graph, AnotherTypeIsToldWhoeverCameFirst) {
+  Heard other = reader("RIHS01_aa");
+  other.type = "std_msgs::msg::dds_::Int32_";
+  for (const bool ours_first : {true, false}) {
+    Graph graph(kNode, kOurs);
+    if (ours_first) graph.add_own(kWriter);
+    graph.heard(other);
+    if (!ours_first) graph.add_own(kWriter);
+    EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("Int32_")));
+  }
+}
+
+TEST(Graph, QualitiesThatDoNotFitAreNamed) {
+  Graph graph(kNode, kOurs);
+  graph.add_own(kWriter);
+  graph.heard({.kind = Heard::Kind::kIncompatible, .guid = kWriter.guid, .topic = "rt/scan", .policy = "durability"});
+  EXPECT_THAT(graph.take_warnings(),
+              ElementsAre(AllOf(HasSubstr("rt/scan"), HasSubstr("durability"), HasSubstr("reliable, volatile"))));
+}
+
+TEST(Graph, ASecondNodeOfOurNameIsTold) {
+  Graph graph(kNode, kOurs);
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "pons", {}), {guid(2, 9), 1}));
+  EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("/pons")));
+  // What we hear of ourselves is not somebody else.
+  Graph alone(kNode, kOurs);
+  ASSERT_TRUE(alone.told(info_of<ParticipantEntitiesInfo>(kOurs, "pons", {}), {guid(1, 9), 1}));
+  EXPECT_THAT(alone.take_warnings(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace pons::gate::ros

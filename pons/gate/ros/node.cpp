@@ -1,0 +1,123 @@
+#include "pons/gate/ros/node.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+
+#include "pons/wire/types/rmw_dds_common/msg/participant_entities_info.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using wire::rmw_dds_common::msg::ParticipantEntitiesInfo;
+
+constexpr Qos kDiscoveryQos{.durability = Qos::Durability::kTransientLocal, .depth = 1};
+constexpr Qos kAllDiscoveryQos{.durability = Qos::Durability::kTransientLocal, .depth = 0};
+
+}  // namespace
+
+Expected<std::unique_ptr<Node>> Node::open(const NodeSettings& settings) {
+  Descriptor wake(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC));
+  if (!wake) return fail("no descriptor is left", "ROS 2", "raise the limit: ulimit -n");
+  std::unique_ptr<Node> node(new Node(settings, std::move(wake)));
+  if (auto joined = node->join(); !joined) return std::unexpected(joined.error());
+  return node;
+}
+
+Expected<void> Node::join() {
+  auto participant = Participant::join(settings_.participant, [this] { wake(); });
+  if (!participant) return std::unexpected(participant.error());
+  participant_ = std::move(*participant);
+  graph_ = Graph(settings_.name, participant_->guid());
+  const EndpointName name{.topic = std::string(kDiscoveryTopic),
+                          .type = wire_type(ParticipantEntitiesInfo::kName),
+                          .user_data = fmt::format("typehash={};", ParticipantEntitiesInfo::kHash)};
+  auto writer = participant_->add_writer(name, kDiscoveryQos);
+  if (!writer) return std::unexpected(writer.error());
+  auto reader = participant_->add_reader(name, kAllDiscoveryQos);
+  if (!reader) return std::unexpected(reader.error());
+  discovery_writer_ = std::move(*writer);
+  discovery_reader_ = std::move(*reader);
+  announce();
+  return {};
+}
+
+void Node::wake() const { (void)::eventfd_write(wake_.get(), 1); }
+
+void Node::announce() {
+  while (graph_.take_changed()) {
+    if (const auto written = discovery_writer_->write(graph_.announcement()); !written)
+      warnings_.push_back(written.error().line());
+  }
+}
+
+void Node::spin() {
+  eventfd_t count = 0;
+  (void)::eventfd_read(wake_.get(), &count);
+  for (const Heard& heard : participant_->take_heard()) graph_.heard(heard);
+  while (discovery_reader_->take(sample_)) {
+    if (const auto told = graph_.told(sample_.bytes, sample_.id); !told) unreadable(told.error(), sample_.id.writer);
+  }
+  announce();
+  const auto now = Part::Clock::now();
+  for (const auto& part : parts_) part->spin(now);
+}
+
+void Node::spin_for(std::chrono::milliseconds at_most) {
+  auto until = Part::Clock::now() + at_most;
+  for (const auto& part : parts_) until = std::min(until, part->due());
+  const auto rest = std::chrono::ceil<std::chrono::milliseconds>(until - Part::Clock::now()).count();
+  pollfd waited{wake_.get(), POLLIN, 0};
+  (void)::poll(&waited, 1, static_cast<int>(std::clamp<std::int64_t>(rest, 0, 60'000)));
+  spin();
+}
+
+std::vector<std::string> Node::take_warnings() {
+  std::vector<std::string> lines = graph_.take_warnings();
+  std::ranges::move(std::exchange(warnings_, {}), std::back_inserter(lines));
+  return lines;
+}
+
+Expected<EndpointName> Node::endpoint_name(std::string_view name, Use use, std::string_view type, std::string_view hash,
+                                           std::string_view user_data) const {
+  auto full = expanded(name, settings_.name, settings_.remaps);
+  if (!full) return std::unexpected(full.error());
+  return EndpointName{wire_topic(*full, use), wire_type(type), fmt::format("{}typehash={};", user_data, hash)};
+}
+
+Expected<std::unique_ptr<Writer>> Node::add_writer(std::string_view name, Use use, std::string_view type,
+                                                   std::string_view hash, const Qos& qos, std::string_view user_data) {
+  auto called = endpoint_name(name, use, type, hash, user_data);
+  if (!called) return std::unexpected(called.error());
+  auto writer = participant_->add_writer(*called, qos);
+  if (writer) {
+    graph_.add_own({(*writer)->guid(), true, called->topic, called->type, called->user_data, qos});
+    announce();
+  }
+  return writer;
+}
+
+Expected<std::unique_ptr<Reader>> Node::add_reader(std::string_view name, Use use, std::string_view type,
+                                                   std::string_view hash, const Qos& qos, std::string_view user_data) {
+  auto called = endpoint_name(name, use, type, hash, user_data);
+  if (!called) return std::unexpected(called.error());
+  auto reader = participant_->add_reader(*called, qos);
+  if (reader) {
+    graph_.add_own({(*reader)->guid(), false, called->topic, called->type, called->user_data, qos});
+    announce();
+  }
+  return reader;
+}
+
+// The first, and then ever fewer: 1, 2, 4, 8 and so on.
+void Node::unreadable(const Error& error, const Guid& writer) {
+  if (!std::has_single_bit(++unreadable_)) return;
+  warnings_.push_back(
+      fmt::format("{} (from {:02x}; {} so far could not be read)", error.line(), fmt::join(writer, "."), unreadable_));
+}
+
+}  // namespace pons::gate::ros

@@ -1,0 +1,160 @@
+// A node of the ROS 2 graph, without ROS: its topics, and the ground that services and actions stand on. One thread
+// makes all calls; what came is handled in spin().
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/gate/ros/graph.hpp"
+#include "pons/gate/ros/names.hpp"
+#include "pons/gate/ros/participant.hpp"
+#include "pons/gate/unix_address.hpp"
+#include "pons/wire/cdr.hpp"
+
+namespace pons::gate::ros {
+
+struct NodeSettings {
+  ParticipantSettings participant;
+  NodeName name{"/", "pons"};
+  Remaps remaps;
+};
+
+// What a node does at each spin(), besides topics: a service that waits for whom it answers, and the like.
+class Part {
+ public:
+  using Clock = std::chrono::steady_clock;
+  virtual ~Part() = default;
+  virtual void spin(Clock::time_point now) = 0;
+  // When it must be called again at the latest, though nothing came.
+  [[nodiscard]] virtual Clock::time_point due() const { return Clock::time_point::max(); }
+};
+
+template <wire::Message T>
+class Publisher {
+ public:
+  explicit Publisher(std::unique_ptr<Writer> writer) : writer_(std::move(writer)) {}
+
+  // Errors: what it holds is longer than its type allows; readers do not keep up.
+  Expected<void> publish(const T& message) {
+    if (auto encoded = wire::encode(message, bytes_); !encoded) return encoded;
+    const auto written = writer_->write(bytes_);
+    return written ? Expected<void>{} : std::unexpected(written.error());
+  }
+  // To how many.
+  [[nodiscard]] std::size_t matched() const { return writer_->matched().size(); }
+
+ private:
+  std::unique_ptr<Writer> writer_;
+  std::vector<std::byte> bytes_;
+};
+
+class Node {
+ public:
+  // Errors: those of Participant::join().
+  [[nodiscard]] static Expected<std::unique_ptr<Node>> open(const NodeSettings& settings);
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+  ~Node() = default;
+
+  // Errors: no name; the topic has another type here. The publisher must end before the node.
+  template <wire::Message T>
+  [[nodiscard]] Expected<Publisher<T>> advertise(std::string_view topic, const Qos& qos = kTopicQos) {
+    auto writer = add_writer(topic, Use::kTopic, T::kName, T::kHash, qos);
+    if (!writer) return std::unexpected(writer.error());
+    return Publisher<T>(std::move(*writer));
+  }
+  // `heard` is called in spin(), for as long as the node lives.
+  template <wire::Message T>
+  [[nodiscard]] Expected<void> subscribe(std::string_view topic, const Qos& qos, std::function<void(const T&)> heard) {
+    auto reader = add_reader(topic, Use::kTopic, T::kName, T::kHash, qos);
+    if (!reader) return std::unexpected(reader.error());
+    add_part(std::make_unique<Subscription<T>>(*this, std::move(*reader), std::move(heard)));
+    return {};
+  }
+
+  // Readable when spin() has something to do.
+  [[nodiscard]] int descriptor() const { return wake_.get(); }
+  void spin();
+  // Waits for that, and for what is due, no longer than so; and spins.
+  void spin_for(std::chrono::milliseconds at_most);
+  // Makes it readable. Any thread.
+  void wake() const;
+
+  [[nodiscard]] const Graph& graph() const { return graph_; }
+  [[nodiscard]] const NodeName& name() const { return settings_.name; }
+  // What people should know, a line each: Graph::take_warnings(), and what came and cannot be read.
+  [[nodiscard]] std::vector<std::string> take_warnings();
+
+  // ---- for services and actions ----
+
+  // `user_data`, KEY=VALUE;, is told of the endpoint besides the hash of its type.
+  [[nodiscard]] Expected<std::unique_ptr<Writer>> add_writer(std::string_view name, Use use, std::string_view type,
+                                                             std::string_view hash, const Qos& qos,
+                                                             std::string_view user_data = {});
+  [[nodiscard]] Expected<std::unique_ptr<Reader>> add_reader(std::string_view name, Use use, std::string_view type,
+                                                             std::string_view hash, const Qos& qos,
+                                                             std::string_view user_data = {});
+  void add_part(std::unique_ptr<Part> part) { parts_.push_back(std::move(part)); }
+  // Something that came could not be read.
+  void unreadable(const Error& error, const Guid& writer);
+  // Of this node, for what must not be the same twice on a domain.
+  [[nodiscard]] std::uint32_t next_number() { return ++numbers_; }
+  [[nodiscard]] Guid guid() const { return participant_->guid(); }
+
+ private:
+  // At most so many at a time, so that one flooded topic does not keep the others waiting.
+  static constexpr int kTakenAtOnce = 256;
+
+  template <wire::Message T>
+  class Subscription final : public Part {
+   public:
+    Subscription(Node& node, std::unique_ptr<Reader> reader, std::function<void(const T&)> heard)
+        : node_(node), reader_(std::move(reader)), heard_(std::move(heard)) {}
+    void spin(Clock::time_point) override {
+      for (int taken = 0; reader_->take(sample_); ++taken) {
+        if (const auto read = wire::decode(sample_.bytes, message_); !read) {
+          node_.unreadable(read.error(), sample_.id.writer);
+        } else {
+          heard_(message_);
+        }
+        if (taken + 1 == kTakenAtOnce) return node_.wake();
+      }
+    }
+
+   private:
+    Node& node_;
+    std::unique_ptr<Reader> reader_;
+    std::function<void(const T&)> heard_;
+    Sample sample_;
+    T message_;
+  };
+
+  explicit Node(const NodeSettings& settings, Descriptor wake) : settings_(settings), wake_(std::move(wake)) {}
+  [[nodiscard]] Expected<void> join();
+  [[nodiscard]] Expected<EndpointName> endpoint_name(std::string_view name, Use use, std::string_view type,
+                                                     std::string_view hash, std::string_view user_data) const;
+  void announce();
+
+  NodeSettings settings_;
+  Descriptor wake_;
+  std::unique_ptr<Participant> participant_;
+  Graph graph_{{}, {}};
+  std::unique_ptr<Writer> discovery_writer_;
+  std::unique_ptr<Reader> discovery_reader_;
+  std::list<std::unique_ptr<Part>> parts_;
+  Sample sample_;
+  std::vector<std::string> warnings_;
+  std::uint64_t unreadable_ = 0;
+  std::uint32_t numbers_ = 0;
+};
+
+}  // namespace pons::gate::ros

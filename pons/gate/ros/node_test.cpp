@@ -1,0 +1,148 @@
+// Two nodes in one process, over loopback. Peers of other makes: tests/ros/.
+#include "pons/gate/ros/node.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/inotify.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "pons/gate/ros/test_nodes.hpp"
+#include "pons/wire/types/sensor_msgs/msg/image.hpp"
+#include "pons/wire/types/std_msgs/msg/int64.hpp"
+#include "pons/wire/types/std_msgs/msg/string.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using wire::std_msgs::msg::Int64;
+using wire::std_msgs::msg::String;
+using Image = wire::sensor_msgs::msg::Image;
+
+TEST(RosNode, ATopicGoesFromOneToTheOther) {
+  const auto here = test_node("here"), there = test_node("there");
+  auto publisher = here->advertise<String>("chatter");
+  ASSERT_TRUE(publisher);
+  std::vector<std::string> heard;
+  ASSERT_TRUE(there->subscribe<String>("chatter", kTopicQos, [&](const String& text) { heard.push_back(text.data); }));
+  ASSERT_TRUE(spin_until({here.get(), there.get()}, [&] { return publisher->matched() == 1; }));
+  for (const char* const text : {"one", "two", "three"}) ASSERT_TRUE(publisher->publish({text}));
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return heard.size() == 3; }));
+  EXPECT_THAT(heard, ElementsAre("one", "two", "three"));
+}
+
+TEST(RosNode, EachKnowsTheOthersName) {
+  const auto here = test_node("here"), there = test_node("there");
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return !here->graph().nodes().empty(); }));
+  EXPECT_THAT(here->graph().nodes(), ElementsAre("/there"));
+  auto publisher = there->advertise<String>("chatter");
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] {
+    return std::ranges::any_of(here->graph().endpoints(), [](const auto& each) {
+      return each.second.topic == "rt/chatter" && each.second.user_data.find(String::kHash) != std::string::npos;
+    });
+  }));
+}
+
+TEST(RosNode, WhoComesLaterHearsWhatIsLatched) {
+  const auto here = test_node("here");
+  auto publisher = here->advertise<String>("robot_description", kLatchedQos);
+  ASSERT_TRUE(publisher->publish({"before anybody came"}));
+  const auto there = test_node("there");
+  std::string heard;
+  ASSERT_TRUE(
+      there->subscribe<String>("robot_description", kLatchedQos, [&](const String& text) { heard = text.data; }));
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return !heard.empty(); }));
+  EXPECT_EQ(heard, "before anybody came");
+}
+
+TEST(RosNode, AMegabyteArrivesWhole) {
+  const auto here = test_node("here"), there = test_node("there");
+  auto publisher = here->advertise<Image>("image");
+  Image image;
+  image.data.resize(1 << 20);
+  for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<std::uint8_t>(i * 7919 >> 3U);
+  int same = 0;
+  ASSERT_TRUE(there->subscribe<Image>("image", kTopicQos, [&](const Image& got) { same += got == image ? 1 : 0; }));
+  ASSERT_TRUE(spin_until({here.get(), there.get()}, [&] { return publisher->matched() == 1; }));
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(publisher->publish(image));
+    EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return same == i + 1; })) << i;
+  }
+}
+
+TEST(RosNode, QualitiesThatDoNotFitAreToldOnBothSides) {
+  const auto here = test_node("here"), there = test_node("there");
+  auto publisher = here->advertise<String>("chatter", kSensorQos);
+  ASSERT_TRUE(there->subscribe<String>("chatter", kTopicQos, [](const String&) {}));
+  std::vector<std::string> here_told, there_told;
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] {
+    for (std::string& line : here->take_warnings()) here_told.push_back(std::move(line));
+    for (std::string& line : there->take_warnings()) there_told.push_back(std::move(line));
+    return !here_told.empty() && !there_told.empty();
+  }));
+  EXPECT_THAT(here_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("wants more"))));
+  EXPECT_THAT(there_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("offers less"))));
+}
+
+TEST(RosNode, WhatCannotBeReadIsToldAndTheNextIsHeard) {
+  const auto here = test_node("here"), there = test_node("there");
+  // Of the name and the hash of one type, and the bytes of another.
+  auto writer = here->add_writer("chatter", Use::kTopic, String::kName, String::kHash, kTopicQos);
+  ASSERT_TRUE(writer);
+  std::string heard;
+  ASSERT_TRUE(there->subscribe<String>("chatter", kTopicQos, [&](const String& text) { heard = text.data; }));
+  ASSERT_TRUE(spin_until({here.get(), there.get()}, [&] { return !(*writer)->matched().empty(); }));
+  std::vector<std::byte> bytes;
+  ASSERT_TRUE(wire::encode(Int64{.data = -1}, bytes));
+  ASSERT_TRUE((*writer)->write(bytes));
+  ASSERT_TRUE(wire::encode(String{.data = "good"}, bytes));
+  ASSERT_TRUE((*writer)->write(bytes));
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return heard == "good"; }));
+  EXPECT_THAT(there->take_warnings(), Contains(HasSubstr("std_msgs/msg/String")));
+}
+
+// Fast DDS would look for them here, and parse them with what has another layout in this process.
+TEST(RosNode, ReadsNoFileOfSettings) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "pons_no_settings";
+  std::filesystem::create_directories(folder);
+  const auto here = std::filesystem::current_path();
+  std::filesystem::current_path(folder);
+  for (const char* const name : {"DEFAULT_FASTRTPS_PROFILES.xml", "named.xml"})
+    std::ofstream(folder / name) << "<profiles/>";
+  ::setenv("FASTRTPS_DEFAULT_PROFILES_FILE", (folder / "named.xml").c_str(), 1);
+  const Descriptor watch(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC));
+  ASSERT_GE(::inotify_add_watch(watch.get(), folder.c_str(), IN_OPEN), 0);
+  const auto node = test_node("here");
+  std::array<char, 4096> events{};
+  EXPECT_EQ(::read(watch.get(), events.data(), events.size()), -1);
+  std::ifstream(folder / "named.xml").get();
+  EXPECT_GT(::read(watch.get(), events.data(), events.size()), 0) << "opening a file is not seen";
+  std::filesystem::current_path(here);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(RosNode, BadSettingsAreRefused) {
+  const auto away = Node::open({.participant = {.domain = test_domain(), .interface = "no_such0"}});
+  ASSERT_FALSE(away);
+  EXPECT_THAT(away.error().line(), AllOf(HasSubstr("no_such0"), HasSubstr("lo (127.0.0.1)")));
+  const auto here = test_node("here");
+  EXPECT_FALSE(here->advertise<String>("2d"));
+  auto text = here->advertise<String>("chatter");
+  ASSERT_TRUE(text);
+  const auto number = here->advertise<Int64>("chatter");
+  ASSERT_FALSE(number);
+  EXPECT_THAT(number.error().line(), AllOf(HasSubstr("String_"), HasSubstr("Int64_")));
+}
+
+}  // namespace
+}  // namespace pons::gate::ros

@@ -1,0 +1,193 @@
+#include "pons/gate/ros/service.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "pons/core/digest.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+constexpr std::uint8_t kReaderBit = 0x04;  // of an entity's kind (RTPS 2.2, 9.3.1.2)
+constexpr std::array kLittleEndian{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+
+// rmw_cyclonedds puts so many bytes between the encapsulation and the data: `uint64 client; int64 number`. They end at
+// a multiple of 8, so the data is laid out as without them.
+static_assert(kHeaderRoom % 8 == 0);
+
+// The identifier by which rmw_cyclonedds knows which two endpoints belong together: 16 bytes in hex with dots.
+std::string identifier(const Node& node, std::uint32_t number) {
+  Guid id = node.guid();
+  for (unsigned i = 0; i < 4; ++i) id[12 + i] = static_cast<std::uint8_t>(number >> (24 - 8 * i));
+  return fmt::format("{:x}", fmt::join(id, "."));
+}
+
+// Bytes that were read up to behind a header, as if there had been none.
+std::span<const std::byte> without_header(std::vector<std::byte>& bytes) {
+  std::copy_n(bytes.begin(), wire::kEncapsulation, bytes.begin() + kHeaderRoom);
+  return std::span(bytes).subspan(kHeaderRoom);
+}
+
+bool has_header(const Sample& sample) {
+  return vendor_of(sample.id.writer) == Vendor::kCyclone && sample.bytes.size() >= wire::kEncapsulation + kHeaderRoom;
+}
+
+// Cyclone drops what Fast DDS tells of a new endpoint before the first heartbeat, and the next comes after a second.
+std::chrono::milliseconds settled_after(Vendor vendor) {
+  return vendor == Vendor::kFastDds ? std::chrono::milliseconds(200) : std::chrono::milliseconds(1500);
+}
+
+// What tells our requests from those of others in a server's answers.
+std::uint64_t client_number(const Guid& guid) {
+  Digest digest;
+  for (const std::uint8_t byte : guid) digest.add(byte);
+  return digest.value();
+}
+
+void put_header(std::vector<std::byte>& bytes, std::span<const std::byte, kHeaderRoom> header) {
+  std::ranges::copy(kLittleEndian, bytes.begin());
+  std::ranges::copy(header, bytes.begin() + wire::kEncapsulation);
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<ServerEnds>> ServerEnds::open(Node& node, std::string_view name, std::string_view request_type,
+                                                       std::string_view request_hash, std::string_view response_type,
+                                                       std::string_view response_hash, const Qos& qos) {
+  const std::string id = fmt::format("serviceid={};", identifier(node, node.next_number()));
+  // The reader last: a request that comes is answered by a writer that is there.
+  auto writer = node.add_writer(name, Use::kReply, response_type, response_hash, qos, id);
+  if (!writer) return std::unexpected(writer.error());
+  auto reader = node.add_reader(name, Use::kRequest, request_type, request_hash, qos, id);
+  if (!reader) return std::unexpected(reader.error());
+  return std::unique_ptr<ServerEnds>(new ServerEnds(node, std::move(*reader), std::move(*writer)));
+}
+
+std::optional<std::pair<Asker, std::span<const std::byte>>> ServerEnds::take(Sample& room) {
+  if (!requests_->take(room)) return std::nullopt;
+  Asker asker{.writer = room.id.writer, .sample = room.id};
+  if (has_header(room)) {
+    auto& header = asker.header.emplace();
+    std::copy_n(room.bytes.begin() + wire::kEncapsulation, kHeaderRoom, header.begin());
+    return std::pair(asker, without_header(room.bytes));
+  }
+  if (room.related.writer != Guid{}) asker.sample.writer = room.related.writer;
+  return std::pair(asker, std::span<const std::byte>(room.bytes));
+}
+
+// DDS matches readers one by one: a client may ask before its reader of answers is known to us.
+bool ServerEnds::reaches(const Asker& asker) const {
+  const std::vector<Guid> readers = replies_->matched();
+  if (!asker.header) {
+    const bool names_reader = (asker.sample.writer[15] & kReaderBit) != 0;
+    return !names_reader || std::ranges::find(readers, asker.sample.writer) != readers.end();
+  }
+  const auto& endpoints = node_.graph().endpoints();
+  const auto writer = endpoints.find(asker.writer);
+  if (writer == endpoints.end()) return false;
+  const std::string_view client = value_of(writer->second.user_data, "clientid");
+  return client.empty() || std::ranges::any_of(readers, [&](const Guid& reader) {
+           const auto known = endpoints.find(reader);
+           return known != endpoints.end() && value_of(known->second.user_data, "clientid") == client;
+         });
+}
+
+void ServerEnds::answer(const Asker& asker, std::vector<std::byte> bytes, Part::Clock::time_point now) {
+  if (reaches(asker)) return send(asker, bytes);
+  waiting_.push_back({asker, std::move(bytes), now + kPatience});
+}
+
+void ServerEnds::send(const Asker& asker, std::vector<std::byte>& bytes) {
+  Expected<std::int64_t> written = 0;
+  if (asker.header) {
+    put_header(bytes, *asker.header);
+    written = replies_->write(bytes);
+  } else {
+    written = replies_->write(std::span(bytes).subspan(kHeaderRoom), asker.sample);
+  }
+  if (!written) ++dropped_;
+}
+
+void ServerEnds::spin(Part::Clock::time_point now) {
+  std::erase_if(waiting_, [&](Waiting& each) {
+    if (reaches(each.asker)) return send(each.asker, each.bytes), true;
+    if (now < each.until) return false;
+    ++dropped_;
+    return true;
+  });
+}
+
+Part::Clock::time_point ServerEnds::due() const {
+  return waiting_.empty() ? Part::Clock::time_point::max() : waiting_.front().until;
+}
+
+Expected<std::unique_ptr<ClientEnds>> ClientEnds::open(Node& node, std::string_view name, std::string_view request_type,
+                                                       std::string_view request_hash, std::string_view response_type,
+                                                       std::string_view response_hash, const Qos& qos) {
+  const std::string id = fmt::format("clientid={};", identifier(node, node.next_number()));
+  auto reader = node.add_reader(name, Use::kReply, response_type, response_hash, qos, id);
+  if (!reader) return std::unexpected(reader.error());
+  auto writer = node.add_writer(name, Use::kRequest, request_type, request_hash, qos, id);
+  if (!writer) return std::unexpected(writer.error());
+  const std::uint64_t number = client_number((*writer)->guid());
+  return std::unique_ptr<ClientEnds>(new ClientEnds(number, std::move(*writer), std::move(*reader)));
+}
+
+std::optional<Guid> ClientEnds::server() const {
+  const std::vector<Guid> writers = replies_->matched();
+  for (const Guid& reader : requests_->matched()) {
+    const Guid participant = participant_of(reader);
+    if (std::ranges::any_of(writers, [&](const Guid& each) { return participant_of(each) == participant; }))
+      return reader;
+  }
+  return std::nullopt;
+}
+
+bool ClientEnds::available() {
+  const auto there = server();
+  const auto now = Part::Clock::now();
+  if (!there) {
+    matched_.reset();
+  } else if (!matched_ || matched_->first != *there) {
+    matched_.emplace(*there, now);
+  }
+  return matched_ && now - matched_->second >= settled_after(vendor_of(matched_->first));
+}
+
+Expected<std::int64_t> ClientEnds::ask(std::vector<std::byte>& bytes) {
+  const auto there = server();
+  if (!there) return fail("no server is there", "service", "start it, on the same domain");
+  // That of the writer's sample, which is what rmw_fastrtps counts by.
+  const std::int64_t number = asked_ + 1;
+  Expected<std::int64_t> written = 0;
+  if (vendor_of(*there) == Vendor::kCyclone) {
+    std::array<std::byte, kHeaderRoom> header{};
+    std::memcpy(header.data(), &id_, sizeof(id_));
+    std::memcpy(header.data() + sizeof(id_), &number, sizeof(number));
+    put_header(bytes, header);
+    written = requests_->write(bytes);
+  } else {
+    written = requests_->write(std::span(bytes).subspan(kHeaderRoom), {.writer = replies_->guid(), .sequence = 0});
+  }
+  if (written) asked_ = *written;
+  return written;
+}
+
+std::optional<std::pair<std::int64_t, std::span<const std::byte>>> ClientEnds::take(Sample& room) {
+  while (replies_->take(room)) {
+    if (has_header(room)) {
+      std::uint64_t client = 0;
+      std::int64_t number = 0;
+      std::memcpy(&client, room.bytes.data() + wire::kEncapsulation, sizeof(client));
+      std::memcpy(&number, room.bytes.data() + wire::kEncapsulation + sizeof(client), sizeof(number));
+      if (client == id_) return std::pair(number, without_header(room.bytes));
+    } else if (room.related.writer == replies_->guid() || room.related.writer == requests_->guid()) {
+      return std::pair(room.related.sequence, std::span<const std::byte>(room.bytes));
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace pons::gate::ros

@@ -1,0 +1,138 @@
+// Pons' node among nodes of both ROS 2 middlewares.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pons/gate/ros/node.hpp"
+#include "pons/gate/ros/service.hpp"
+#include "pons/gate/ros/test_nodes.hpp"
+#include "pons/wire/types/std_msgs/msg/string.hpp"
+#include "pons/wire/types/std_srvs/srv/set_bool.hpp"
+#include "tests/ros/peer_process.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using namespace std::chrono_literals;
+using test::PeerProcess;
+using ::testing::Contains;
+using ::testing::StartsWith;
+using wire::std_msgs::msg::String;
+using wire::std_srvs::srv::SetBool;
+
+struct Make {
+  const char* name;
+  const char* program;
+  std::vector<std::string> environment;
+};
+
+// Cyclone takes the first interface that is not loopback, as long as nobody tells it otherwise. The last is how
+// rmw_cyclonedds confines it to one computer.
+const Make kMakes[] = {
+    {"fast", PONS_FAST_PEER, {}},
+    {"cyclone", PONS_CYCLONE_PEER, {}},
+    {"cyclone_on_loopback",
+     PONS_CYCLONE_PEER,
+     {R"(CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/>)"
+      "</Interfaces></General></Domain></CycloneDDS>"}},
+    {"cyclone_without_multicast",
+     PONS_CYCLONE_PEER,
+     {"CYCLONEDDS_URI=<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast></General><Discovery>"
+      "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+      R"(<Peers><Peer address="localhost"/></Peers></Discovery></Domain></CycloneDDS>)"}}};
+
+class Interop : public ::testing::TestWithParam<Make> {
+ protected:
+  [[nodiscard]] PeerProcess peer(const std::string& role) {
+    return PeerProcess(GetParam().program, test_domain(), "peer", role, GetParam().environment);
+  }
+  [[nodiscard]] bool spun(const std::function<bool()>& done) { return spin_until({node_.get()}, done); }
+
+  std::unique_ptr<Node> node_ = test_node("pons");
+};
+
+TEST_P(Interop, HearsATalker) {
+  std::vector<std::string> heard;
+  ASSERT_TRUE(node_->subscribe<String>("chatter", kTopicQos, [&](const String& text) { heard.push_back(text.data); }));
+  auto talker = peer("talker");
+  EXPECT_TRUE(spun([&] { return heard.size() >= 5; }));
+  EXPECT_THAT(heard, Contains(StartsWith("hello ")));
+}
+
+TEST_P(Interop, IsHeardByAListener) {
+  auto publisher = node_->advertise<String>("chatter");
+  auto listener = peer("listener");
+  // Each side finds the other by itself: what is said before both have, is not heard.
+  EXPECT_TRUE(spun([&] { return publisher->publish({"from pons"}) && listener.said("heard from pons"); }));
+}
+
+TEST_P(Interop, BothKnowTheOthersNode) {
+  auto publisher = node_->advertise<String>("chatter");
+  auto listener = peer("listener");
+  EXPECT_TRUE(spun(
+      [&] { return !node_->graph().nodes().empty() && listener.said("node /pons with 0 readers and 1 writers"); }));
+  EXPECT_THAT(node_->graph().nodes(), Contains("/peer"));
+}
+
+TEST_P(Interop, AnswersAClient) {
+  ASSERT_TRUE(serve<SetBool>(*node_, "switch", [](const SetBool::Request& request, const Answer<SetBool>& answer) {
+    answer({.success = request.data, .message = "by pons"});
+  }));
+  auto asks = peer("client");
+  EXPECT_TRUE(spun([&] { return asks.said("reply"); }));
+  EXPECT_TRUE(asks.said("reply 1 by pons"));
+}
+
+TEST_P(Interop, AsksAServer) {
+  const auto asks = client<SetBool>(*node_, "switch");
+  ASSERT_TRUE(asks);
+  auto server = peer("server");
+  ASSERT_TRUE(spun([&] { return (*asks)->available(); }));
+  std::string message;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE((*asks)->call({.data = true}, 10s, [&](const Expected<SetBool::Response>& reply) {
+      message = reply ? reply->message : reply.error().line();
+    }));
+    message.clear();
+    ASSERT_TRUE(spun([&] { return !message.empty(); }));
+    EXPECT_THAT(message, StartsWith("by ")) << ::testing::PrintToString(server.lines());
+  }
+  EXPECT_TRUE(server.said("asked 1"));
+}
+
+TEST_P(Interop, AServerThatDiesIsNamed) {
+  const auto asks = client<SetBool>(*node_, "switch");
+  auto server = peer("server");
+  ASSERT_TRUE(spun([&] { return (*asks)->available(); }));
+  server.kill();
+  std::string message;
+  ASSERT_TRUE((*asks)->call({.data = true}, 500ms, [&](const Expected<SetBool::Response>& reply) {
+    message = reply ? reply->message : reply.error().line();
+  }));
+  EXPECT_TRUE(spun([&] { return !message.empty(); }));
+  EXPECT_THAT(message, ::testing::HasSubstr("no answer in time"));
+}
+
+INSTANTIATE_TEST_SUITE_P(, Interop, ::testing::ValuesIn(kMakes), [](const auto& each) { return each.param.name; });
+
+TEST(InteropOfBoth, OneServerAnswersClientsOfEither) {
+  const auto node = test_node("pons");
+  int asked = 0;
+  ASSERT_TRUE(serve<SetBool>(*node, "switch", [&](const SetBool::Request& request, const Answer<SetBool>& answer) {
+    answer({.success = request.data, .message = "by pons"});
+    ++asked;
+  }));
+  PeerProcess fast(kMakes[0].program, test_domain(), "fast", "client", kMakes[0].environment);
+  PeerProcess cyclone(kMakes[1].program, test_domain(), "cyclone", "client", kMakes[1].environment);
+  EXPECT_TRUE(spin_until({node.get()}, [&] { return fast.said("reply") && cyclone.said("reply"); }));
+  EXPECT_TRUE(fast.said("reply 1 by pons"));
+  EXPECT_TRUE(cyclone.said("reply 1 by pons"));
+  EXPECT_EQ(asked, 2);
+}
+
+}  // namespace
+}  // namespace pons::gate::ros
