@@ -12,7 +12,7 @@ TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 # What reads bytes that others wrote: fuzz/NAME.cpp.
-FUZZERS = cdr journal task tree
+FUZZERS = cdr journal mcap task tree
 FUZZ_S ?= 30
 
 .PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers clean
@@ -71,11 +71,11 @@ tsan: setup ## all tests under the thread sanitizer
 
 tsan-quick: setup ## the tests of what threads share without locks, under the same sanitizer
 	cmake --preset tsan
-	cmake --build --preset tsan --parallel $(JOBS) --target $(TSAN_QUICK) relaxed_releases
+	cmake --build --preset tsan --parallel $(JOBS) --target $(TSAN_QUICK) relaxed_releases recording_threads_test
 	for name in $(TSAN_QUICK); do \
 	  TSAN_OPTIONS=suppressions=$(CURDIR)/tools/tsan_suppressions.txt build/tsan/pons/$${name%_test}/$$name --gtest_brief=1 || exit 1; \
 	done
-	ctest --preset tsan -R relaxed_release --no-tests=error
+	ctest --preset tsan -R 'relaxed_release|RecordingThreads' --no-tests=error
 
 rtsan: export RTSAN_OPTIONS = external_symbolizer_path=/usr/bin/addr2line
 rtsan: ## the control loop's tests under RealtimeSanitizer, and that it fires
@@ -103,7 +103,7 @@ bench-peers: ## build what the benchmarks compare against
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
 
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
-	for program in control_step inverse_kinematics journal scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
+	for program in cdr control_step inverse_kinematics journal recording scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
 	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose

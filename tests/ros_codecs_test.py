@@ -67,6 +67,22 @@ class Codecs(unittest.TestCase):
             with self.subTest(name=name, text=text):
                 self.assertIn(said, self.refused(name, text))
 
+    def test_what_recordings_keep_is_the_file_or_is_made_of_its_parts(self):
+        self.file("a_humble/msg/One.msg", "# as it stands\nint32 x 5\na_humble/Two[<=3] twos\n")
+        self.file("a_humble/msg/Two.msg", "string<=4 name\n")
+        self.file("a_humble/srv/Ask.srv", 'uint8 A=3\nstring S="b c"\nfloat32[2] f [1.5, 2]\nTwo[] twos\nbool b true\n---\n')
+        self.file("builtin_interfaces/msg/Time.msg", "int32 sec\nuint32 nanosec\n")
+        self.file("service_msgs/msg/ServiceEventInfo.msg", "builtin_interfaces/Time stamp\n")
+        out = self.root / "out"
+        done = self.run_tool("--out", out, self.root)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        text = (out / "pons/wire/types/all_schemas.hpp").read_text()
+        self.assertIn('{"a_humble/msg/One", "a/One", R"msg(# as it stands\nint32 x 5\na/Two[<=3] twos\n)msg",\n'
+                      '     "a_humble/msg/Two"}', text)
+        self.assertIn('R"msg(uint8 A=3\nstring S="b c"\nfloat32[2] f [1.5, 2.0]\na/Two[] twos\nbool b true\n)msg"', text)
+        self.assertIn('{"a_humble/srv/Ask_Response", "a/Ask_Response", R"msg()msg",\n     ""}', text)
+        self.assertIn('a/Ask_Request[<=1] request\n', text)
+
     def test_only_what_changed_is_written_and_what_is_no_longer_made_goes(self):
         self.file("a/msg/One.msg", "int32 x\n")
         self.file("a/msg/TwoThree.msg", "One[] ones\nstring<=4 class\n")

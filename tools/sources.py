@@ -9,7 +9,7 @@ CPP = (".cpp", ".hpp")
 # Known-bad trees that prove the checkers fire; they break every rule on purpose.
 FIXTURES = "tests/fixtures/"
 # What building leaves behind, as .gitignore names it; for trees that are not a checkout.
-MADE = ("build/", ".venv/", ".venv-bench/", "install/", "log/")
+MADE = ("build/", ".venv/", ".venv-bench/", ".venv-check/", "install/", "log/")
 
 
 @dataclass(frozen=True, order=True)

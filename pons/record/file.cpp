@@ -10,17 +10,12 @@
 #include <string>
 #include <system_error>
 
+#include "pons/record/posix.hpp"
+
 namespace pons::record {
 namespace {
 
 namespace fs = std::filesystem;
-
-[[nodiscard]] std::unexpected<Error> cannot(std::string_view what, const fs::path& where, int error) {
-  std::string mend = "choose another path";
-  if (error == ENOSPC || error == EDQUOT) mend = "free some space or choose another path";
-  if (error == EACCES || error == EPERM) mend = "change the folder's permissions or choose another path";
-  return fail(fmt::format("cannot {}: {}", what, std::generic_category().message(error)), where.string(), mend);
-}
 
 // The file that a name stands for once links are followed: replacing the link itself would cut it off from its target.
 [[nodiscard]] fs::path behind_links(const fs::path& path) {
@@ -35,29 +30,10 @@ namespace fs = std::filesystem;
   return target;
 }
 
-[[nodiscard]] fs::path folder_of(const fs::path& path) {
-  return path.has_parent_path() ? path.parent_path() : fs::path(".");
-}
-
-// An open file descriptor, closed on every way out.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  [[nodiscard]] int number() const { return number_; }
-
- private:
-  int number_;
-};
-
 // 0, or the errno of what went wrong.
 [[nodiscard]] int write_and_sync(const fs::path& path, std::string_view bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
-  if (file.number() < 0) return errno;
+  if (!file.open()) return errno;
   while (!bytes.empty()) {
     const ssize_t written = ::write(file.number(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
@@ -67,15 +43,27 @@ class Descriptor {
   return ::fsync(file.number()) == 0 ? 0 : errno;
 }
 
-// The rename lives in the folder: until the folder is synced, a power cut can undo it.
-[[nodiscard]] int sync_folder(const fs::path& folder) {
+}  // namespace
+
+std::unexpected<Error> cannot(std::string_view what, const fs::path& where, int error) {
+  std::string mend = "choose another path";
+  if (error == ENOSPC || error == EDQUOT) mend = "free some space or choose another path";
+  if (error == EFBIG) mend = "raise the limit of a file's size (ulimit -f) or write smaller files";
+  if (error == EACCES || error == EPERM) mend = "change the folder's permissions or choose another path";
+  if (error == EROFS) mend = "choose a path on a file system that is not read-only";
+  if (error == EIO) mend = "look after the disk: the kernel's log says more";
+  return fail(fmt::format("cannot {}: {}", what, std::generic_category().message(error)), where.string(), mend);
+}
+
+fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
+
+// A rename lives in the folder: until the folder is synced, a power cut can undo it.
+int sync_folder(const fs::path& folder) {
   const Descriptor directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (directory.number() < 0) return errno;
+  if (!directory.open()) return errno;
   // Some file systems cannot sync a folder (EINVAL); theirs is then as good as it gets.
   return ::fsync(directory.number()) == 0 || errno == EINVAL ? 0 : errno;
 }
-
-}  // namespace
 
 Expected<void> check_writable(const fs::path& path) {
   if (path.empty() || !path.has_filename()) {

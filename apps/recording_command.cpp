@@ -1,0 +1,276 @@
+// pons recording: what one holds, whether it is whole, a whole one of what is left, and tables of it.
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "apps/commands.hpp"
+#include "pons/record/export.hpp"
+#include "pons/record/mcap_check.hpp"
+#include "pons/record/mcap_reader.hpp"
+#include "pons/record/recorder.hpp"
+#include "pons/record/video.hpp"
+#include "pons/wire/json.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+namespace mcap = record::mcap;
+using record::McapReader;
+
+struct RecordingOptions {
+  fs::path file, output, csv, jsonl, mp4;
+  std::vector<std::string> topics;
+  bool overwrite = false, json = false;
+
+  [[nodiscard]] record::Overwrite overwriting() const {
+    return overwrite ? record::Overwrite::kAllowed : record::Overwrite::kNever;
+  }
+};
+
+// One topic may have several publishers, each with a channel.
+struct Row {
+  std::uint64_t messages = 0, dropped = 0;
+};
+using Rows = std::map<std::pair<std::string, std::string>, Row>;  // topic, type
+
+// What a file says of itself must not write to the terminal what it likes.
+std::string plain(std::string text) {
+  for (char& each : text) {
+    if (static_cast<unsigned char>(each) < ' ' || each == '\x7F') each = '?';
+  }
+  return text;
+}
+
+std::string megabytes(std::uint64_t bytes) { return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes)); }
+
+double span_s(const mcap::Statistics& statistics) {
+  return 1e-9 * static_cast<double>(statistics.end - statistics.start);
+}
+
+// "zstd, 40 chunks, 12.0 of 31.5 MB"
+std::string compression_of(const record::Contents& contents) {
+  std::map<std::string, int> names;
+  std::uint64_t compressed = 0, uncompressed = 0;
+  for (const auto& each : contents.chunks) {
+    ++names[each.compression.empty() ? "uncompressed" : each.compression];
+    compressed += each.compressed_size;
+    uncompressed += each.uncompressed_size;
+  }
+  if (names.empty()) return contents.statistics.messages > 0 ? "no chunks" : "empty";
+  std::string text;
+  for (const auto& [name, count] : names) text += (text.empty() ? "" : " and ") + name;
+  const auto chunks = contents.chunks.size();
+  text += fmt::format(", {} chunk{}", chunks, chunks == 1 ? "" : "s");
+  if (compressed != uncompressed) text += fmt::format(", {} of {}", megabytes(compressed), megabytes(uncompressed));
+  return text;
+}
+
+// What the recorder said of messages that it could not take; the last words count.
+Expected<mcap::Texts> drops_of(const McapReader& reader) {
+  const auto& all = reader.contents().metadata;
+  const auto last = std::ranges::find(all.rbegin(), all.rend(), record::kDropsName, &mcap::MetadataIndex::name);
+  if (last == all.rend()) return mcap::Texts{};
+  auto metadata = reader.metadata(*last);
+  if (!metadata) return std::unexpected(metadata.error());
+  return std::move(metadata->texts);
+}
+
+Expected<Rows> rows_of(const McapReader& reader) {
+  const record::Contents& contents = reader.contents();
+  Rows rows;
+  for (const auto& [id, channel] : contents.channels) {
+    const auto found = contents.statistics.channel_messages.find(id);
+    const std::string type(contents.type_of(channel));
+    rows[{plain(channel.topic), plain(type.empty() ? channel.message_encoding : type)}].messages +=
+        found == contents.statistics.channel_messages.end() ? 0 : found->second;
+  }
+  const auto drops = drops_of(reader);
+  if (!drops) return std::unexpected(drops.error());
+  for (const auto& [name, count] : *drops) {
+    const std::string topic = plain(name);
+    const auto row = std::ranges::find_if(rows, [&](const auto& each) { return each.first.first == topic; });
+    auto& dropped = row == rows.end() ? rows[{topic, "-"}].dropped : row->second.dropped;
+    dropped = std::strtoull(count.c_str(), nullptr, 10);
+  }
+  return rows;
+}
+
+// Of times since 1970 the date.
+std::string moment(mcap::Timestamp time) {
+  constexpr mcap::Timestamp kFirstDate = 946'684'800'000'000'000;  // of the year 2000
+  const auto seconds = static_cast<std::time_t>(time / 1'000'000'000);
+  if (time < kFirstDate) return fmt::format("{:.3f} s", 1e-9 * static_cast<double>(time));
+  return fmt::format("{:%F %T} UTC", fmt::gmtime(seconds));
+}
+
+// Where it is not whole, what is shown is what can be read.
+void show_damage(const record::Contents& contents, const std::string& file) {
+  if (contents.damage) say(stderr, fmt::format("pons: {}\n", contents.damage->error(file).line()));
+}
+
+int show_json(const McapReader& reader, const Rows& rows) {
+  const record::Contents& contents = reader.contents();
+  wire::Json topics = wire::Json::array();
+  for (const auto& [key, row] : rows)
+    topics.push_back(
+        {{"topic", key.first}, {"type", key.second}, {"messages", row.messages}, {"dropped", row.dropped}});
+  const wire::Json json{{"file", reader.source().name()},
+                        {"bytes", reader.source().size()},
+                        {"finished", contents.finished},
+                        {"profile", contents.header.profile},
+                        {"library", contents.header.library},
+                        {"start_ns", contents.statistics.start},
+                        {"end_ns", contents.statistics.end},
+                        {"messages", contents.statistics.messages},
+                        {"chunks", contents.chunks.size()},
+                        {"attachments", contents.attachments.size()},
+                        {"topics", topics}};
+  say(stdout, json.dump(2, ' ', false, wire::Json::error_handler_t::replace) + "\n");
+  return kExitGood;
+}
+
+int info(const RecordingOptions& options) {
+  const auto reader = McapReader::open(options.file);
+  if (!reader) return bad_input(reader.error());
+  const record::Contents& contents = (*reader)->contents();
+  const auto rows = rows_of(**reader);
+  if (!rows) return bad_run(rows.error());
+  show_damage(contents, options.file.string());
+  if (options.json) return show_json(**reader, *rows);
+  const auto& statistics = contents.statistics;
+  say(stdout, fmt::format("{}: {}, {}\n", options.file.string(), contents.finished ? "finished" : "not finished",
+                          megabytes((*reader)->source().size())));
+  if (statistics.messages > 0)
+    say(stdout,
+        fmt::format("{} to {}, {:.3f} s\n", moment(statistics.start), moment(statistics.end), span_s(statistics)));
+  say(stdout, fmt::format("{}; written by {}\n", compression_of(contents),
+                          contents.header.library.empty() ? "nobody that says so" : plain(contents.header.library)));
+  std::size_t topic_width = 5, type_width = 4;
+  for (const auto& [key, row] : *rows) {
+    topic_width = std::max(topic_width, key.first.size());
+    type_width = std::max(type_width, key.second.size());
+  }
+  say(stdout, fmt::format("\n{:<{}}  {:<{}}  {:>10}  {:>8}  {:>8}\n", "topic", topic_width, "type", type_width,
+                          "messages", "a second", "dropped"));
+  for (const auto& [key, row] : *rows) {
+    const double took_s = span_s(statistics);
+    const std::string rate = took_s > 0 ? fmt::format("{:.1f}", static_cast<double>(row.messages) / took_s) : "-";
+    say(stdout, fmt::format("{:<{}}  {:<{}}  {:>10}  {:>8}  {:>8}\n", key.first, topic_width, key.second, type_width,
+                            row.messages, rate, row.dropped));
+  }
+  for (const auto& each : contents.attachments)
+    say(stdout,
+        fmt::format("attachment {} ({}, {} bytes)\n", plain(each.name), plain(each.media_type), each.data_size));
+  return kExitGood;
+}
+
+std::string held(const record::Verdict& verdict) {
+  return fmt::format("{} messages in {} chunks, {} attachments", verdict.messages, verdict.chunks, verdict.attachments);
+}
+
+int check(const RecordingOptions& options) {
+  const auto source = record::open_file(options.file);
+  if (!source) return bad_input(source.error());
+  const auto verdict = record::check(**source);
+  if (!verdict) return bad_input(verdict.error());
+  if (verdict->whole()) {
+    say(stdout, fmt::format("whole: {}\n", held(*verdict)));
+    return kExitGood;
+  }
+  for (const record::Damage& each : verdict->damage)
+    say(stderr, fmt::format("pons: {}: byte {}: {}\n", options.file.string(), each.at, each.what));
+  if (verdict->further > 0) say(stderr, fmt::format("pons: and {} more\n", verdict->further));
+  say(stdout, fmt::format("not whole; can be saved by pons recording repair: {}\n", held(*verdict)));
+  return kExitBadRun;
+}
+
+int repair(const RecordingOptions& options) {
+  const auto source = record::open_file(options.file);
+  if (!source) return bad_input(source.error());
+  fs::path output = options.output;
+  if (output.empty()) {
+    output = options.file;
+    output.replace_filename(options.file.stem().string() + "_repaired.mcap");
+  }
+  if (auto repaired = record::repair(**source, output, options.overwriting()); !repaired)
+    return bad_input(repaired.error());
+  const auto made = record::open_file(output);
+  if (!made) return bad_run(made.error());
+  const auto verdict = record::check(**made);
+  if (!verdict) return bad_run(verdict.error());
+  say(stdout, fmt::format("{}: {}\n", output.string(), held(*verdict)));
+  return kExitGood;
+}
+
+int film(const RecordingOptions& options, const McapReader& reader) {
+  if (options.topics.size() != 1)
+    return bad_input({"a film is of one topic", options.mp4.string(), "name it with --topic"});
+  const auto filmed = record::export_mp4(reader, options.topics.front(), options.mp4, options.overwriting());
+  if (!filmed) return bad_input(filmed.error());
+  if (filmed->damage) say(stderr, fmt::format("pons: {}\n", filmed->damage->error(options.file.string()).line()));
+  say(stdout, fmt::format("{} pictures, {:.2f} a second\n", filmed->pictures, filmed->a_second));
+  return filmed->damage ? kExitBadRun : kExitGood;
+}
+
+int export_it(const RecordingOptions& options) {
+  const auto reader = McapReader::open(options.file);
+  if (!reader) return bad_input(reader.error());
+  if (!options.mp4.empty()) return film(options, **reader);
+  record::Query query;
+  if (!options.topics.empty()) query.topics.emplace(options.topics.begin(), options.topics.end());
+  const auto exported = options.csv.empty()
+                            ? record::export_jsonl(**reader, query, options.jsonl, options.overwriting())
+                            : record::export_csv(**reader, query, options.csv, options.overwriting());
+  if (!exported) return bad_input(exported.error());
+  for (const auto& [topic, why] : exported->left_out)
+    say(stderr, fmt::format("pons: {} is left out: {}\n", plain(topic), plain(why)));
+  if (exported->first_unreadable)
+    say(stderr, fmt::format("pons: {} messages left out; the first: {}\n", exported->unreadable,
+                            plain(exported->first_unreadable->line())));
+  if (exported->damage) say(stderr, fmt::format("pons: {}\n", exported->damage->error(options.file.string()).line()));
+  say(stdout, fmt::format("{} messages\n", exported->messages));
+  const bool all = exported->unreadable == 0 && !exported->damage && (exported->left_out.empty() || !query.topics);
+  return all ? kExitGood : kExitBadRun;
+}
+
+}  // namespace
+
+void add_recording(CLI::App& app, Chosen& chosen) {
+  auto options = std::make_shared<RecordingOptions>();
+  CLI::App* recording =
+      app.add_subcommand("recording", "Look into a recording, check it, mend it, or make tables of it");
+  recording->require_subcommand(1);
+  const auto add = [&](const char* name, const char* what, int (*run)(const RecordingOptions&)) {
+    CLI::App* command = recording->add_subcommand(name, what);
+    command->add_option("file", options->file, "An MCAP file, whoever wrote it")->required();
+    command->callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
+    return command;
+  };
+  add("info", "Its topics, types, counts, duration and compression, and whether it was finished", info)
+      ->add_flag("--json", options->json, "The same for programs");
+  add("check", "Whether it is whole to the last byte, and what can be saved if not", check);
+  CLI::App* mend = add("repair", "Write a whole one of all that can be read of it", repair);
+  mend->add_option("--output", options->output, "The new file (FILE_repaired.mcap beside it)");
+  mend->add_flag("--overwrite", options->overwrite, "The new file may replace one; also FILE itself");
+  CLI::App* tables =
+      add("export", "Its messages as text, of the types that Pons knows; or pictures as a film", export_it);
+  auto* csv = tables->add_option("--csv", options->csv, "A folder for one table a topic");
+  auto* jsonl = tables->add_option("--jsonl", options->jsonl, "A file for one JSON object a line");
+  auto* mp4 = tables->add_option("--mp4", options->mp4, "A film of a topic of compressed images, by ffmpeg");
+  csv->excludes(jsonl);
+  mp4->excludes(csv)->excludes(jsonl);
+  tables->add_option("--topic", options->topics, "Only this one; may be given several times")->allow_extra_args(false);
+  tables->add_flag("--overwrite", options->overwrite, "New files may replace others");
+  tables->callback([options, &chosen] {
+    if (options->csv.empty() && options->jsonl.empty() && options->mp4.empty())
+      throw CLI::RequiredError("pons recording export: --csv DIR, --jsonl FILE or --mp4 FILE");
+    chosen = [options] { return export_it(*options); };
+  });
+}
+
+}  // namespace pons::apps

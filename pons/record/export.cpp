@@ -1,0 +1,188 @@
+#include "pons/record/export.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <system_error>
+#include <utility>
+
+#include "pons/record/new_file.hpp"
+#include "pons/record/posix.hpp"
+#include "pons/record/ros_types.hpp"
+
+namespace pons::record {
+namespace {
+
+namespace fs = std::filesystem;
+using wire::Json;
+
+Expected<Json> json_itself(std::span<const std::byte> bytes) {
+  const auto* begin = reinterpret_cast<const char*>(bytes.data());
+  Json json = Json::parse(begin, begin + bytes.size(), nullptr, false);
+  if (json.is_discarded()) return fail("it is no JSON");
+  return json;
+}
+
+// How messages of each channel become JSON; what cannot is left out.
+class Readers {
+ public:
+  Readers(const Contents& contents, const Query& query, Exported& exported) {
+    for (const auto& [id, channel] : contents.channels) {
+      if (query.topics && !query.topics->contains(channel.topic)) continue;
+      if (channel.message_encoding == "json") {
+        readers_[id] = &json_itself;
+      } else if (const auto type = known_type_of(contents, channel)) {
+        readers_[id] = (*type)->to_json;
+      } else {
+        exported.left_out[channel.topic] = type.error().what;
+      }
+    }
+  }
+  // nullptr: its channel is left out.
+  [[nodiscard]] Expected<Json> (*of(std::uint16_t channel) const)(std::span<const std::byte>) {
+    const auto found = readers_.find(channel);
+    return found == readers_.end() ? nullptr : found->second;
+  }
+
+ private:
+  std::map<std::uint16_t, Expected<Json> (*)(std::span<const std::byte>)> readers_;
+};
+
+using Put = std::function<Expected<void>(const mcap::Message&, const mcap::Channel&, const Json&)>;
+
+Expected<Exported> each_json(const McapReader& reader, const Query& query, const Put& put) {
+  for (const std::string& topic : query.topics.value_or(std::set<std::string, std::less<>>{})) {
+    const auto is_it = [&](const auto& channel) { return channel.second.topic == topic; };
+    if (std::ranges::none_of(reader.contents().channels, is_it))
+      return fail("there is no such topic in the recording", topic, "pons recording info shows those that there are");
+  }
+  Exported exported;
+  const Readers readers(reader.contents(), query, exported);
+  Expected<void> done;
+  const auto read = reader.each_message(query, [&](const mcap::Message& message, const mcap::Channel& channel) {
+    const auto to_json = readers.of(channel.id);
+    if (to_json == nullptr) return true;
+    const auto json = to_json(message.data);
+    if (!json) {
+      ++exported.unreadable;
+      if (!exported.first_unreadable)
+        exported.first_unreadable = Error{
+            fmt::format("message {} of {} cannot be read: {}", message.sequence, channel.topic, json.error().line()),
+            reader.source().name(), ""};
+      return true;
+    }
+    ++exported.messages;
+    done = put(message, channel, *json);
+    return done.has_value();
+  });
+  if (!read) return std::unexpected(read.error());
+  if (!done) return std::unexpected(done.error());
+  exported.damage = *read;
+  return exported;
+}
+
+// RFC 4180.
+std::string cell(const Json& json) {
+  std::string text = json.is_string() ? json.get<std::string>() : json.is_null() ? "" : wire::line_of(json);
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char each : text) quoted += each == '"' ? std::string("\"\"") : std::string(1, each);
+  return quoted + '"';
+}
+
+// The leaves, each by its way.
+void flatten(const Json& json, const std::string& way, std::string& names, std::string& cells) {
+  if (json.is_object()) {
+    for (const auto& [name, value] : json.items()) flatten(value, way.empty() ? name : way + "." + name, names, cells);
+    return;
+  }
+  names += ',' + cell(way);
+  cells += ',' + cell(json);
+}
+
+class Tables {
+ public:
+  Tables(fs::path folder, Overwrite overwrite) : folder_(std::move(folder)), overwrite_(overwrite) {}
+
+  Expected<void> put(const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
+    std::string names, cells;
+    // What JSON an application puts into messages may differ from one to the next.
+    if (channel.message_encoding == "json")
+      flatten(Json{{"message", wire::line_of(json)}}, "", names, cells);
+    else
+      flatten(json, "", names, cells);
+    auto there = tables_.find(std::pair(channel.topic, channel.schema));
+    if (there == tables_.end()) {
+      auto file = NewText::create(folder_ / name_for(channel.topic), overwrite_);
+      if (!file) return std::unexpected(file.error());
+      there = tables_.emplace(std::pair(channel.topic, channel.schema), std::move(*file)).first;
+      auto headed = there->second.add("log_time_ns,publish_time_ns,sequence" + names + "\r\n");
+      if (!headed) return headed;
+    }
+    return there->second.add(
+        fmt::format("{},{},{}{}\r\n", message.log_time, message.publish_time, message.sequence, cells));
+  }
+
+  Expected<void> end() {
+    for (auto& [key, file] : tables_) {
+      if (auto ended = file.end(); !ended) return ended;
+    }
+    return {};
+  }
+
+ private:
+  // Two topics may have names that become one.
+  std::string name_for(const std::string& topic) {
+    std::string name = topic.starts_with('/') ? topic.substr(1) : topic;
+    for (char& each : name) {
+      const bool plain = (each >= 'a' && each <= 'z') || (each >= 'A' && each <= 'Z') || (each >= '0' && each <= '9');
+      if (!plain && each != '-') each = '_';
+    }
+    if (name.empty()) name = "topic";
+    const int times = ++names_[name];
+    return times == 1 ? name + ".csv" : fmt::format("{}_{}.csv", name, times);
+  }
+
+  fs::path folder_;
+  Overwrite overwrite_;
+  std::map<std::pair<std::string, std::uint16_t>, NewText> tables_;  // by topic and schema
+  std::map<std::string, int> names_;
+};
+
+}  // namespace
+
+Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, const fs::path& path,
+                                Overwrite overwrite) {
+  auto file = NewText::create(path, overwrite);
+  if (!file) return std::unexpected(file.error());
+  auto exported =
+      each_json(reader, query, [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
+        const Json line{{"topic", channel.topic},
+                        {"log_time_ns", message.log_time},
+                        {"publish_time_ns", message.publish_time},
+                        {"sequence", message.sequence},
+                        {"message", json}};
+        return file->add(wire::line_of(line) + "\n");
+      });
+  if (!exported) return exported;
+  if (auto ended = file->end(); !ended) return std::unexpected(ended.error());
+  return exported;
+}
+
+Expected<Exported> export_csv(const McapReader& reader, const Query& query, const fs::path& folder,
+                              Overwrite overwrite) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return cannot("make the folder", folder, error.value());
+  Tables tables(folder, overwrite);
+  auto exported =
+      each_json(reader, query, [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
+        return tables.put(message, channel, json);
+      });
+  if (!exported) return exported;
+  if (auto ended = tables.end(); !ended) return std::unexpected(ended.error());
+  return exported;
+}
+
+}  // namespace pons::record

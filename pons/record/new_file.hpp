@@ -1,0 +1,45 @@
+// A file that nobody sees before it is whole. One thread at a time; blocks on the disk.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "pons/core/error.hpp"
+#include "pons/record/output_file.hpp"
+
+namespace pons::record {
+
+enum class Overwrite { kNever, kAllowed };
+
+// The name under which a file is written that shall become `path`. Errors: those of check_writable; `path` exists and
+// may not be overwritten.
+[[nodiscard]] Expected<std::filesystem::path> begin_file(const std::filesystem::path& path, Overwrite overwrite);
+// It gets its name, which nobody loses who made such a file meanwhile; or, where that fails, is removed.
+[[nodiscard]] Expected<void> end_file(const std::filesystem::path& part, const std::filesystem::path& path,
+                                      Overwrite overwrite);
+
+// Text that is written so, a piece of it at a time.
+class NewText {
+ public:
+  [[nodiscard]] static Expected<NewText> create(const std::filesystem::path& path, Overwrite overwrite);
+  ~NewText();  // without end() nothing is left of it
+  NewText(NewText&&) noexcept = default;
+  NewText& operator=(NewText&&) = delete;
+
+  [[nodiscard]] Expected<void> add(std::string_view text);
+  [[nodiscard]] Expected<void> end();
+
+ private:
+  NewText(std::filesystem::path path, Overwrite overwrite, OutputFile file)
+      : path_(std::move(path)), overwrite_(overwrite), file_(std::move(file)) {}
+  [[nodiscard]] Expected<void> flush();
+
+  std::filesystem::path path_;
+  Overwrite overwrite_;
+  std::optional<OutputFile> file_;
+  std::string waiting_;
+};
+
+}  // namespace pons::record

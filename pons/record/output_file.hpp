@@ -1,0 +1,36 @@
+// A new file that grows at its end. One thread at a time; blocks on the disk.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "pons/core/error.hpp"
+#include "pons/record/posix.hpp"
+
+namespace pons::record {
+
+class OutputFile {
+ public:
+  // Errors: a file of that name is there already; the folder is missing, or nothing can be written into it.
+  [[nodiscard]] static Expected<OutputFile> create(const std::filesystem::path& path);
+
+  // All of it or nothing: after an error the file ends where it ended before. Errors: the disk or its quota is full,
+  // the file would become larger than the system allows, the disk is broken, or the file was removed meanwhile, so that
+  // nobody would find what is written.
+  [[nodiscard]] Expected<void> append(std::span<const std::byte> bytes);
+  // What was appended survives the loss of power once this has returned. Errors: the disk is broken.
+  [[nodiscard]] Expected<void> sync();
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  OutputFile(std::filesystem::path path, Descriptor file) : path_(std::move(path)), file_(std::move(file)) {}
+
+  std::filesystem::path path_;
+  Descriptor file_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace pons::record

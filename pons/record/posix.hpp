@@ -1,0 +1,45 @@
+// What files are made of where the standard library tells too little of what went wrong. For this folder only.
+#pragma once
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <string_view>
+#include <utility>
+
+#include "pons/core/error.hpp"
+
+namespace pons::record {
+
+// An open file descriptor, closed on every way out.
+class Descriptor {
+ public:
+  Descriptor() = default;
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  ~Descriptor() { close(); }
+  void close() {
+    if (number_ >= 0) ::close(std::exchange(number_, -1));
+  }
+  [[nodiscard]] int number() const { return number_; }
+  [[nodiscard]] bool open() const { return number_ >= 0; }
+
+ private:
+  int number_ = -1;
+};
+
+// "cannot WHAT: …", with how to mend what `error`, an errno, says.
+[[nodiscard]] std::unexpected<Error> cannot(std::string_view what, const std::filesystem::path& where, int error);
+
+[[nodiscard]] std::filesystem::path folder_of(const std::filesystem::path& path);
+
+// What was made, renamed or removed in a folder lasts only once this has returned. 0, or the errno of what went wrong.
+[[nodiscard]] int sync_folder(const std::filesystem::path& folder);
+
+}  // namespace pons::record

@@ -1,0 +1,309 @@
+#include "pons/record/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace pons::record {
+
+using mcap::Timestamp;
+
+namespace {
+
+constexpr std::size_t kLeastQueue = 4096;
+
+constexpr std::size_t kCountInWords = 4 + 4 + 20;  // of a topic's drops, beside its name
+
+constexpr std::size_t aligned(std::size_t size) { return (size + 7) / 8 * 8; }
+
+}  // namespace
+
+Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {
+  const std::string name = options.name;
+  if (options.queue_bytes < kLeastQueue)
+    return fail("the queue is too small", name, fmt::format("give it {} bytes or more", kLeastQueue));
+  if (options.quota_bytes && *options.quota_bytes / 2 < options.file_bytes)
+    return fail("the quota is less than two files'", name, "raise it, or make the files smaller");
+  auto rotation = Rotation::open(options.folder, name);
+  if (!rotation) return std::unexpected(rotation.error());
+  std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(*rotation)));
+  if (auto begun = recorder->begin_file(); !begun) return std::unexpected(begun.error());
+  return recorder;
+}
+
+Recorder::Recorder(RecorderOptions options, Rotation rotation)
+    : options_(std::move(options)), half_bytes_(options_.queue_bytes / 2), rotation_(std::move(rotation)) {
+  // Zeroed, so that no producer is the first to touch a page.
+  for (Half& half : halves_) half.room = std::make_unique<std::byte[]>(half_bytes_);
+}
+
+Recorder::~Recorder() = default;
+
+TopicId Recorder::add_topic(Topic topic) {
+  const std::scoped_lock lock(mutex_);
+  status_.topics.push_back({topic.name, 0, 0});
+  topics_.push_back(std::move(topic));
+  counts_.emplace_back();
+  return static_cast<TopicId>(topics_.size() - 1);
+}
+
+Recorder::Place Recorder::reserve(TopicId topic, Timestamp log_time, Timestamp publish_time, std::size_t size) {
+  const std::scoped_lock lock(mutex_);
+  Counts& counts = counts_[topic];
+  ++counts.offered;
+  // A number of its own, written or not: a gap shows where something is missing.
+  const Item item{size, log_time, publish_time, topic, counts.sequence++};
+  Half& half = halves_[filling_];
+  const bool fits = size <= half_bytes_ && sizeof item + aligned(size) <= half_bytes_ - half.used;
+  if (closed_ || !fits) {
+    ++counts.dropped;
+    return {};
+  }
+  std::byte* const at = half.room.get() + half.used;
+  std::memcpy(at, &item, sizeof item);
+  half.used += sizeof item + aligned(size);
+  half.copying.fetch_add(1, std::memory_order_relaxed);
+  if (std::exchange(idle_, false)) more_.notify_one();
+  return {{at + sizeof item, size}, &half};
+}
+
+void Recorder::publish(const Place& place) {
+  // The writing thread waits for nobody else.
+  if (place.half->copying.fetch_sub(1, std::memory_order_release) == 1) place.half->copying.notify_one();
+}
+
+bool Recorder::record(TopicId topic, Timestamp log_time, Timestamp publish_time, std::span<const std::byte> data) {
+  const Place place = reserve(topic, log_time, publish_time, data.size());
+  if (place.half == nullptr) return false;
+  if (!data.empty()) std::memcpy(place.room.data(), data.data(), data.size());
+  publish(place);
+  return true;
+}
+
+bool Recorder::attach(mcap::Attachment attachment) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_ || attachment.data.size() > half_bytes_ - std::min(half_bytes_, attachment_bytes_)) return false;
+  attachment_bytes_ += attachment.data.size();
+  attachments_.push_back(std::move(attachment));
+  if (std::exchange(idle_, false)) more_.notify_one();
+  return true;
+}
+
+void Recorder::advance(Timestamp now) {
+  const std::scoped_lock lock(mutex_);
+  now_ = std::max(now_, now);
+  advanced_ = true;
+  if (std::exchange(idle_, false)) more_.notify_one();
+}
+
+void Recorder::close() {
+  const std::scoped_lock lock(mutex_);
+  closed_ = true;
+  more_.notify_one();
+}
+
+RecorderStatus Recorder::status() const {
+  const std::scoped_lock lock(mutex_);
+  RecorderStatus status = status_;
+  for (std::size_t i = 0; i < counts_.size(); ++i) {
+    status.topics[i].offered = counts_[i].offered;
+    status.topics[i].dropped = counts_[i].dropped;
+  }
+  return status;
+}
+
+void Recorder::work() {
+  while (true) {
+    if (work_off()) continue;
+    std::unique_lock lock(mutex_);
+    const auto something = [&] { return halves_[filling_].used > 0 || !attachments_.empty() || advanced_; };
+    if (closed_ && !something()) break;
+    idle_ = true;
+    more_.wait(lock, [&] { return closed_ || something(); });
+    idle_ = false;
+  }
+  end_file();
+}
+
+bool Recorder::work_off() {
+  std::unique_lock lock(mutex_);
+  const bool advanced = std::exchange(advanced_, false);
+  Half& half = halves_[filling_];
+  if (half.used == 0 && attachments_.empty() && !advanced) return false;
+  filling_ = 1 - filling_;
+  for (std::size_t i = known_.size(); i < topics_.size(); ++i) {
+    known_.push_back(topics_[i]);
+    words_ += topics_[i].name.size() + kCountInWords;
+  }
+  const auto attachments = std::exchange(attachments_, {});
+  attachment_bytes_ = 0;
+  const Timestamp now = now_;
+  lock.unlock();
+
+  in_file_.resize(known_.size());
+  told_before_.resize(known_.size());
+  told_.resize(known_.size());
+  for (auto copying = half.copying.load(std::memory_order_acquire); copying > 0;
+       copying = half.copying.load(std::memory_order_acquire))
+    half.copying.wait(copying);
+  write_half(half);
+  for (const mcap::Attachment& each : attachments) write_attachment(each);
+  if (writer_ && writer_->oldest_waiting() &&
+      *writer_->oldest_waiting() + static_cast<Timestamp>(options_.writer.chunk_span.count()) <= now) {
+    if (auto flushed = writer_->flush(); !flushed) failed(flushed.error(), now);
+  }
+  if (writer_) {
+    if (auto told = tell_drops(); !told) failed(told.error(), now);
+  }
+  lock.lock();
+  half.used = 0;
+  status_.bytes = rotation_.bytes() + (writer_ ? writer_->bytes() : 0);
+  status_.removed = rotation_.removed();
+  return true;
+}
+
+void Recorder::write_attachment(const mcap::Attachment& attachment) {
+  if (writer_ && is_full(attachment.data.size() + attachment.name.size() + attachment.media_type.size() + 128)) {
+    end_file();
+    if (auto begun = begin_file(); !begun) failed(begun.error(), attachment.log_time);
+  }
+  const bool had_file = writer_ != nullptr;
+  const auto attached = had_file ? writer_->attach(attachment) : Expected<void>{};
+  if (!attached) failed(attached.error(), attachment.log_time);
+  if (had_file && attached) return;
+  const std::scoped_lock lock(mutex_);
+  ++status_.lost_attachments;
+}
+
+void Recorder::write_half(Half& half) {
+  for (std::size_t at = 0; at < half.used;) {
+    Item item;
+    std::memcpy(&item, half.room.get() + at, sizeof item);
+    write_one(item, {half.room.get() + at + sizeof item, item.size});
+    at += sizeof item + aligned(item.size);
+  }
+}
+
+void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
+  if (!writer_) {
+    if (retry_at_ && item.log_time < *retry_at_) return lose(item.topic, 1);
+    if (auto begun = begin_file(); !begun) {
+      failed(begun.error(), item.log_time);
+      return lose(item.topic, 1);
+    }
+  }
+  auto channel = channel_of(item.topic);
+  if (channel && is_full(data.size())) {
+    end_file();
+    const auto begun = begin_file();
+    channel = begun ? channel_of(item.topic) : std::unexpected(begun.error());
+  }
+  if (!channel) {
+    lose(item.topic, 1);
+    return failed(channel.error(), item.log_time);
+  }
+  ++in_file_[item.topic].handed;
+  const auto done = writer_->write({*channel, item.sequence, item.log_time, item.publish_time, data});
+  if (!done) failed(done.error(), item.log_time);
+}
+
+Expected<void> Recorder::begin_file() {
+  if (options_.quota_bytes) {
+    auto room = rotation_.make_room(options_.file_bytes, *options_.quota_bytes);
+    if (!room) return room;
+  }
+  auto writer = McapWriter::create(rotation_.next_path(), options_.writer);
+  if (!writer) return std::unexpected(writer.error());
+  for (const mcap::Metadata& each : options_.notes) {
+    if (auto noted = (*writer)->note(each); !noted) return noted;
+  }
+  writer_ = std::move(*writer);
+  schemas_.clear();
+  in_file_.assign(known_.size(), {});
+  retry_at_.reset();
+  const std::scoped_lock lock(mutex_);
+  ++status_.files;
+  status_.failing = false;
+  return {};
+}
+
+// A file holds one message at least, however long.
+bool Recorder::is_full(std::size_t size) const {
+  if (writer_->bytes_when_finished(size) + words_ <= options_.file_bytes) return false;
+  return std::ranges::any_of(in_file_, [](const InFile& each) { return each.handed > 0; });
+}
+
+Expected<std::uint16_t> Recorder::channel_of(TopicId topic) {
+  InFile& in_file = in_file_[topic];
+  if (in_file.channel != 0) return in_file.channel;
+  const Topic& facts = known_[topic];
+  std::uint16_t schema = 0;
+  if (!facts.schema_encoding.empty()) {
+    const auto key = std::pair(facts.type, facts.schema);
+    if (const auto found = schemas_.find(key); found != schemas_.end()) {
+      schema = found->second;
+    } else {
+      const auto added = writer_->add_schema(facts.type, facts.schema_encoding, facts.schema);
+      if (!added) return added;
+      schema = schemas_[key] = *added;
+    }
+  }
+  const auto added = writer_->add_channel(schema, facts.name, facts.message_encoding, facts.metadata);
+  if (added) in_file.channel = *added;
+  return added;
+}
+
+// At most once for each time that the queue is emptied.
+Expected<void> Recorder::tell_drops() {
+  std::map<std::string, std::uint64_t> drops;
+  bool is_news = false;
+  {
+    const std::scoped_lock lock(mutex_);
+    for (std::size_t i = 0; i < known_.size(); ++i) {
+      is_news = is_news || counts_[i].dropped != told_[i];
+      told_[i] = counts_[i].dropped;
+      if (told_[i] > told_before_[i]) drops[known_[i].name] += told_[i] - told_before_[i];
+    }
+  }
+  if (!is_news) return {};
+  mcap::Metadata metadata{std::string(kDropsName), {}};
+  for (const auto& [topic, count] : drops) metadata.texts.emplace(topic, std::to_string(count));
+  return writer_->note(metadata);
+}
+
+void Recorder::end_file() {
+  if (!writer_) return;
+  auto ended = tell_drops();
+  auto finished = writer_->finish();
+  if (ended) ended = finished;
+  // What the file does not hold, the next one tells of.
+  const auto counts = writer_->counts();
+  for (std::size_t i = 0; i < in_file_.size(); ++i) {
+    const auto written = counts.find(in_file_[i].channel);
+    const std::uint64_t held = in_file_[i].channel == 0 || written == counts.end() ? 0 : written->second;
+    if (in_file_[i].handed > held) lose(static_cast<TopicId>(i), in_file_[i].handed - held);
+  }
+  if (ended) told_before_ = told_;
+  rotation_.add(writer_->path(), writer_->bytes());
+  writer_.reset();
+  const std::scoped_lock lock(mutex_);
+  status_.bytes = rotation_.bytes();
+  if (!ended) status_.error = ended.error();
+}
+
+void Recorder::failed(const Error& error, Timestamp now) {
+  end_file();
+  retry_at_ = now + static_cast<Timestamp>(options_.retry_after.count());
+  const std::scoped_lock lock(mutex_);
+  status_.error = error;
+  status_.failing = true;
+}
+
+void Recorder::lose(TopicId topic, std::uint64_t count) {
+  const std::scoped_lock lock(mutex_);
+  counts_[topic].dropped += count;
+}
+
+}  // namespace pons::record

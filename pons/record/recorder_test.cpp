@@ -1,0 +1,294 @@
+// The recorder with its writing thread's work done between the producers' calls; with threads: tests/recording/.
+#include "pons/record/recorder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "pons/record/mcap_check.hpp"
+#include "pons/record/test_recording.hpp"
+#include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
+#include "pons/wire/types/std_msgs/msg/string.hpp"
+
+namespace pons::record {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr mcap::Timestamp kSecond = 1'000'000'000;
+
+class RecorderTest : public testing::Test {
+ protected:
+  [[nodiscard]] RecorderOptions options() const {
+    RecorderOptions options;
+    options.folder = folder_.path();
+    options.name = "run";
+    options.queue_bytes = 8192;
+    return options;
+  }
+  [[nodiscard]] Topic plain(const std::string& name) const { return {name, "", "", "", "cdr", {}}; }
+  void finish(Recorder& recorder) {
+    recorder.close();
+    recorder.work();
+  }
+  // All messages of all files, oldest first, and that each is whole.
+  [[nodiscard]] std::vector<Kept> all_kept() const {
+    std::vector<Kept> kept;
+    for (const auto& path : files()) {
+      const auto reader = McapReader::open(path);
+      EXPECT_TRUE(reader) << reader.error().line();
+      if (!reader) continue;
+      const auto verdict = check((*reader)->source());
+      EXPECT_TRUE(verdict && verdict->whole()) << path;
+      const auto of_file = read_all(**reader).messages;
+      kept.insert(kept.end(), of_file.begin(), of_file.end());
+    }
+    return kept;
+  }
+  [[nodiscard]] std::vector<std::filesystem::path> files() const {
+    std::vector<std::filesystem::path> paths;
+    for (int i = 0; i < 1000; ++i) {
+      const auto path = folder_ / fmt::format("run_{}.mcap", i);
+      if (std::filesystem::exists(path)) paths.push_back(path);
+    }
+    return paths;
+  }
+  [[nodiscard]] static mcap::Texts last_drops(const std::filesystem::path& path) {
+    const auto reader = McapReader::open(path);
+    EXPECT_TRUE(reader) << reader.error().line();
+    mcap::Texts drops;
+    if (!reader) return drops;
+    for (const auto& index : (*reader)->contents().metadata) {
+      if (index.name == kDropsName) drops = (*reader)->metadata(index)->texts;
+    }
+    return drops;
+  }
+
+  TestFolder folder_;
+};
+
+TEST_F(RecorderTest, RecordsRosMessagesAsRosbag2Would) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder) << recorder.error().line();
+  using wire::sensor_msgs::msg::JointState;
+  const auto topic = (*recorder)->add_topic(ros_topic<JointState>("/joint_states", {Reliability::kBestEffort}));
+  JointState state;
+  state.name = {"shoulder"};
+  state.position = {0.25};
+  ASSERT_TRUE((*recorder)->record(topic, 2 * kSecond, kSecond, state));
+  finish(**recorder);
+  const auto reader = McapReader::open(folder_ / "run_0.mcap");
+  ASSERT_TRUE(reader) << reader.error().line();
+  const Contents& contents = (*reader)->contents();
+  const auto& channel = contents.channels.at(1);
+  EXPECT_EQ(contents.schemas.at(channel.schema).name, "sensor_msgs/msg/JointState");
+  EXPECT_EQ(contents.schemas.at(channel.schema).encoding, "ros2msg");
+  EXPECT_EQ(contents.schemas.at(channel.schema).data, wire::ros2msg_schema<JointState>());
+  EXPECT_EQ(channel.message_encoding, "cdr");
+  EXPECT_EQ(channel.metadata.at("topic_type_hash"), JointState::kHash);
+  EXPECT_THAT(channel.metadata.at("offered_qos_profiles"), HasSubstr("- history: 1\n  depth: 10\n  reliability: 2\n"));
+  int shown = 0;
+  ASSERT_TRUE((*reader)->each_message({}, [&](const mcap::Message& message, const mcap::Channel&) {
+    JointState read;
+    EXPECT_TRUE(wire::decode(message.data, read));
+    EXPECT_EQ(read, state);
+    EXPECT_EQ(message.log_time, 2 * kSecond);
+    EXPECT_EQ(message.publish_time, kSecond);
+    return ++shown > 0;
+  }));
+  EXPECT_EQ(shown, 1);
+}
+
+TEST_F(RecorderTest, AFullQueueDropsAndTheFileSaysSo) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder);
+  const auto a = (*recorder)->add_topic(plain("/a")), b = (*recorder)->add_topic(plain("/b"));
+  const std::string data(1000, 'x');
+  int taken = 0;
+  for (int i = 0; i < 10; ++i) taken += (*recorder)->record(a, 1, 1, bytes_of(data)) ? 1 : 0;
+  EXPECT_EQ(taken, 3) << "of a half of 4096 bytes";
+  EXPECT_FALSE((*recorder)->record(b, 1, 1, bytes_of(std::string(5000, 'x')))) << "never fits";
+  EXPECT_TRUE((*recorder)->work_off());
+  EXPECT_FALSE((*recorder)->work_off());
+  EXPECT_TRUE((*recorder)->record(a, 1, 1, bytes_of(data)));
+  EXPECT_EQ((*recorder)->status().topics.at(a).offered, 11U);
+  EXPECT_EQ((*recorder)->status().topics.at(a).dropped, 7U);
+  finish(**recorder);
+  EXPECT_EQ(last_drops(folder_ / "run_0.mcap"), (mcap::Texts{{"/a", "7"}, {"/b", "1"}}));
+  std::vector<std::uint32_t> sequences;
+  for (const Kept& each : all_kept()) sequences.push_back(each.sequence);
+  EXPECT_THAT(sequences, testing::ElementsAre(0, 1, 2, 10)) << "the gap is where they are missing";
+}
+
+TEST_F(RecorderTest, DropsSurviveAWriterThatIsNeverFinished) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder);
+  const auto a = (*recorder)->add_topic(plain("/a"));
+  EXPECT_FALSE((*recorder)->record(a, 1, 1, bytes_of(std::string(5000, 'x'))));
+  EXPECT_TRUE((*recorder)->record(a, 1, 1, bytes_of("x")));
+  EXPECT_TRUE((*recorder)->work_off());
+  EXPECT_EQ(last_drops(folder_ / "run_0.mcap"), (mcap::Texts{{"/a", "1"}}));
+  finish(**recorder);
+}
+
+TEST_F(RecorderTest, WhatWaitsIsWrittenWhenTimeGoesOn) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder);
+  const auto a = (*recorder)->add_topic(plain("/a"));
+  const auto there = [&] { return (*McapReader::open(folder_ / "run_0.mcap"))->contents().statistics.messages; };
+  EXPECT_TRUE((*recorder)->record(a, 5 * kSecond, 1, bytes_of("x")));
+  EXPECT_TRUE((*recorder)->work_off());
+  (*recorder)->advance(5 * kSecond + kSecond / 2);
+  EXPECT_TRUE((*recorder)->work_off());
+  EXPECT_EQ(there(), 0U);
+  (*recorder)->advance(6 * kSecond);
+  EXPECT_TRUE((*recorder)->work_off());
+  EXPECT_EQ(there(), 1U);
+  finish(**recorder);
+}
+
+TEST_F(RecorderTest, FilesAreNoLongerThanToldAndTheOldestGo) {
+  RecorderOptions told = options();
+  told.file_bytes = 20'000;
+  told.quota_bytes = 60'000;
+  told.writer.chunk_bytes = 3000;
+  for (const auto compression : {mcap::Compression::kNone, mcap::Compression::kLz4, mcap::Compression::kZstd}) {
+    told.writer.compression = compression;
+    told.name = "run" + std::string(mcap::name_of(compression));
+    auto recorder = Recorder::open(told);
+    ASSERT_TRUE(recorder) << recorder.error().line();
+    const auto a = (*recorder)->add_topic(plain("/a")), b = (*recorder)->add_topic(plain("/b"));
+    std::uint64_t most = 0;
+    std::string noise(700, ' ');
+    for (int i = 0; i < 300; ++i) {
+      for (char& each : noise) each = static_cast<char>(std::rand());  // NOLINT(concurrency-mt-unsafe)
+      ASSERT_TRUE((*recorder)->record(i % 2 == 0 ? a : b, static_cast<mcap::Timestamp>(i), 1, bytes_of(noise)));
+      EXPECT_TRUE((*recorder)->work_off());
+      std::uint64_t all = 0;
+      for (const auto& each : std::filesystem::directory_iterator(folder_.path())) {
+        if (!each.path().filename().string().starts_with(told.name + "_")) continue;
+        EXPECT_LE(each.file_size(), 20'000U);
+        all += each.file_size();
+      }
+      most = std::max(most, all);
+    }
+    finish(**recorder);
+    EXPECT_LE(most, 60'000U);
+    EXPECT_GE(most, 40'000U) << "and not less than need be";
+    const auto status = (*recorder)->status();
+    EXPECT_GE(status.files, 10U);
+    EXPECT_EQ(status.removed + 3, status.files);
+    EXPECT_FALSE(std::filesystem::exists(folder_ / (told.name + "_0.mcap")));
+  }
+}
+
+TEST_F(RecorderTest, NothingIsLostFromOneFileToTheNext) {
+  RecorderOptions told = options();
+  told.file_bytes = 10'000;
+  told.notes = {{"pons.run", {{"world", "parcel_cell"}}}};
+  auto recorder = Recorder::open(told);
+  ASSERT_TRUE(recorder);
+  const auto a = (*recorder)->add_topic(plain("/a"));
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    ASSERT_TRUE((*recorder)->record(a, i, 1, bytes_of(std::string(500, 'x'))));
+    EXPECT_TRUE((*recorder)->work_off());
+  }
+  finish(**recorder);
+  EXPECT_GT(files().size(), 4U);
+  const auto kept = all_kept();
+  ASSERT_THAT(kept, SizeIs(100));
+  for (std::uint32_t i = 0; i < 100; ++i) EXPECT_EQ(kept[i].sequence, i);
+  for (const auto& path : files()) EXPECT_EQ((*McapReader::open(path))->contents().metadata.at(0).name, "pons.run");
+}
+
+TEST_F(RecorderTest, ALaterRunGoesOnCounting) {
+  for (int i = 0; i < 2; ++i) {
+    auto recorder = Recorder::open(options());
+    ASSERT_TRUE(recorder);
+    finish(**recorder);
+  }
+  EXPECT_THAT(files(), SizeIs(2));
+}
+
+TEST_F(RecorderTest, AnAttachmentIsInTheFile) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder);
+  EXPECT_FALSE((*recorder)->attach({1, 1, "long.bin", "", std::vector<std::byte>(5000)}));
+  EXPECT_TRUE((*recorder)->attach({1, 1, "world.yaml", "text/yaml", std::vector<std::byte>(100)}));
+  finish(**recorder);
+  EXPECT_EQ((*McapReader::open(folder_ / "run_0.mcap"))->contents().attachments.at(0).name, "world.yaml");
+}
+
+// A disk that is full, as a limit of the size of files.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit before_{};
+};
+
+TEST_F(RecorderTest, AFullDiskIsSaidCountedAndLeavesAFileThatCanBeRead) {
+  RecorderOptions told = options();
+  told.writer.chunk_bytes = 2000;
+  auto recorder = Recorder::open(told);
+  ASSERT_TRUE(recorder);
+  const auto a = (*recorder)->add_topic(plain("/a"));
+  const std::string data(500, 'x');
+  std::uint32_t i = 0;
+  const auto record = [&](mcap::Timestamp at) {
+    ASSERT_TRUE((*recorder)->record(a, at, at, bytes_of(data)));
+    EXPECT_TRUE((*recorder)->work_off());
+    ++i;
+  };
+  {
+    const FullDisk full(8000);
+    while (!(*recorder)->status().failing && i < 100) record(kSecond);
+    EXPECT_LT(i, 30U);
+    EXPECT_THAT((*recorder)->status().error->line(), HasSubstr("run_0.mcap: cannot write: File too large"));
+    record(2 * kSecond);
+  }
+  EXPECT_TRUE((*recorder)->status().failing) << "it is tried again after ten seconds";
+  record(12 * kSecond);
+  EXPECT_FALSE((*recorder)->status().failing);
+  finish(**recorder);
+  ASSERT_THAT(files(), SizeIs(2));
+  EXPECT_LE(std::filesystem::file_size(files()[0]), 8000U);
+  const auto kept = all_kept();
+  const auto status = (*recorder)->status();
+  EXPECT_EQ(status.topics.at(a).offered, i);
+  EXPECT_EQ(status.topics.at(a).dropped + kept.size(), i);
+  EXPECT_EQ(last_drops(files()[1]), (mcap::Texts{{"/a", std::to_string(status.topics.at(a).dropped)}}));
+}
+
+TEST_F(RecorderTest, WhatCannotBeIsRefusedByName) {
+  RecorderOptions told = options();
+  told.folder = folder_ / "no";
+  EXPECT_THAT(Recorder::open(told).error().line(), HasSubstr("no: the folder does not exist"));
+  told = options();
+  told.name = "a/b";
+  EXPECT_THAT(Recorder::open(told).error().line(), HasSubstr("a/b: no name for a recording"));
+  told = options();
+  told.queue_bytes = 100;
+  EXPECT_THAT(Recorder::open(told).error().line(), HasSubstr("the queue is too small"));
+  told = options();
+  told.quota_bytes = told.file_bytes;
+  EXPECT_THAT(Recorder::open(told).error().line(), HasSubstr("the quota is less than two files'"));
+}
+
+}  // namespace
+}  // namespace pons::record

@@ -1,0 +1,45 @@
+// The files of one recording: NAME_0.mcap, NAME_1.mcap, and so on, in one folder; the oldest go when they take too much
+// room together. One thread at a time; blocks on the disk.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "pons/core/error.hpp"
+
+namespace pons::record {
+
+class Rotation {
+ public:
+  // Finds the files of that name that are there; new ones follow them. Errors: the folder is missing or cannot be read;
+  // `name` is empty or no file name.
+  [[nodiscard]] static Expected<Rotation> open(const std::filesystem::path& folder, const std::string& name);
+
+  // For a new file.
+  [[nodiscard]] std::filesystem::path next_path();
+  // It is finished, and counts.
+  void add(const std::filesystem::path& path, std::uint64_t bytes);
+  // Removes the oldest until they and `needed` bytes more take no more than `quota`. Errors: one cannot be removed.
+  [[nodiscard]] Expected<void> make_room(std::uint64_t needed, std::uint64_t quota);
+
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] std::uint64_t removed() const { return removed_; }  // files
+
+ private:
+  struct File {
+    std::filesystem::path path;
+    std::uint64_t bytes = 0;
+  };
+
+  Rotation(std::filesystem::path folder, std::string name) : folder_(std::move(folder)), name_(std::move(name)) {}
+
+  std::filesystem::path folder_;
+  std::string name_;
+  std::deque<File> files_;  // oldest first
+  std::uint64_t next_ = 0, bytes_ = 0, removed_ = 0;
+};
+
+}  // namespace pons::record

@@ -1,0 +1,223 @@
+// Recordings of killed processes, and the program that looks into them.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+
+#include "pons/record/mcap_check.hpp"
+#include "pons/record/recorder.hpp"
+#include "pons/record/test_recording.hpp"
+#include "pons/wire/types/sensor_msgs/msg/compressed_image.hpp"
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::tests {
+namespace {
+
+using record::McapReader;
+using ::testing::HasSubstr;
+
+record::Verdict verdict_of(const std::filesystem::path& path) {
+  const auto source = record::open_file(path);
+  EXPECT_TRUE(source) << source.error().line();
+  const auto verdict = source ? record::check(**source) : Expected<record::Verdict>();
+  EXPECT_TRUE(verdict) << verdict.error().line();
+  return verdict ? *verdict : record::Verdict{};
+}
+
+// The program that is to be killed, and its words.
+class Peer {
+ public:
+  Peer(const std::filesystem::path& folder, const std::string& compression) {
+    std::array<int, 2> ends{};
+    if (::pipe(ends.data()) != 0) return;
+    child_ = ::fork();
+    if (child_ == 0) {
+      ::dup2(ends[1], STDOUT_FILENO);
+      ::execl(PONS_RECORDING_PEER, PONS_RECORDING_PEER, "endless", folder.c_str(), compression.c_str(), nullptr);
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    words_ = ::fdopen(ends[0], "r");
+  }
+  ~Peer() {
+    kill();
+    if (words_ != nullptr) (void)std::fclose(words_);
+  }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+
+  [[nodiscard]] std::string line() {
+    std::array<char, 200> text{};
+    return std::fgets(text.data(), text.size(), words_) == nullptr ? "" : text.data();
+  }
+  void kill() {
+    if (child_ <= 0) return;
+    ::kill(child_, SIGKILL);
+    ::waitpid(std::exchange(child_, -1), nullptr, 0);
+  }
+
+ private:
+  pid_t child_ = -1;
+  std::FILE* words_ = nullptr;
+};
+
+TEST(RecordingKills, WhateverTheMomentEachFinishedChunkIsThereAndRepairMakesAWholeFile) {
+  for (int round = 0; round < 24; ++round) {
+    const std::string compression = std::array{"none", "lz4", "zstd"}[static_cast<std::size_t>(round % 3)];
+    SCOPED_TRACE(fmt::format("round {}, {}", round, compression));
+    const record::TestFolder folder;
+    std::uint64_t sure = 0;
+    {
+      Peer peer(folder.path(), compression);
+      ASSERT_EQ(peer.line(), "begun\n");
+      for (int i = 0; i < round; ++i) sure = std::strtoull(peer.line().c_str(), nullptr, 10);
+      peer.kill();
+      // What it had said before it died.
+      for (std::string line = peer.line(); line.ends_with('\n'); line = peer.line())
+        sure = std::strtoull(line.c_str(), nullptr, 10);
+    }
+    const auto path = folder / "run_0.mcap";
+    const auto reader = McapReader::open(path);
+    ASSERT_TRUE(reader) << reader.error().line();
+    EXPECT_FALSE((*reader)->contents().finished);
+    const auto kept = record::read_all(**reader).messages;
+    EXPECT_GE(kept.size(), sure);
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      ASSERT_EQ(kept[i].sequence, i);
+      ASSERT_EQ(kept[i].data, fmt::format("{:0100}", i));
+    }
+    ASSERT_TRUE(record::repair((*reader)->source(), folder / "r.mcap", record::Overwrite::kNever));
+    const auto verdict = verdict_of(folder / "r.mcap");
+    EXPECT_TRUE(verdict.whole());
+    EXPECT_EQ(verdict.messages, kept.size());
+  }
+}
+
+class RecordingCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    record::write_sample(folder_ / "a.mcap", {.compression = record::mcap::Compression::kZstd}, 12);
+    const std::string whole = record::read_bytes(folder_ / "a.mcap");
+    record::write_bytes(folder_ / "cut.mcap", std::string_view(whole).substr(0, whole.size() / 2));
+  }
+  [[nodiscard]] Finished recording(std::vector<std::string> words) const {
+    words.insert(words.begin(), "recording");
+    return run_pons(words);
+  }
+
+  record::TestFolder folder_;
+};
+
+TEST_F(RecordingCommand, InfoShowsWhatOneHolds) {
+  const Finished whole = recording({"info", (folder_ / "a.mcap").string()});
+  EXPECT_EQ(whole.code, 0) << whole.err;
+  EXPECT_THAT(whole.out, HasSubstr("a.mcap: finished, "));
+  EXPECT_THAT(whole.out, HasSubstr("1.000 s to 2.100 s, 1.100 s\n"));
+  EXPECT_THAT(whole.out, HasSubstr("zstd, 4 chunks"));
+  EXPECT_THAT(whole.out, HasSubstr("/numbers  test_msgs/msg/Text           8       7.3         0\n"));
+  EXPECT_THAT(whole.out, HasSubstr("attachment plan.txt (text/plain, 14 bytes)\n"));
+  const Finished cut = recording({"info", (folder_ / "cut.mcap").string()});
+  EXPECT_EQ(cut.code, 0);
+  EXPECT_THAT(cut.out, HasSubstr("cut.mcap: not finished, "));
+  EXPECT_THAT(cut.err, HasSubstr("goes beyond the end of the file"));
+  const Finished json = recording({"info", "--json", (folder_ / "a.mcap").string()});
+  const auto told = nlohmann::json::parse(json.out);
+  EXPECT_EQ(told["messages"], 12);
+  EXPECT_EQ(told["topics"][0]["type"], "test_msgs/msg/Text");
+}
+
+TEST_F(RecordingCommand, CheckTellsAndRepairMends) {
+  const Finished whole = recording({"check", (folder_ / "a.mcap").string()});
+  EXPECT_EQ(whole.code, 0);
+  EXPECT_EQ(whole.out, "whole: 12 messages in 4 chunks, 1 attachments\n");
+  const Finished cut = recording({"check", (folder_ / "cut.mcap").string()});
+  EXPECT_EQ(cut.code, 1);
+  EXPECT_THAT(cut.err, HasSubstr("cut.mcap: byte "));
+  EXPECT_THAT(cut.out, HasSubstr("can be saved by pons recording repair: "));
+  const Finished repaired = recording({"repair", (folder_ / "cut.mcap").string()});
+  EXPECT_EQ(repaired.code, 0) << repaired.err;
+  EXPECT_EQ(recording({"check", (folder_ / "cut_repaired.mcap").string()}).code, 0);
+  const Finished again = recording({"repair", (folder_ / "cut.mcap").string()});
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("cut_repaired.mcap: there is such a file already"));
+  const std::string cut_file = (folder_ / "cut.mcap").string();
+  EXPECT_EQ(recording({"repair", cut_file, "--output", cut_file, "--overwrite"}).code, 0);
+  EXPECT_EQ(recording({"check", cut_file}).code, 0);
+}
+
+TEST_F(RecordingCommand, ExportWritesTablesOrSaysWhyNot) {
+  const std::string file = (folder_ / "a.mcap").string(), out = (folder_ / "a.jsonl").string();
+  const Finished unknown = recording({"export", file, "--jsonl", out});
+  EXPECT_EQ(unknown.code, 0) << "nothing was asked for by name";
+  EXPECT_THAT(unknown.err, HasSubstr("/numbers is left out: Pons does not know the type test_msgs/msg/Text"));
+  EXPECT_EQ(unknown.out, "0 messages\n");
+  EXPECT_EQ(recording({"export", file, "--jsonl", out, "--overwrite", "--topic", "/numbers"}).code, 1);
+  EXPECT_EQ(recording({"export", file, "--jsonl", out, "--overwrite", "--topic", "/no"}).code, 2);
+  EXPECT_THAT(recording({"export", file}).err, HasSubstr("--csv DIR, --jsonl FILE or --mp4 FILE"));
+  EXPECT_EQ(recording({"export", (folder_ / "none.mcap").string(), "--jsonl", out}).code, 2);
+}
+
+// A program named ffmpeg that keeps what it is given: what it makes of it is not ours.
+class RecordingFilm : public RecordingCommand {
+ protected:
+  void SetUp() override {
+    RecordingCommand::SetUp();
+    auto writer = record::McapWriter::create(folder_ / "film.mcap", {});
+    ASSERT_TRUE(writer);
+    using wire::sensor_msgs::msg::CompressedImage;
+    for (const std::string topic : {"/camera", "/other"}) {
+      const auto facts = record::ros_topic<CompressedImage>(topic);
+      const auto schema = (*writer)->add_schema(facts.type, facts.schema_encoding, facts.schema);
+      const auto channel = (*writer)->add_channel(*schema, topic, "cdr", facts.metadata);
+      for (std::uint32_t i = 0; i < 5; ++i) {
+        CompressedImage image;
+        if (topic == "/camera") image.data = {0xFF, 0xD8, 0xFF, 0xE0};
+        image.data.push_back(static_cast<std::uint8_t>('a' + i));
+        std::vector<std::byte> bytes;
+        ASSERT_TRUE(wire::encode(image, bytes));
+        ASSERT_TRUE((*writer)->write({*channel, i, i * 250'000'000ULL, 0, bytes}));
+      }
+    }
+    ASSERT_TRUE((*writer)->finish());
+  }
+  void ffmpeg(const std::string& does) {
+    record::write_bytes(folder_ / "ffmpeg", "#!/bin/sh\nfor last; do :; done\n" + does);
+    std::filesystem::permissions(folder_ / "ffmpeg", std::filesystem::perms::owner_all);
+  }
+  [[nodiscard]] Finished film(const std::string& topic) const {
+    return run_pons({"recording", "export", (folder_ / "film.mcap").string(), "--mp4", out(), "--topic", topic},
+                    {"PATH=" + folder_.path().string()});
+  }
+  [[nodiscard]] std::string out() const { return (folder_ / "out.mp4").string(); }
+};
+
+TEST_F(RecordingFilm, PicturesGoToFfmpegOneBehindTheOther) {
+  ffmpeg("/bin/cat > \"$last\"; echo \"$@\" > \"" + (folder_ / "words").string() + "\"");
+  const Finished made = film("/camera");
+  EXPECT_EQ(made.code, 0) << made.err;
+  EXPECT_EQ(made.out, "5 pictures, 4.00 a second\n");
+  std::string expected;
+  for (const char each : {'a', 'b', 'c', 'd', 'e'}) expected += std::string("\xFF\xD8\xFF\xE0") + each;
+  EXPECT_EQ(record::read_bytes(out()), expected);
+  EXPECT_THAT(record::read_bytes(folder_ / "words"), HasSubstr("-c:v mjpeg -framerate 4.000000 -i -"));
+  EXPECT_EQ(film("/camera").code, 2) << "there is such a file already";
+}
+
+TEST_F(RecordingFilm, WhatCannotBeFilmedIsNamedAndLeavesNothing) {
+  EXPECT_THAT(film("/camera").err, HasSubstr("ffmpeg is not installed; install it"));
+  ffmpeg("echo no such codec >&2; exit 1");
+  EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg has made no film of it"));
+  EXPECT_THAT(film("/other").err, HasSubstr("/other: picture 0 is neither JPEG nor PNG"));
+  EXPECT_THAT(film("/no").err, HasSubstr("/no: there is no such topic"));
+  EXPECT_EQ(run_pons({"recording", "export", (folder_ / "film.mcap").string(), "--mp4", out()}).code, 2);
+  for (const auto& each : std::filesystem::directory_iterator(folder_.path()))
+    EXPECT_THAT(each.path().filename().string(), testing::Not(HasSubstr("out.mp4")));
+}
+
+}  // namespace
+}  // namespace pons::tests
