@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "pons/task/json_text.hpp"
+
 namespace pons::apps {
 
 void add_ros_options(CLI::App& command, RosOptions& options) {
@@ -41,6 +43,8 @@ Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& 
   return settings;
 }
 
-std::string ros_line(const std::string& warning) { return fmt::format("ros2: {}\n", warning); }
+std::string ros_line(const std::string& warning) {
+  return fmt::format("ros2: {}\n", task::excerpt(warning, 600));  // others' names are in it
+}
 
 }  // namespace pons::apps

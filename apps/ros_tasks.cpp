@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "apps/story_text.hpp"
+#include "pons/gate/request.hpp"
 #include "pons/gate/ros/service.hpp"
 #include "pons/task/json_text.hpp"
 #include "pons/wire/types/pons_msgs/srv/command_task.hpp"
@@ -67,6 +69,9 @@ Result result_of(const std::string& task, const Json& detail) {
 }  // namespace
 
 Expected<void> RosTasks::serve() {
+  auto later = std::make_unique<Later>();
+  later_ = later.get();
+  gate_.node().add_part(std::move(later));
   auto served = gate::ros::serve<SubmitTask>(
       gate_.node(), "~/submit_task", [this](const SubmitTask::Request& request, const Answer<SubmitTask>& answer) {
         submit(request.task, [answer](const Json& told) {
@@ -100,6 +105,8 @@ Expected<void> RosTasks::serve() {
 void RosTasks::submit(const std::string& text, std::function<void(const Json&)> answered) {
   const auto task = task::parse_json(text);
   if (!task) return gate_.ask(text, std::move(answered));
+  if (task->is_object() && task->contains("tasks"))
+    return answered(gate::refusal({"several tasks where one is asked for", "tasks", "send each by itself"}));
   gate_.ask(Json{{"op", "submit"}, {"task", *task}}, std::move(answered));
 }
 
@@ -128,19 +135,16 @@ void RosTasks::begin(const GoalId& goal, const std::string& text) {
 }
 
 void RosTasks::follow(const GoalId& goal) {
-  const Followed& followed = followed_.at(goal);
-  gate_.ask(Json{{"op", "watch"}, {"id", followed.order}, {"after", followed.after}},
+  const auto found = followed_.find(goal);
+  if (found == followed_.end()) return;
+  gate_.ask(Json{{"op", "watch"}, {"id", found->second.order}, {"after", found->second.after}},
             [this, goal](const Json& told) { hear(goal, told); });
 }
 
 void RosTasks::hear(const GoalId& goal, const Json& told) {
   Followed& followed = followed_.at(goal);
-  if (!told.value("ok", false)) {
-    goals_->end(goal, GoalStatus::STATUS_ABORTED,
-                {.task_id = followed.task, .reason = "no more is heard of it: " + told.value("error", "no answer")});
-    followed_.erase(goal);
-    return;
-  }
+  // Too many watch, or the journal is slow: the task goes on, and so does the goal.
+  if (!told.value("ok", false)) return later_->put([this, goal] { follow(goal); });
   for (const Json& event : told.at("events")) {
     followed.after = std::max(followed.after, event.at("sequence").get<std::int64_t>());
     if (event.at("task") != followed.task) continue;
@@ -160,11 +164,27 @@ void RosTasks::hear(const GoalId& goal, const Json& told) {
 }
 
 bool RosTasks::cancel(const GoalId& goal) {
-  const auto found = followed_.find(goal);
-  if (found == followed_.end()) return false;
-  gate_.ask(Json{{"op", "cancel"}, {"id", found->second.task}, {"reason", "its client cancelled it"}},
-            [](const Json&) {});
+  if (!followed_.contains(goal)) return false;
+  tell_cancel(goal);
   return true;
+}
+
+// Until it is taken, or the task has ended.
+void RosTasks::tell_cancel(const GoalId& goal) {
+  const auto found = followed_.find(goal);
+  if (found == followed_.end()) return;
+  gate_.ask(Json{{"op", "cancel"}, {"id", found->second.task}, {"reason", "its client cancelled it"}},
+            [this, goal](const Json& told) {
+              if (!told.value("ok", false)) later_->put([this, goal] { tell_cancel(goal); });
+            });
+}
+
+void RosTasks::Later::spin(Clock::time_point now) {
+  while (!waiting_.empty() && waiting_.front().first <= now) {
+    const auto act = std::move(waiting_.front().second);
+    waiting_.pop_front();
+    act();
+  }
 }
 
 }  // namespace pons::apps

@@ -144,6 +144,7 @@ TEST_F(RosRun, TellsWhatIsWrongAndCommandsTasks) {
   EXPECT_THAT(submit(R"({"id":"x","steps":[{"skill":"fly"}]})").error, HasSubstr("'fly'"));
   // One more member than a task has: it must not become one of the request's.
   EXPECT_FALSE(submit(R"({"id":"x"},"op":"stop","x":{})").ok);
+  EXPECT_THAT(submit(R"({"tasks":[)" + home("one") + "," + home("two") + "]}").error, HasSubstr("several tasks"));
   const auto accepted = submit(kWaits);
   EXPECT_TRUE(accepted.ok) << accepted.error;
   EXPECT_EQ(accepted.id, "watch");

@@ -1,6 +1,7 @@
 // Actions, as ROS 2 makes them of three services and two topics. A goal has an id that its client chose.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -73,6 +74,7 @@ class ActionServer final : public Part {
  public:
   // Decides on a goal, at once or later, with one of accept() and reject(); everything on the node's thread.
   using Asked = std::function<void(const GoalId&, const typename A::Goal&)>;
+  static constexpr std::size_t kWaitingMost = 64;  // requests for one result
   // A client wants it to end; false: it will not.
   using Cancelled = std::function<bool(const GoalId&)>;
 
@@ -95,7 +97,7 @@ class ActionServer final : public Part {
     typename A::FeedbackMessage message;
     message.goal_id.uuid = id;
     message.feedback = feedback;
-    if (const auto told = feedback_->publish(message); !told) node_.unreadable(told.error(), {});
+    if (const auto told = feedback_->publish(message); !told) node_.warn(told.error().line());
   }
   // `status` is one that ends it.
   void end(const GoalId& id, std::int8_t status, typename A::Result result) {
@@ -143,7 +145,9 @@ class ActionServer final : public Part {
     const std::int8_t status = goals_.status(id);
     if (Goals::ended(status)) return answer({.status = status, .result = results_[id]});
     if (status == GoalStatus::STATUS_UNKNOWN) return answer({.status = status});
-    waiting_[id].push_back(std::move(answer));
+    auto& waiting = waiting_[id];
+    if (waiting.size() >= kWaitingMost) waiting.erase(waiting.begin());  // of a client that asks again and again
+    waiting.push_back(std::move(answer));
   }
   [[nodiscard]] CancelGoal::Response cancel(const CancelGoal::Request& request) {
     CancelGoal::Response response;
@@ -159,7 +163,7 @@ class ActionServer final : public Part {
   }
   bool become(const GoalId& id, std::int8_t status) {
     if (!goals_.becomes(id, status, Clock::now())) return false;
-    if (const auto told = statuses_->publish(goals_.all()); !told) node_.unreadable(told.error(), {});
+    if (const auto told = statuses_->publish(goals_.all()); !told) node_.warn(told.error().line());
     return true;
   }
   std::optional<Answer<typename A::SendGoal>> take_open(const GoalId& id) {
@@ -187,9 +191,9 @@ template <Action A>
                                                       typename ActionServer<A>::Asked asked,
                                                       typename ActionServer<A>::Cancelled cancelled) {
   auto made = std::make_unique<ActionServer<A>>(node, std::move(asked), std::move(cancelled));
-  if (auto opened = made->open(name); !opened) return std::unexpected(opened.error());
   ActionServer<A>* const server = made.get();
-  node.add_part(std::move(made));
+  node.add_part(std::move(made));  // before its services, which call it
+  if (auto opened = server->open(name); !opened) return std::unexpected(opened.error());
   return server;
 }
 
@@ -202,7 +206,7 @@ class ActionClient final : public Part {
     typename A::Result result;
   };
   // What comes of a goal, on the node's thread. `ended` is called once: with the end, or why none will be heard of: it
-  // was rejected, nobody answered in time, the server has gone.
+  // was rejected, nobody answered in time (then it is cancelled), the server has gone.
   struct Hears {
     std::function<void()> accepted;
     std::function<void(const typename A::Feedback&)> feedback;
@@ -213,15 +217,26 @@ class ActionClient final : public Part {
 
   explicit ActionClient(Node& node, std::string name) : node_(node), name_(std::move(name)) {}
 
-  [[nodiscard]] bool available() { return sends_->available() && cancels_->available() && results_->available(); }
+  // Whether a server is there with all that belongs to it.
+  [[nodiscard]] bool available() {
+    const bool feeds_back = std::ranges::any_of(node_.graph().endpoints(), [this](const auto& each) {
+      return each.second.writes && each.second.topic == feedback_topic_;
+    });
+    return feeds_back && sends_->available() && cancels_->available() && results_->available();
+  }
   // Errors, at once: no server is there; the goal is longer than its type allows.
   [[nodiscard]] Expected<GoalId> send(typename A::Goal goal, std::chrono::milliseconds ends_within, Hears hears) {
+    if (!cancels_->present() || !results_->present())
+      return fail("no server is there", name_, "start it, on the same domain");
     const GoalId id = new_goal_id();
     typename A::SendGoal::Request request;
     request.goal_id.uuid = id;
     request.goal = std::move(goal);
     auto called = sends_->call(request, kAnswersWithin, [this, id, ends_within](const auto& reply) {
-      if (!reply) return finish(id, std::unexpected(reply.error()));
+      if (!reply) {
+        (void)cancel(id);  // it may accept it yet
+        return finish(id, std::unexpected(reply.error()));
+      }
       if (!reply->accepted) return finish(id, fail("the goal was rejected", name_, "see what its server says"));
       if (const auto found = open_.find(id); found != open_.end() && found->second.accepted) found->second.accepted();
       wait_for_end(id, ends_within);
@@ -252,6 +267,7 @@ class ActionClient final : public Part {
     auto results = client<typename A::GetResult>(node_, under + "get_result");
     if (!results) return std::unexpected(results.error());
     sends_ = *sends, cancels_ = *cancels, results_ = *results;
+    feedback_topic_ = node_.wire_name(under + "feedback", Use::kTopic).value_or("");
     return node_.subscribe<typename A::FeedbackMessage>(under + "feedback", kTopicQos, [this](const auto& message) {
       const auto found = open_.find(message.goal_id.uuid);
       if (found != open_.end() && found->second.feedback) found->second.feedback(message.feedback);
@@ -263,7 +279,10 @@ class ActionClient final : public Part {
     typename A::GetResult::Request request;
     request.goal_id.uuid = id;
     const auto called = results_->call(request, within, [this, id](const auto& reply) {
-      if (!reply) return finish(id, std::unexpected(reply.error()));
+      if (!reply) {
+        (void)cancel(id);
+        return finish(id, std::unexpected(reply.error()));
+      }
       finish(id, Ended{reply->status, reply->result});
     });
     if (!called) finish(id, std::unexpected(called.error()));
@@ -277,7 +296,7 @@ class ActionClient final : public Part {
   }
 
   Node& node_;
-  std::string name_;
+  std::string name_, feedback_topic_;
   Client<typename A::SendGoal>* sends_ = nullptr;
   Client<CancelGoal>* cancels_ = nullptr;
   Client<typename A::GetResult>* results_ = nullptr;
@@ -287,9 +306,9 @@ class ActionClient final : public Part {
 template <Action A>
 [[nodiscard]] Expected<ActionClient<A>*> action_client(Node& node, std::string name) {
   auto made = std::make_unique<ActionClient<A>>(node, std::move(name));
-  if (auto opened = made->open(); !opened) return std::unexpected(opened.error());
   ActionClient<A>* const there = made.get();
-  node.add_part(std::move(made));
+  node.add_part(std::move(made));  // likewise
+  if (auto opened = there->open(); !opened) return std::unexpected(opened.error());
   return there;
 }
 

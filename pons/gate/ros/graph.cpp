@@ -63,8 +63,10 @@ void Graph::add_own(Endpoint endpoint) {
 void Graph::heard(const Heard& heard) {
   switch (heard.kind) {
     case Heard::Kind::kParticipant:
+      if (!value_of(heard.user_data, "pons").empty()) alike_.insert(heard.guid);
       return;
     case Heard::Kind::kGone:
+      alike_.erase(heard.guid);
       others_.erase(heard.guid);
       peers_.erase(heard.guid);
       return;
@@ -138,9 +140,10 @@ void Graph::learn(const Guid& participant, Peer peer) {
     if (node.name == node_)
       warn(fmt::format("{}: another node of that name is in the graph; give one of them another name or domain",
                        node_.full()));
-  if (peer.form != form_) {
-    const bool mixed = std::ranges::any_of(
-        peers_, [&](const auto& each) { return each.first != participant && each.second.form == form_; });
+  if (peer.form != form_ && !alike_.contains(participant)) {
+    const bool mixed = std::ranges::any_of(peers_, [&](const auto& each) {
+      return each.first != participant && each.second.form == form_ && !alike_.contains(each.first);
+    });
     if (mixed)
       warn(
           "nodes of ROS 2 Humble and of Iron or later are on one domain: they do not read each other's names; each "

@@ -75,6 +75,7 @@ class Graph {
   std::vector<Endpoint> own_;
   std::map<Guid, Endpoint> others_;
   std::map<Guid, Peer> peers_;  // by participant
+  std::set<Guid> alike_;        // other nodes of Pons: they speak the form of their peers, as we do
   Form form_ = Form::kJazzy;
   bool changed_ = true;
   std::vector<std::string> warnings_;

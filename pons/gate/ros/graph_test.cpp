@@ -82,6 +82,17 @@ TEST(Graph, SpeaksTheFormOfItsPeers) {
   EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("Humble")));
 }
 
+// They would mirror each other, and each what the other has just left.
+TEST(Graph, OtherNodesOfPonsTellNothingOfTheForm) {
+  Graph graph(kNode, kOurs);
+  graph.heard({.kind = Heard::Kind::kParticipant, .guid = kTheirs, .user_data = "enclave=/;pons=1;"});
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "alike", {}), {guid(2, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kOthers, "talker", {}), {guid(3, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kHumble);
+  EXPECT_THAT(graph.take_warnings(), IsEmpty());
+}
+
 TEST(Graph, NodesAreThoseOfTheNewestWordAndGoWithTheirParticipant) {
   Graph graph(kNode, kOurs);
   ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "one", {}), {guid(2, 9), 1}));

@@ -54,7 +54,7 @@ std::string substituted(std::string_view text, const NodeName& node) {
     if (inside == "node") {
       result += node.name;
     } else if (inside == "ns" || inside == "namespace") {
-      result += node.space;
+      result += node.space == "/" ? "" : node.space;
     } else {
       return "";
     }
@@ -80,7 +80,9 @@ Expected<NodeName> node_name(std::string space, std::string name) {
 
 Expected<std::string> expanded(std::string_view name, const NodeName& node, const Remaps& remaps) {
   std::string full = substituted(name, node);
-  if (full.starts_with("~/")) {
+  if (full == "~") {
+    full = node.full();
+  } else if (full.starts_with("~/")) {
     full = under(node.full(), std::string_view(full).substr(2));
   } else if (!full.starts_with('/')) {
     full = under(node.space, full);

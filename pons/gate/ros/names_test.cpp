@@ -14,12 +14,13 @@ TEST(RosNames, ExpandAsRosDoes) {
       {"{ns}/scan", "/cell/scan"},   {"left/scan_2", "/cell/left/scan_2"}};
   for (const auto& [name, full] : names) EXPECT_EQ(expanded(name, kNode, {}), full) << name;
   EXPECT_EQ(expanded("scan", NodeName{"/", "pons"}, {}), "/scan");
+  EXPECT_EQ(expanded("{ns}/scan", NodeName{"/", "pons"}, {}), "/scan");
+  EXPECT_EQ(expanded("~", kNode, {}), "/cell/pons");
   EXPECT_EQ(expanded("~/scan", NodeName{"/", "pons"}, {}), "/pons/scan");
 }
 
 TEST(RosNames, WhatIsNoneIsRefused) {
-  for (const std::string_view name :
-       {"", "/", "scan/", "a//b", "/2d", "a-b", "~", "a~/b", "{who}/scan", "{node/scan", "ü"})
+  for (const std::string_view name : {"", "/", "scan/", "a//b", "/2d", "a-b", "a~/b", "{who}/scan", "{node/scan", "ü"})
     EXPECT_FALSE(expanded(name, kNode, {})) << name;
   EXPECT_FALSE(node_name("cell", "pons"));
   EXPECT_FALSE(node_name("/cell", "my node"));

@@ -58,10 +58,18 @@ void Node::announce() {
 void Node::spin() {
   eventfd_t count = 0;
   (void)::eventfd_read(wake_.get(), &count);
-  for (const Heard& heard : participant_->take_heard()) graph_.heard(heard);
-  while (discovery_reader_->take(sample_)) {
+  const std::vector<Heard> heard = participant_->take_heard();
+  const auto is_gone = [](const Heard& each) { return each.kind == Heard::Kind::kGone; };
+  for (const Heard& each : heard)
+    if (!is_gone(each)) graph_.heard(each);
+  int left = Part::kTakenAtOnce;
+  for (; left > 0 && discovery_reader_->take(sample_); --left) {
     if (const auto told = graph_.told(sample_.bytes, sample_.id); !told) unreadable(told.error(), sample_.id.writer);
   }
+  if (left == 0) wake();
+  // Last: what somebody who has gone still said must not bring him back.
+  for (const Heard& each : heard)
+    if (is_gone(each)) graph_.heard(each);
   announce();
   const auto now = Part::Clock::now();
   for (const auto& part : parts_) part->spin(now);
@@ -80,6 +88,11 @@ std::vector<std::string> Node::take_warnings() {
   std::vector<std::string> lines = graph_.take_warnings();
   std::ranges::move(std::exchange(warnings_, {}), std::back_inserter(lines));
   return lines;
+}
+
+Expected<std::string> Node::wire_name(std::string_view name, Use use) const {
+  auto full = expanded(name, settings_.name, settings_.remaps);
+  return full ? Expected<std::string>(wire_topic(*full, use)) : full;
 }
 
 Expected<EndpointName> Node::endpoint_name(std::string_view name, Use use, std::string_view type, std::string_view hash,

@@ -32,6 +32,8 @@ struct NodeSettings {
 class Part {
  public:
   using Clock = std::chrono::steady_clock;
+  // Samples at a time, so that one flooded topic does not keep the others waiting.
+  static constexpr int kTakenAtOnce = 256;
   virtual ~Part() = default;
   virtual void spin(Clock::time_point now) = 0;
   // When it must be called again at the latest, though nothing came.
@@ -104,6 +106,10 @@ class Node {
                                                              std::string_view hash, const Qos& qos,
                                                              std::string_view user_data = {});
   void add_part(std::unique_ptr<Part> part) { parts_.push_back(std::move(part)); }
+  // As a topic or service of that name is called on the wire. Error: no name.
+  [[nodiscard]] Expected<std::string> wire_name(std::string_view name, Use use) const;
+  // A line for people.
+  void warn(std::string line) { warnings_.push_back(std::move(line)); }
   // Something that came could not be read.
   void unreadable(const Error& error, const Guid& writer);
   // Of this node, for what must not be the same twice on a domain.
@@ -111,9 +117,6 @@ class Node {
   [[nodiscard]] Guid guid() const { return participant_->guid(); }
 
  private:
-  // At most so many at a time, so that one flooded topic does not keep the others waiting.
-  static constexpr int kTakenAtOnce = 256;
-
   template <wire::Message T>
   class Subscription final : public Part {
    public:

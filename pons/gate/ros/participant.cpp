@@ -410,7 +410,7 @@ void keep_from_files() {
 
 dds::DomainParticipantQos settings_for(const std::string& address, std::uint32_t domain) {
   dds::DomainParticipantQos qos;
-  constexpr std::string_view kEnclave = "enclave=/;";
+  constexpr std::string_view kEnclave = "enclave=/;pons=1;";  // the latter for ourselves alone
   qos.user_data().assign(kEnclave.begin(), kEnclave.end());
   qos.name("/");
   // No shared memory: its layout is each version's own, and it is not given back by a process that is killed.

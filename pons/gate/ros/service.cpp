@@ -78,8 +78,7 @@ std::optional<std::pair<Asker, std::span<const std::byte>>> ServerEnds::take(Sam
 }
 
 // DDS matches readers one by one: a client may ask before its reader of answers is known to us.
-bool ServerEnds::reaches(const Asker& asker) const {
-  const std::vector<Guid> readers = replies_->matched();
+bool ServerEnds::reaches(const Asker& asker, const std::vector<Guid>& readers) const {
   if (!asker.header) {
     const bool names_reader = (asker.sample.writer[15] & kReaderBit) != 0;
     return !names_reader || std::ranges::find(readers, asker.sample.writer) != readers.end();
@@ -95,7 +94,11 @@ bool ServerEnds::reaches(const Asker& asker) const {
 }
 
 void ServerEnds::answer(const Asker& asker, std::vector<std::byte> bytes, Part::Clock::time_point now) {
-  if (reaches(asker)) return send(asker, bytes);
+  if (reaches(asker, replies_->matched())) return send(asker, bytes);
+  if (waiting_.size() >= kWaitingMost) {
+    ++dropped_;
+    return;
+  }
   waiting_.push_back({asker, std::move(bytes), now + kPatience});
 }
 
@@ -111,8 +114,10 @@ void ServerEnds::send(const Asker& asker, std::vector<std::byte>& bytes) {
 }
 
 void ServerEnds::spin(Part::Clock::time_point now) {
+  if (waiting_.empty()) return;
+  const std::vector<Guid> readers = replies_->matched();
   std::erase_if(waiting_, [&](Waiting& each) {
-    if (reaches(each.asker)) return send(each.asker, each.bytes), true;
+    if (reaches(each.asker, readers)) return send(each.asker, each.bytes), true;
     if (now < each.until) return false;
     ++dropped_;
     return true;

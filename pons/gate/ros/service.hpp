@@ -48,6 +48,7 @@ class ServerEnds final {
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
   static constexpr std::chrono::milliseconds kPatience{1000};
+  static constexpr std::size_t kWaitingMost = 256;  // answers; more are dropped at once
 
  private:
   struct Waiting {
@@ -57,7 +58,7 @@ class ServerEnds final {
   };
   ServerEnds(Node& node, std::unique_ptr<Reader> requests, std::unique_ptr<Writer> replies)
       : node_(node), requests_(std::move(requests)), replies_(std::move(replies)) {}
-  [[nodiscard]] bool reaches(const Asker& asker) const;
+  [[nodiscard]] bool reaches(const Asker& asker, const std::vector<Guid>& readers) const;
   void send(const Asker& asker, std::vector<std::byte>& bytes);
 
   Node& node_;
@@ -113,7 +114,10 @@ class Server final : public Part {
       : node_(node), ends_(std::move(ends)), asked_(std::move(asked)) {}
 
   void spin(Clock::time_point now) override {
-    while (const auto taken = ends_->take(sample_)) {
+    for (int left = kTakenAtOnce; left > 0; --left) {
+      const auto taken = ends_->take(sample_);
+      if (!taken) break;
+      if (left == 1) node_.wake();  // there may be more
       const auto& [asker, bytes] = *taken;
       if (const auto read = wire::decode(bytes, request_); !read) {
         node_.unreadable(read.error(), asker.writer);
@@ -129,7 +133,7 @@ class Server final : public Part {
   void answer(const Asker& asker, const typename S::Response& response) {
     std::vector<std::byte> bytes(kHeaderRoom + wire::encoded_size(response));
     if (wire::encode(response, std::span(bytes).subspan(kHeaderRoom)) == 0)
-      return node_.unreadable({"an answer is longer than its type allows", std::string(S::Response::kName)}, {});
+      return node_.warn(std::string(S::Response::kName) + ": an answer is longer than its type allows");
     ends_->answer(asker, std::move(bytes), Clock::now());
   }
 
@@ -175,7 +179,10 @@ class Client final : public Part {
   }
 
   void spin(Clock::time_point now) override {
-    while (const auto taken = ends_->take(sample_)) {
+    for (int left = kTakenAtOnce; left > 0; --left) {
+      const auto taken = ends_->take(sample_);
+      if (!taken) break;
+      if (left == 1) node_.wake();  // there may be more
       const auto found = waiting_.find(taken->first);
       if (found == waiting_.end()) continue;
       Replied replied = std::move(found->second.replied);
