@@ -267,7 +267,7 @@ bool available(dds_entity_t requests, dds_entity_t replies) {
   });
 }
 
-// Asks once, as soon as a server is there.
+// Asks as soon as a server is there, and again after 3 s: what is asked while the server has not found us yet is lost.
 template <typename Asked, typename Told>
 class Client : public Role {
  public:
@@ -278,16 +278,15 @@ class Client : public Role {
     checked(dds_get_instance_handle(requests_, &self_), "handle");
   }
   void step() override {
-    if (!asked_ && available(requests_, replies_)) {
+    if (!heard_ && available(requests_, replies_) && since_asked_++ % kAgain == 0) {
       const Asked request = ask(self_, kNumber);
       checked(dds_write(requests_, &request), "ask");
-      asked_ = true;
     }
     void* sample = nullptr;
     dds_sample_info_t info;
     while (dds_take(replies_, &sample, &info, 1, 1) == 1) {
       const Told& response = *static_cast<const Told*>(sample);
-      if (info.valid_data && response.client == self_ && response.number == kNumber) hear(response);
+      if (info.valid_data && response.client == self_ && response.number == kNumber) heard_ = true, hear(response);
       dds_return_loan(replies_, &sample, 1);
       sample = nullptr;
     }
@@ -295,12 +294,14 @@ class Client : public Role {
 
  private:
   static constexpr std::int64_t kNumber = 7;
+  static constexpr int kAgain = 150;  // steps
   virtual Asked ask(std::uint64_t client, std::int64_t number) = 0;
   virtual void hear(const Told& response) = 0;
 
   dds_entity_t replies_, requests_;
   dds_instance_handle_t self_ = 0;
-  bool asked_ = false;
+  int since_asked_ = 0;
+  bool heard_ = false;
 };
 
 class Switch final : public Client<Request, Response> {

@@ -331,7 +331,7 @@ class Server final : public Role {
   dds::DataReader* requests_;
 };
 
-// Asks once, as soon as a server is there.
+// Asks as soon as a server is there, and again after 3 s: what is asked while the server has not found us yet is lost.
 template <typename Asked, typename Told>
 class Client : public Role {
  public:
@@ -343,18 +343,19 @@ class Client : public Role {
     dds::SubscriptionMatchedStatus hears;
     requests_->get_publication_matched_status(asks);
     replies_->get_subscription_matched_status(hears);
-    if (!asked_ && asks.current_count > 0 && asks.current_count == hears.current_count) {
+    const bool available = asks.current_count > 0 && asks.current_count == hears.current_count;
+    if (!heard_ && available && since_asked_++ % kAgain == 0) {
       rtps::WriteParams parameters;
       parameters.related_sample_identity().writer_guid(replies_->guid());
       Asked request = ask();
       requests_->write(&request, parameters);
       number_ = parameters.sample_identity().sequence_number();
-      asked_ = true;
     }
     Told response;
     for (dds::SampleInfo info; take(*replies_, response, info);) {
       const auto& related = info.related_sample_identity;
-      if (related.writer_guid() == replies_->guid() && related.sequence_number() == number_) hear(response);
+      if (related.writer_guid() == replies_->guid() && related.sequence_number() == number_)
+        heard_ = true, hear(response);
     }
   }
 
@@ -365,7 +366,9 @@ class Client : public Role {
   dds::DataReader* replies_;
   dds::DataWriter* requests_;
   rtps::SequenceNumber_t number_;
-  bool asked_ = false;
+  static constexpr int kAgain = 150;  // steps
+  int since_asked_ = 0;
+  bool heard_ = false;
 };
 
 class Switch final : public Client<Request, Response> {

@@ -131,7 +131,7 @@ TEST(InteropOfBoth, OneServerAnswersClientsOfEither) {
   EXPECT_TRUE(spin_until({node.get()}, [&] { return fast.said("reply") && cyclone.said("reply"); }));
   EXPECT_TRUE(fast.said("reply 1 by pons"));
   EXPECT_TRUE(cyclone.said("reply 1 by pons"));
-  EXPECT_EQ(asked, 2);
+  EXPECT_GE(asked, 2);
 }
 
 }  // namespace

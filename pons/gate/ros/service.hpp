@@ -47,7 +47,7 @@ class ServerEnds final {
   // Answers that found no reader.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
-  static constexpr std::chrono::milliseconds kPatience{1000};
+  static constexpr std::chrono::milliseconds kPatience{5000};
   static constexpr std::size_t kWaitingMost = 256;  // answers; more are dropped at once
 
  private:
