@@ -12,20 +12,14 @@
 namespace pons::apps {
 namespace {
 
+using gate::ros::ros_stamp;
 using wire::geometry_msgs::msg::TransformStamped;
 using wire::sensor_msgs::msg::JointState;
 using wire::std_msgs::msg::String;
 using wire::tf2_msgs::msg::TFMessage;
-using RosTime = wire::builtin_interfaces::msg::Time;
 
 constexpr std::string_view kWorldFrame = "world", kTipFrame = "tool_tip";
-constexpr std::int64_t kNsInS = 1'000'000'000;
-// Static transforms are latched: who comes later has them all.
 constexpr gate::ros::Qos kTransformsQos{.depth = 100};
-
-RosTime to_ros(Time time) {
-  return {static_cast<std::int32_t>(time.ns() / kNsInS), static_cast<std::uint32_t>(time.ns() % kNsInS)};
-}
 
 TransformStamped transform(const Pose& parent_from_child, std::string parent, std::string child) {
   TransformStamped made;
@@ -79,12 +73,12 @@ Expected<void> RosView::add(std::vector<Robot> robots) {
   if (!transforms) return std::unexpected(transforms.error());
   if (!fixed) return std::unexpected(fixed.error());
   if (!clock) return std::unexpected(clock.error());
-  transforms_.push_back(*transforms);
-  clock_.push_back(*clock);
+  transforms_ = *transforms;
+  clock_ = *clock;
   TFMessage standing;
   for (Robot& robot : robots) {
-    const std::string space = robot.name.empty() ? "" : "/" + robot.name;
-    auto joints = gate_->outlet<JointState>(space + "/joint_states");
+    const std::string space = robot.name.empty() ? "" : robot.name + "/";
+    auto joints = gate_->outlet<JointState>(space + "joint_states");
     if (!joints) return std::unexpected(joints.error());
     if (auto described = describe(robot, space); !described) return described;
     auto links = robot.model.links();
@@ -109,24 +103,24 @@ Expected<void> RosView::add(std::vector<Robot> robots) {
   return {};
 }
 
-Expected<void> RosView::describe(const Robot& robot, std::string_view space) {
+Expected<void> RosView::describe(const Robot& robot, const std::string& space) {
   const auto path = robot.model.robot().urdf;
   std::ifstream file(path);
   String text{{std::istreambuf_iterator<char>(file), {}}};
   if (!file || text.data.empty()) return fail("cannot be read", path.string(), "see that it is there");
-  auto description = gate_->outlet<String>(fmt::format("{}/robot_description", space), gate::ros::kLatchedQos);
+  auto description = gate_->outlet<String>(space + "robot_description", gate::ros::kLatchedQos);
   if (!description) return std::unexpected(description.error());
   description->put(text);
   return {};
 }
 
 void RosView::show(Time now) {
-  clock_.front().put({to_ros(now)});
+  clock_->put({ros_stamp(now.ns())});
   moving_.transforms.clear();
   for (Shown& shown : robots_) {
     const link::State& state = shown.robot.state();
     if (state.position.size() == 0) continue;  // nothing was measured yet
-    const RosTime stamp = to_ros(state.stamp);
+    const auto stamp = ros_stamp(state.stamp.ns());
     shown.message.header.stamp = stamp;
     put(state.position, shown.message.position);
     put(state.speed, shown.message.velocity);
@@ -140,7 +134,7 @@ void RosView::show(Time now) {
       moving_.transforms.back().header.stamp = stamp;
     }
   }
-  transforms_.front().put(moving_);
+  transforms_->put(moving_);
 }
 
 std::unique_ptr<gate::Visitors> RosView::visitors(std::unique_ptr<gate::Visitors> others) {

@@ -3,8 +3,8 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "apps/ros_tasks.hpp"
@@ -49,13 +49,13 @@ class RosView {
   };
   explicit RosView(std::unique_ptr<gate::ros::Gate> gate) : gate_(std::move(gate)) {}
   [[nodiscard]] Expected<void> add(std::vector<Robot> robots);
-  [[nodiscard]] Expected<void> describe(const Robot& robot, std::string_view space);
+  [[nodiscard]] Expected<void> describe(const Robot& robot, const std::string& space);
 
   std::unique_ptr<RosTasks> tasks_;  // used by the gate's thread
   std::unique_ptr<gate::ros::Gate> gate_;
   std::vector<Shown> robots_;
-  std::vector<gate::ros::Outlet<wire::tf2_msgs::msg::TFMessage>> transforms_;  // one
-  std::vector<gate::ros::Outlet<wire::rosgraph_msgs::msg::Clock>> clock_;      // one
+  std::optional<gate::ros::Outlet<wire::tf2_msgs::msg::TFMessage>> transforms_;
+  std::optional<gate::ros::Outlet<wire::rosgraph_msgs::msg::Clock>> clock_;
   wire::tf2_msgs::msg::TFMessage moving_;
 };
 

@@ -230,6 +230,25 @@ INSTANTIATE_TEST_SUITE_P(, RosRunOfBoth, ::testing::Values(PONS_FAST_PEER, PONS_
   return std::string(each.param).ends_with("fast_peer") ? "fast" : "cyclone";
 });
 
+TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
+  const tests::Folder folder;
+  tests::Running run(folder.path(), "run",
+                     {"run", "small_cell", "--parcels", "100", "--realtime", "--quiet", "--socket", folder / "s",
+                      "--ros", "--ros-domain", std::to_string(test_domain()), "--ros-namespace", "/hall", "--ros-node",
+                      "cell", "--ros-remap", "robot_description:=/urdf"});
+  const auto node = test_node("test");
+  const auto there = [&](const std::string& topic) {
+    return std::ranges::any_of(node->graph().endpoints(), [&](const auto& each) { return each.second.topic == topic; });
+  };
+  EXPECT_TRUE(spin_until({node.get()}, [&] {
+    return there("rt/hall/joint_states") && there("rt/urdf") && there("rt/tf") && there("rt/clock") &&
+           there("rq/hall/cell/submit_taskRequest") && !node->graph().nodes().empty();
+  }));
+  EXPECT_THAT(node->graph().nodes(), Contains("/hall/cell"));
+  run.signal(SIGINT);
+  (void)run.wait();
+}
+
 TEST(RosOptions, WhatCannotBeIsRefused) {
   const auto refused = [](const std::vector<std::string>& more) {
     std::vector<std::string> line{"run", "small_cell", "--parcels", "1", "--quiet"};

@@ -53,14 +53,13 @@ void put_header(std::vector<std::byte>& bytes, std::span<const std::byte, kHeade
 
 }  // namespace
 
-Expected<std::unique_ptr<ServerEnds>> ServerEnds::open(Node& node, std::string_view name, std::string_view request_type,
-                                                       std::string_view request_hash, std::string_view response_type,
-                                                       std::string_view response_hash, const Qos& qos) {
+Expected<std::unique_ptr<ServerEnds>> ServerEnds::open(Node& node, std::string_view name, const ServiceTypes& types,
+                                                       const Qos& qos) {
   const std::string id = fmt::format("serviceid={};", identifier(node, node.next_number()));
   // The reader last: a request that comes is answered by a writer that is there.
-  auto writer = node.add_writer(name, Use::kReply, response_type, response_hash, qos, id);
+  auto writer = node.add_writer(name, Use::kReply, types.response, types.response_hash, qos, id);
   if (!writer) return std::unexpected(writer.error());
-  auto reader = node.add_reader(name, Use::kRequest, request_type, request_hash, qos, id);
+  auto reader = node.add_reader(name, Use::kRequest, types.request, types.request_hash, qos, id);
   if (!reader) return std::unexpected(reader.error());
   return std::unique_ptr<ServerEnds>(new ServerEnds(node, std::move(*reader), std::move(*writer)));
 }
@@ -128,13 +127,12 @@ Part::Clock::time_point ServerEnds::due() const {
   return waiting_.empty() ? Part::Clock::time_point::max() : waiting_.front().until;
 }
 
-Expected<std::unique_ptr<ClientEnds>> ClientEnds::open(Node& node, std::string_view name, std::string_view request_type,
-                                                       std::string_view request_hash, std::string_view response_type,
-                                                       std::string_view response_hash, const Qos& qos) {
+Expected<std::unique_ptr<ClientEnds>> ClientEnds::open(Node& node, std::string_view name, const ServiceTypes& types,
+                                                       const Qos& qos) {
   const std::string id = fmt::format("clientid={};", identifier(node, node.next_number()));
-  auto reader = node.add_reader(name, Use::kReply, response_type, response_hash, qos, id);
+  auto reader = node.add_reader(name, Use::kReply, types.response, types.response_hash, qos, id);
   if (!reader) return std::unexpected(reader.error());
-  auto writer = node.add_writer(name, Use::kRequest, request_type, request_hash, qos, id);
+  auto writer = node.add_writer(name, Use::kRequest, types.request, types.request_hash, qos, id);
   if (!writer) return std::unexpected(writer.error());
   const std::uint64_t number = client_number((*writer)->guid());
   return std::unique_ptr<ClientEnds>(new ClientEnds(number, std::move(*writer), std::move(*reader)));

@@ -22,6 +22,13 @@ namespace pons::gate::ros {
 template <typename S>
 concept Service = wire::Message<typename S::Request> && wire::Message<typename S::Response>;
 
+// What its two messages are called, and the hashes of their definitions.
+struct ServiceTypes {
+  std::string_view request, request_hash, response, response_hash;
+};
+template <Service S>
+inline constexpr ServiceTypes kTypesOf{S::Request::kName, S::Request::kHash, S::Response::kName, S::Response::kHash};
+
 // Who asked, so that the answer finds him.
 struct Asker {
   Guid writer{};                                    // of the request
@@ -33,10 +40,7 @@ struct Asker {
 class ServerEnds final {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<ServerEnds>> open(Node& node, std::string_view name,
-                                                                  std::string_view request_type,
-                                                                  std::string_view request_hash,
-                                                                  std::string_view response_type,
-                                                                  std::string_view response_hash, const Qos& qos);
+                                                                  const ServiceTypes& types, const Qos& qos);
   // The oldest request, as CDR within what `room` holds; nothing: there is none.
   [[nodiscard]] std::optional<std::pair<Asker, std::span<const std::byte>>> take(Sample& room);
   // `bytes` begin with room for a header of 16 bytes, then the encapsulation. Sent as soon as the asker's reader is
@@ -72,10 +76,7 @@ class ServerEnds final {
 class ClientEnds final {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<ClientEnds>> open(Node& node, std::string_view name,
-                                                                  std::string_view request_type,
-                                                                  std::string_view request_hash,
-                                                                  std::string_view response_type,
-                                                                  std::string_view response_hash, const Qos& qos);
+                                                                  const ServiceTypes& types, const Qos& qos);
   // Whether a server is matched with both its ends, and has been for so long that it has surely found ours: DDS matches
   // each side by itself, and what is sent before the other side has done so is lost, and no one tells.
   [[nodiscard]] bool available();
@@ -148,8 +149,7 @@ class Server final : public Part {
 template <Service S>
 [[nodiscard]] Expected<void> serve(Node& node, std::string_view name, typename Server<S>::Asked asked,
                                    const Qos& qos = kServiceQos) {
-  auto ends =
-      ServerEnds::open(node, name, S::Request::kName, S::Request::kHash, S::Response::kName, S::Response::kHash, qos);
+  auto ends = ServerEnds::open(node, name, kTypesOf<S>, qos);
   if (!ends) return std::unexpected(ends.error());
   node.add_part(std::make_unique<Server<S>>(node, std::move(*ends), std::move(asked)));
   return {};
@@ -222,8 +222,7 @@ class Client final : public Part {
 
 template <Service S>
 [[nodiscard]] Expected<Client<S>*> client(Node& node, std::string_view name, const Qos& qos = kServiceQos) {
-  auto ends =
-      ClientEnds::open(node, name, S::Request::kName, S::Request::kHash, S::Response::kName, S::Response::kHash, qos);
+  auto ends = ClientEnds::open(node, name, kTypesOf<S>, qos);
   if (!ends) return std::unexpected(ends.error());
   auto made = std::make_unique<Client<S>>(node, std::move(*ends), std::string(name));
   Client<S>* const there = made.get();
