@@ -7,6 +7,8 @@
 #include "apps/cell_facts.hpp"
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
+#include "apps/views/arms_view.hpp"
+#include "apps/views/clock_view.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/rt/clock.hpp"
 #include "pons/runner/thinker.hpp"
@@ -141,7 +143,10 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     socket = std::move(*listening);
   }
   if (options.ros) {
-    if (auto opened = self->open_ros(world, *options.ros); !opened) return std::unexpected(opened.error());
+    auto node = RosNode::open(*options.ros);
+    if (!node) return std::unexpected(node.error());
+    self->ros = std::move(*node);
+    self->outlets.add(*self->ros);
   }
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
@@ -162,13 +167,17 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
       std::make_unique<brain::PolicyRunner>(policies_of(self->cell().world, self->cell().model), *self->inference);
   const auto visitors = [half = self.get()](Time now) {
     half->policies->attend(half->cell().stream, now);
-    if (half->ros) half->ros->show(now);
+    for (const auto& view : half->views) view->show(now);
     if (half->desk) half->desk->attend(now);
   };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
+  if (self->outlets.needed()) {
+    if (auto opened = self->open_views(world); !opened) return std::unexpected(opened.error());
+  }
   if (socket || self->ros) {
+    if (self->ros) self->ros->start();
     std::unique_ptr<gate::Visitors> asked = std::move(socket);
     if (self->ros) asked = self->ros->visitors(std::move(asked));
     self->desk =
@@ -178,15 +187,19 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   return self;
 }
 
-Expected<void> BridgeHalf::open_ros(const world::World& world, const gate::ros::NodeSettings& settings) {
-  std::vector<RosView::Robot> robots;
+// What it shows, to all who are there by now.
+Expected<void> BridgeHalf::open_views(const world::World& world) {
+  std::vector<ArmsView::Arm> shown;
   const auto stations = world.arms();
   for (std::size_t i = 0; i < arms.size(); ++i)
-    robots.push_back({arms.size() > 1 ? stations[i].arm : std::string(), arms[i]->cell.model.copy(),
-                      [&cell = arms[i]->cell]() -> const link::State& { return cell.arm.state(); }});
-  auto view = RosView::open(settings, std::move(robots));
-  if (!view) return std::unexpected(view.error());
-  ros = std::move(*view);
+    shown.push_back({arms.size() > 1 ? stations[i].arm : std::string(), arms[i]->cell.model.copy(),
+                     [&cell = arms[i]->cell]() -> const link::State& { return cell.arm.state(); }});
+  auto robots = ArmsView::open(outlets, std::move(shown));
+  if (!robots) return std::unexpected(robots.error());
+  views.push_back(std::move(*robots));
+  auto clock = ClockView::open(outlets);
+  if (!clock) return std::unexpected(clock.error());
+  views.push_back(std::move(*clock));
   return {};
 }
 

@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "apps/desk.hpp"
-#include "apps/ros_view.hpp"
+#include "apps/ros_node.hpp"
+#include "apps/views/outlets.hpp"
 #include "pons/brain/dispatcher.hpp"
 #include "pons/brain/far_brain.hpp"
 #include "pons/brain/liar.hpp"
@@ -135,13 +136,15 @@ class BridgeHalf {
   std::unique_ptr<brain::PolicyRunner> policies;
   std::unique_ptr<runner::Observer> observer;
   std::unique_ptr<runner::BridgeSide> bridge_side;
-  std::unique_ptr<RosView> ros;
+  std::unique_ptr<RosNode> ros;
+  Outlets outlets;
+  std::vector<std::unique_ptr<View>> views;  // of what it shows
   std::unique_ptr<Desk> desk;
 
  private:
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
-  [[nodiscard]] Expected<void> open_ros(const world::World& world, const gate::ros::NodeSettings& settings);
+  [[nodiscard]] Expected<void> open_views(const world::World& world);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
   // As the bridge hears it.
   [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,

@@ -47,15 +47,23 @@ void Gate::run() {
   write_all();
 }
 
-void Gate::send(std::size_t writer, std::vector<std::byte> bytes) {
+Expected<std::size_t> Gate::add_topic(std::string_view topic, std::string_view type, std::string_view hash,
+                                      const Qos& qos) {
+  auto writer = node_->add_writer(topic, Use::kTopic, type, hash, qos);
+  if (!writer) return std::unexpected(writer.error());
+  writers_.push_back(std::move(*writer));
+  return writers_.size() - 1;
+}
+
+void Gate::put(std::size_t topic, std::vector<std::byte> message) {
   {
     const std::scoped_lock lock(mutex_);
-    if (queued_bytes_ + bytes.size() > kQueuedMost) {
+    if (queued_bytes_ + message.size() > kQueuedMost) {
       ++dropped_;
       return;
     }
-    queued_bytes_ += bytes.size();
-    queued_.emplace_back(writer, std::move(bytes));
+    queued_bytes_ += message.size();
+    queued_.emplace_back(topic, std::move(message));
   }
   node_->wake();
 }

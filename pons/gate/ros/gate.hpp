@@ -27,13 +27,13 @@ class Gate;
 template <wire::Message T>
 class Outlet {
  public:
-  Outlet(Gate& gate, std::size_t writer) : gate_(&gate), writer_(writer) {}
+  Outlet(Gate& gate, std::size_t topic) : gate_(&gate), topic_(topic) {}
   // Encodes it here and leaves it to the node's thread. Waits for nothing; what finds no room is dropped and counted.
   void put(const T& message);
 
  private:
   Gate* gate_;
-  std::size_t writer_;
+  std::size_t topic_;
 };
 
 class Gate final : public Visitors {
@@ -52,14 +52,21 @@ class Gate final : public Visitors {
   // Errors: those of Node::advertise().
   template <wire::Message T>
   [[nodiscard]] Expected<Outlet<T>> outlet(std::string_view topic, const Qos& qos = kTopicQos) {
-    auto writer = node_->add_writer(topic, Use::kTopic, T::kName, T::kHash, qos);
-    if (!writer) return std::unexpected(writer.error());
-    writers_.push_back(std::move(*writer));
-    return Outlet<T>(*this, writers_.size() - 1);
+    const auto number = add_topic(topic, T::kName, T::kHash, qos);
+    return number ? Expected<Outlet<T>>(Outlet<T>(*this, *number)) : std::unexpected(number.error());
   }
+  // Likewise, of a type that only whoever calls knows; for put().
+  [[nodiscard]] Expected<std::size_t> add_topic(std::string_view topic, std::string_view type, std::string_view hash,
+                                                const Qos& qos);
   // What it is told to do is done on its thread from start() on.
   [[nodiscard]] Node& node() { return *node_; }
   void start();
+
+  // ---- on any thread ----
+
+  // Leaves a message, CDR with its encapsulation, to the node's thread. Waits for nothing; what finds no room is
+  // dropped and counted.
+  void put(std::size_t topic, std::vector<std::byte> message);
 
   // ---- on the thread of whoever answers ----
 
@@ -79,8 +86,6 @@ class Gate final : public Visitors {
   void ask(std::string request, std::function<void(const Json&)> answered);
 
  private:
-  template <wire::Message T>
-  friend class Outlet;
   struct Asked {
     std::string text;
     std::uint64_t number;
@@ -93,7 +98,6 @@ class Gate final : public Visitors {
   };
 
   explicit Gate(std::unique_ptr<Node> node);
-  void send(std::size_t writer, std::vector<std::byte> bytes);
   void run();
   void write_all();
   void take_answers();
@@ -116,7 +120,7 @@ class Gate final : public Visitors {
 template <wire::Message T>
 void Outlet<T>::put(const T& message) {
   std::vector<std::byte> bytes;
-  if (wire::encode(message, bytes)) gate_->send(writer_, std::move(bytes));
+  if (wire::encode(message, bytes)) gate_->put(topic_, std::move(bytes));
 }
 
 }  // namespace pons::gate::ros

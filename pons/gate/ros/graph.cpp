@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "pons/task/json_text.hpp"
 #include "pons/wire/types/rmw_dds_common/msg/participant_entities_info.hpp"
 #include "pons/wire/types/rmw_dds_common_humble/msg/participant_entities_info.hpp"
 
@@ -18,6 +19,8 @@ using Humble = wire::rmw_dds_common_humble::msg::ParticipantEntitiesInfo;
 // A hostile participant could make us remember without end.
 constexpr std::size_t kWarningsMost = 1000;
 constexpr std::size_t kEndpointsMost = 100'000;
+constexpr std::size_t kPeersMost = 1000;
+constexpr std::size_t kLineBytes = 500;
 
 template <typename Gid>
 Gid to_gid(const Guid& guid) {
@@ -136,6 +139,8 @@ Expected<void> Graph::told(std::span<const std::byte> message, const SampleId& i
 }
 
 void Graph::learn(const Guid& participant, Peer peer) {
+  if (peers_.size() >= kPeersMost && !peers_.contains(participant))
+    return warn(fmt::format("more than {} participants", kPeersMost));
   for (const Node& node : peer.nodes)
     if (node.name == node_)
       warn(fmt::format("{}: another node of that name is in the graph; give one of them another name or domain",
@@ -166,7 +171,8 @@ std::vector<std::string> Graph::nodes() const {
   return names;
 }
 
-void Graph::warn(std::string line) {
+void Graph::warn(std::string_view text) {
+  std::string line = task::excerpt(text, kLineBytes);  // others' names are in it
   if (warned_.size() < kWarningsMost && warned_.insert(line).second) warnings_.push_back(std::move(line));
 }
 

@@ -8,6 +8,8 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pons/core/error.hpp"
@@ -68,7 +70,7 @@ class Graph {
   void compare(const Endpoint& own, const Endpoint& other);
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);
-  void warn(std::string line);
+  void warn(std::string_view text);
 
   NodeName node_;
   Guid participant_;

@@ -20,16 +20,16 @@ constexpr Qos kAllDiscoveryQos{.durability = Qos::Durability::kTransientLocal, .
 
 }  // namespace
 
-Expected<std::unique_ptr<Node>> Node::open(const NodeSettings& settings) {
+Expected<std::unique_ptr<Node>> Node::open(const NodeSettings& settings, const Join& join) {
   Descriptor wake(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC));
   if (!wake) return fail("no descriptor is left", "ROS 2", "raise the limit: ulimit -n");
   std::unique_ptr<Node> node(new Node(settings, std::move(wake)));
-  if (auto joined = node->join(); !joined) return std::unexpected(joined.error());
+  if (auto joined = node->join(join); !joined) return std::unexpected(joined.error());
   return node;
 }
 
-Expected<void> Node::join() {
-  auto participant = Participant::join(settings_.participant, [this] { wake(); });
+Expected<void> Node::join(const Join& join) {
+  auto participant = join(settings_.participant, [this] { wake(); });
   if (!participant) return std::unexpected(participant.error());
   participant_ = std::move(*participant);
   graph_ = Graph(settings_.name, participant_->guid());

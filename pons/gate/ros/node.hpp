@@ -61,8 +61,9 @@ class Publisher {
 
 class Node {
  public:
-  // Errors: those of Participant::join().
-  [[nodiscard]] static Expected<std::unique_ptr<Node>> open(const NodeSettings& settings);
+  // Errors: those of Participant::join(), or of what takes its place.
+  [[nodiscard]] static Expected<std::unique_ptr<Node>> open(const NodeSettings& settings,
+                                                            const Join& join = Participant::join);
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
   ~Node() = default;
@@ -142,7 +143,7 @@ class Node {
   };
 
   explicit Node(const NodeSettings& settings, Descriptor wake) : settings_(settings), wake_(std::move(wake)) {}
-  [[nodiscard]] Expected<void> join();
+  [[nodiscard]] Expected<void> join(const Join& join);
   [[nodiscard]] Expected<EndpointName> endpoint_name(std::string_view name, Use use, std::string_view type,
                                                      std::string_view hash, std::string_view user_data) const;
   void announce();

@@ -116,4 +116,8 @@ class Participant {
   [[nodiscard]] virtual std::vector<Heard> take_heard() = 0;
 };
 
+// How one is made: Participant::join, or what takes its place where nothing shall be sent.
+using Join =
+    std::function<Expected<std::unique_ptr<Participant>>(const ParticipantSettings&, std::function<void()> woken)>;
+
 }  // namespace pons::gate::ros

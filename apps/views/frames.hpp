@@ -1,0 +1,23 @@
+// Poses and times as ROS 2 has them.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "pons/core/pose.hpp"
+#include "pons/gate/ros/node.hpp"
+#include "pons/wire/types/geometry_msgs/msg/transform_stamped.hpp"
+
+namespace pons::apps {
+
+inline constexpr std::string_view kWorldFrame = "world";
+inline constexpr gate::ros::Qos kTransformsQos{.depth = 100};
+
+// Without a stamp.
+[[nodiscard]] wire::geometry_msgs::msg::TransformStamped transform(const Pose& parent_from_child, std::string parent,
+                                                                   std::string child);
+
+// A robot's name before that of its frame, where it has one, as robot_state_publisher's frame_prefix does.
+[[nodiscard]] std::string frame(const std::string& robot, std::string_view link);
+
+}  // namespace pons::apps
