@@ -70,6 +70,11 @@ void expect_known() {
   const auto json = found->to_json(bytes);
   ASSERT_TRUE(json) << json.error().line();
   EXPECT_EQ(*json, to_json(message));
+  const auto back = found->to_cdr(*json);
+  ASSERT_TRUE(back) << back.error().line();
+  EXPECT_EQ(*back, bytes);
+  EXPECT_EQ(found->empty(), to_json(T{}));
+  EXPECT_EQ(known_type(T::kName), found);
   EXPECT_FALSE(found->to_json(std::span(bytes).first(bytes.size() - 1)));
 }
 
@@ -84,6 +89,7 @@ TEST(KnownTypesTest, EachIsFoundByItsNameOnTheWireAndReadAsItself) {
   EXPECT_EQ(known_types("rmw_dds_common/msg/Gid").size(), 2U);
   EXPECT_TRUE(known_types("rmw_dds_common_humble/msg/Gid").empty());
   EXPECT_TRUE(known_types("std_msgs/msg/Nothing").empty());
+  EXPECT_EQ(known_type("std_msgs/msg/Nothing"), nullptr);
 }
 
 }  // namespace

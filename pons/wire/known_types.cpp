@@ -1,7 +1,9 @@
 #include "pons/wire/known_types.hpp"
 
+#include <algorithm>
 #include <array>
 
+#include "pons/wire/from_json.hpp"
 #include "pons/wire/schema.hpp"
 #include "pons/wire/types/all_types.hpp"
 
@@ -15,9 +17,24 @@ Expected<Json> decoded(std::span<const std::byte> cdr) {
   return to_json(message);
 }
 
+template <Message T>
+Expected<std::vector<std::byte>> encoded(const Json& json) {
+  T message;
+  if (auto taken = from_json(json, message); !taken) return std::unexpected(taken.error());
+  std::vector<std::byte> bytes;
+  if (auto put = encode(message, bytes); !put) return std::unexpected(put.error());
+  return bytes;
+}
+
+template <Message T>
+Json nothing() {
+  return to_json(T{});
+}
+
 template <typename... Each>
 constexpr auto listed(Types<Each...>) {
-  return std::array<KnownType, sizeof...(Each)>{KnownType{Each::kName, Each::kHash, &decoded<Each>}...};
+  return std::array<KnownType, sizeof...(Each)>{
+      KnownType{Each::kName, Each::kHash, &decoded<Each>, &encoded<Each>, &nothing<Each>}...};
 }
 
 constexpr auto kKnown = listed(AllTypes{});
@@ -30,6 +47,11 @@ std::vector<const KnownType*> known_types(std::string_view name) {
     if (wire::wire_name(each.name) == name) found.push_back(&each);
   }
   return found;
+}
+
+const KnownType* known_type(std::string_view name) {
+  const auto found = std::ranges::find(kKnown, name, &KnownType::name);
+  return found == kKnown.end() ? nullptr : &*found;
 }
 
 }  // namespace pons::wire

@@ -1,7 +1,6 @@
 #include "pons/gate/ros/action.hpp"
 
 #include <algorithm>
-#include <random>
 
 namespace pons::gate::ros {
 namespace {
@@ -97,13 +96,6 @@ std::int64_t stamp_now_ns() {
 
 wire::builtin_interfaces::msg::Time ros_stamp(std::int64_t ns) {
   return {static_cast<std::int32_t>(ns / kNsInS), static_cast<std::uint32_t>(ns % kNsInS)};
-}
-
-GoalId new_goal_id() {
-  std::random_device random;
-  GoalId id;
-  for (std::uint8_t& byte : id) byte = static_cast<std::uint8_t>(random());
-  return id;
 }
 
 }  // namespace pons::gate::ros

@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "pons/core/error.hpp"
+#include "pons/gate/ros/goal_client.hpp"
 #include "pons/gate/ros/node.hpp"
 #include "pons/gate/ros/service.hpp"
 #include "pons/wire/types/action_msgs/msg/goal_status_array.hpp"
-#include "pons/wire/types/action_msgs/srv/cancel_goal.hpp"
 
 namespace pons::gate::ros {
 
@@ -26,9 +26,9 @@ template <typename A>
 concept Action = wire::Message<typename A::Goal> && wire::Message<typename A::Result> &&
                  wire::Message<typename A::Feedback> && Service<typename A::SendGoal> && Service<typename A::GetResult>;
 
-using GoalId = std::array<std::uint8_t, 16>;
-using GoalStatus = wire::action_msgs::msg::GoalStatus;
-using CancelGoal = wire::action_msgs::srv::CancelGoal;
+template <Action A>
+inline constexpr ActionTypes kActionTypesOf{kTypesOf<typename A::SendGoal>, kTypesOf<typename A::GetResult>,
+                                            A::FeedbackMessage::kName, A::FeedbackMessage::kHash};
 
 // How goals stand, whatever their types: what may follow what (design.ros2.org, "Actions"), which of them a
 // cancellation means, and how long those that have ended are known. No network, no clock; one thread.
@@ -65,9 +65,6 @@ class Goals {
 // Since 1970, as goals are stamped.
 [[nodiscard]] std::int64_t stamp_now_ns();
 [[nodiscard]] wire::builtin_interfaces::msg::Time ros_stamp(std::int64_t ns);
-
-// Of the client: random enough that no two of any process are the same.
-[[nodiscard]] GoalId new_goal_id();
 
 template <Action A>
 class ActionServer final : public Part {
@@ -205,110 +202,65 @@ class ActionClient final : public Part {
     std::int8_t status = GoalStatus::STATUS_UNKNOWN;
     typename A::Result result;
   };
-  // What comes of a goal, on the node's thread. `ended` is called once: with the end, or why none will be heard of: it
-  // was rejected, nobody answered in time (then it is cancelled), the server has gone.
+  // As GoalClient::Hears; what cannot be read ends it, too.
   struct Hears {
     std::function<void()> accepted;
     std::function<void(const typename A::Feedback&)> feedback;
     std::function<void(Expected<Ended>)> ended;
   };
-  // Within which a server says whether it accepts, and hears of a cancellation.
-  static constexpr std::chrono::milliseconds kAnswersWithin{5000};
 
-  explicit ActionClient(Node& node, std::string name) : node_(node), name_(std::move(name)) {}
+  explicit ActionClient(std::unique_ptr<GoalClient> goals) : goals_(std::move(goals)) {}
 
-  // Whether a server is there with all that belongs to it.
-  [[nodiscard]] bool available() {
-    const bool feeds_back = std::ranges::any_of(node_.graph().endpoints(), [this](const auto& each) {
-      return each.second.writes && each.second.topic == feedback_topic_;
-    });
-    return feeds_back && sends_->available() && cancels_->available() && results_->available();
-  }
-  // Errors, at once: no server is there; the goal is longer than its type allows.
+  [[nodiscard]] bool available() { return goals_->available(); }
+  // As GoalClient::send(). Error also: the goal is longer than its type allows.
   [[nodiscard]] Expected<GoalId> send(typename A::Goal goal, std::chrono::milliseconds ends_within, Hears hears) {
-    if (!cancels_->present() || !results_->present())
-      return fail("no server is there", name_, "start it, on the same domain");
-    const GoalId id = new_goal_id();
     typename A::SendGoal::Request request;
-    request.goal_id.uuid = id;
+    request.goal_id.uuid = new_goal_id();
     request.goal = std::move(goal);
-    auto called = sends_->call(request, kAnswersWithin, [this, id, ends_within](const auto& reply) {
-      if (!reply) {
-        (void)cancel(id);  // it may accept it yet
-        return finish(id, std::unexpected(reply.error()));
-      }
-      if (!reply->accepted) return finish(id, fail("the goal was rejected", name_, "see what its server says"));
-      if (const auto found = open_.find(id); found != open_.end() && found->second.accepted) found->second.accepted();
-      wait_for_end(id, ends_within);
-    });
-    if (!called) return std::unexpected(called.error());
-    open_.emplace(id, std::move(hears));
-    return id;
+    auto bytes = bytes_of_request(request, goals_->name());
+    if (!bytes) return std::unexpected(bytes.error());
+    auto sent = goals_->send(request.goal_id.uuid, *std::move(bytes), ends_within,
+                             {.accepted = std::move(hears.accepted),
+                              .feedback = read_feedback(std::move(hears.feedback)),
+                              .ended = read_end(std::move(hears.ended))});
+    if (!sent) return std::unexpected(sent.error());
+    return request.goal_id.uuid;
   }
   // What comes of it, its end says.
-  [[nodiscard]] Expected<void> cancel(const GoalId& id) {
-    CancelGoal::Request request;
-    request.goal_info.goal_id.uuid = id;
-    return cancels_->call(request, kAnswersWithin, [](const auto&) {});
-  }
-  // It has gone: nothing more is heard of its goals.
-  void spin(Clock::time_point) override {
-    if (open_.empty() || results_->present()) return;
-    for (const auto& [id, hears] : std::map<GoalId, Hears>(open_))
-      finish(id, fail("the server has gone", name_, "start it again"));
-  }
+  [[nodiscard]] Expected<void> cancel(const GoalId& id) { return goals_->cancel(id, {}); }
 
-  [[nodiscard]] Expected<void> open() {
-    const std::string under = name_ + "/_action/";
-    auto sends = client<typename A::SendGoal>(node_, under + "send_goal");
-    if (!sends) return std::unexpected(sends.error());
-    auto cancels = client<CancelGoal>(node_, under + "cancel_goal");
-    if (!cancels) return std::unexpected(cancels.error());
-    auto results = client<typename A::GetResult>(node_, under + "get_result");
-    if (!results) return std::unexpected(results.error());
-    sends_ = *sends, cancels_ = *cancels, results_ = *results;
-    feedback_topic_ = node_.wire_name(under + "feedback", Use::kTopic).value_or("");
-    return node_.subscribe<typename A::FeedbackMessage>(under + "feedback", kTopicQos, [this](const auto& message) {
-      const auto found = open_.find(message.goal_id.uuid);
-      if (found != open_.end() && found->second.feedback) found->second.feedback(message.feedback);
-    });
-  }
+  void spin(Clock::time_point now) override { goals_->spin(now); }
+  [[nodiscard]] Clock::time_point due() const override { return goals_->due(); }
 
  private:
-  void wait_for_end(const GoalId& id, std::chrono::milliseconds within) {
-    typename A::GetResult::Request request;
-    request.goal_id.uuid = id;
-    const auto called = results_->call(request, within, [this, id](const auto& reply) {
-      if (!reply) {
-        (void)cancel(id);
-        return finish(id, std::unexpected(reply.error()));
-      }
-      finish(id, Ended{reply->status, reply->result});
-    });
-    if (!called) finish(id, std::unexpected(called.error()));
+  static auto read_feedback(std::function<void(const typename A::Feedback&)> heard) {
+    return [heard = std::move(heard)](std::span<const std::byte> bytes) -> Expected<void> {
+      typename A::FeedbackMessage message;
+      if (auto read = wire::decode(bytes, message); !read) return read;
+      if (heard) heard(message.feedback);
+      return {};
+    };
   }
-  void finish(const GoalId& id, Expected<Ended> end) {
-    const auto found = open_.find(id);
-    if (found == open_.end()) return;
-    const Hears hears = std::move(found->second);
-    open_.erase(found);
-    if (hears.ended) hears.ended(std::move(end));
+  static auto read_end(std::function<void(Expected<Ended>)> heard) {
+    return [heard = std::move(heard)](const Expected<GoalClient::Ended>& end) {
+      if (!heard) return;
+      if (!end) return heard(std::unexpected(end.error()));
+      typename A::GetResult::Response response;
+      if (const auto read = wire::decode(end->reply, response); !read) return heard(std::unexpected(read.error()));
+      heard(Ended{response.status, std::move(response.result)});
+    };
   }
 
-  Node& node_;
-  std::string name_, feedback_topic_;
-  Client<typename A::SendGoal>* sends_ = nullptr;
-  Client<CancelGoal>* cancels_ = nullptr;
-  Client<typename A::GetResult>* results_ = nullptr;
-  std::map<GoalId, Hears> open_;
+  std::unique_ptr<GoalClient> goals_;
 };
 
 template <Action A>
 [[nodiscard]] Expected<ActionClient<A>*> action_client(Node& node, std::string name) {
-  auto made = std::make_unique<ActionClient<A>>(node, std::move(name));
+  auto goals = GoalClient::open(node, std::move(name), kActionTypesOf<A>);
+  if (!goals) return std::unexpected(goals.error());
+  auto made = std::make_unique<ActionClient<A>>(*std::move(goals));
   ActionClient<A>* const there = made.get();
-  node.add_part(std::move(made));  // likewise
-  if (auto opened = there->open(); !opened) return std::unexpected(opened.error());
+  node.add_part(std::move(made));
   return there;
 }
 

@@ -138,14 +138,24 @@ Expected<std::unique_ptr<ClientEnds>> ClientEnds::open(Node& node, std::string_v
   return std::unique_ptr<ClientEnds>(new ClientEnds(number, std::move(*writer), std::move(*reader)));
 }
 
-std::optional<Guid> ClientEnds::server() const {
+std::vector<Guid> ClientEnds::servers() const {
   const std::vector<Guid> writers = replies_->matched();
-  for (const Guid& reader : requests_->matched()) {
+  std::vector<Guid> found = requests_->matched();
+  std::erase_if(found, [&](const Guid& reader) {
     const Guid participant = participant_of(reader);
-    if (std::ranges::any_of(writers, [&](const Guid& each) { return participant_of(each) == participant; }))
-      return reader;
-  }
-  return std::nullopt;
+    return std::ranges::none_of(writers, [&](const Guid& each) { return participant_of(each) == participant; });
+  });
+  return found;
+}
+
+std::optional<Guid> ClientEnds::server() const {
+  const std::vector<Guid> found = servers();
+  return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+bool ClientEnds::reaches(const Guid& server) const {
+  const std::vector<Guid> found = servers();
+  return std::ranges::find(found, server) != found.end();
 }
 
 bool ClientEnds::available() {
@@ -191,6 +201,50 @@ std::optional<std::pair<std::int64_t, std::span<const std::byte>>> ClientEnds::t
     }
   }
   return std::nullopt;
+}
+
+// ---- a client of bytes ----
+
+Expected<std::unique_ptr<ByteClient>> ByteClient::open(Node& node, std::string name, const ServiceTypes& types,
+                                                       const Qos& qos) {
+  auto ends = ClientEnds::open(node, name, types, qos);
+  if (!ends) return std::unexpected(ends.error());
+  return std::make_unique<ByteClient>(node, std::move(*ends), std::move(name));
+}
+
+Expected<void> ByteClient::call(std::vector<std::byte> bytes, std::chrono::milliseconds patience, Replied replied) {
+  const auto number = ends_->ask(bytes);
+  if (!number) return std::unexpected(number.error());
+  waiting_.emplace(*number, Waiting{std::move(replied), Clock::now() + patience});
+  return {};
+}
+
+void ByteClient::spin(Clock::time_point now) {
+  for (int left = kTakenAtOnce; left > 0; --left) {
+    const auto taken = ends_->take(sample_);
+    if (!taken) break;
+    if (left == 1) node_.wake();  // there may be more
+    const auto found = waiting_.find(taken->first);
+    if (found == waiting_.end()) continue;
+    const Replied replied = std::move(found->second.replied);
+    waiting_.erase(found);
+    replied(taken->second);
+  }
+  // One by one: who hears of it may ask again.
+  const auto late = [now](const auto& each) { return now >= each.second.until; };
+  for (auto each = std::ranges::find_if(waiting_, late); each != waiting_.end();
+       each = std::ranges::find_if(waiting_, late)) {
+    const Replied replied = std::move(each->second.replied);
+    waiting_.erase(each);
+    replied(fail("no answer in time", name_,
+                 available() ? "the server is there: see what keeps it" : "the server has gone: start it again"));
+  }
+}
+
+Part::Clock::time_point ByteClient::due() const {
+  auto due = Clock::time_point::max();
+  for (const auto& [number, waiting] : waiting_) due = std::min(due, waiting.until);
+  return due;
 }
 
 }  // namespace pons::gate::ros

@@ -80,8 +80,10 @@ class ClientEnds final {
   // Whether a server is matched with both its ends, and has been for so long that it has surely found ours: DDS matches
   // each side by itself, and what is sent before the other side has done so is lost, and no one tells.
   [[nodiscard]] bool available();
-  // Whether one is matched at all.
-  [[nodiscard]] bool present() const { return server().has_value(); }
+  // The reader of requests of one that is matched with both its ends; of several the first.
+  [[nodiscard]] std::optional<Guid> server() const;
+  // Whether that one still is.
+  [[nodiscard]] bool reaches(const Guid& server) const;
   // `bytes` as for ServerEnds::answer(). The number by which the reply is known. Errors: no server; it does not keep
   // up.
   [[nodiscard]] Expected<std::int64_t> ask(std::vector<std::byte>& bytes);
@@ -91,8 +93,7 @@ class ClientEnds final {
  private:
   ClientEnds(std::uint64_t id, std::unique_ptr<Writer> requests, std::unique_ptr<Reader> replies)
       : id_(id), requests_(std::move(requests)), replies_(std::move(replies)) {}
-  // The reader of requests; of several the first.
-  [[nodiscard]] std::optional<Guid> server() const;
+  [[nodiscard]] std::vector<Guid> servers() const;
 
   std::uint64_t id_;  // before the data, for servers that want it there
   std::unique_ptr<Writer> requests_;
@@ -155,58 +156,38 @@ template <Service S>
   return {};
 }
 
-// Belongs to its node, which outlives it.
-template <Service S>
-class Client final : public Part {
+// Encoded behind room for a header. Error: it is longer than its type allows.
+template <wire::Message T>
+[[nodiscard]] Expected<std::vector<std::byte>> bytes_of_request(const T& request, std::string_view service) {
+  std::vector<std::byte> bytes(kHeaderRoom + wire::encoded_size(request));
+  if (wire::encode(request, std::span(bytes).subspan(kHeaderRoom)) == 0)
+    return fail("a request is longer than its type allows", std::string(service), "shorten it");
+  return bytes;
+}
+
+// Asks a service whose messages are bytes here. The node outlives it.
+class ByteClient final : public Part {
  public:
-  using Replied = std::function<void(Expected<typename S::Response>)>;
-  Client(Node& node, std::unique_ptr<ClientEnds> ends, std::string name)
+  // The reply as CDR, as long as the call lasts.
+  using Replied = std::function<void(const Expected<std::span<const std::byte>>&)>;
+  [[nodiscard]] static Expected<std::unique_ptr<ByteClient>> open(Node& node, std::string name,
+                                                                  const ServiceTypes& types,
+                                                                  const Qos& qos = kServiceQos);
+  ByteClient(Node& node, std::unique_ptr<ClientEnds> ends, std::string name)
       : node_(node), ends_(std::move(ends)), name_(std::move(name)) {}
 
   [[nodiscard]] bool available() { return ends_->available(); }
-  [[nodiscard]] bool present() const { return ends_->present(); }
-  // `replied` is called once, in spin(): with the reply, or the error that there was none in time. Errors, at once: no
-  // server is there; the request is longer than its type allows.
-  [[nodiscard]] Expected<void> call(const typename S::Request& request, std::chrono::milliseconds patience,
-                                    Replied replied) {
-    std::vector<std::byte> bytes(kHeaderRoom + wire::encoded_size(request));
-    if (wire::encode(request, std::span(bytes).subspan(kHeaderRoom)) == 0)
-      return fail("a request is longer than its type allows", name_, "shorten it");
-    const auto number = ends_->ask(bytes);
-    if (!number) return std::unexpected(number.error());
-    waiting_.emplace(*number, Waiting{std::move(replied), Clock::now() + patience});
-    return {};
-  }
+  [[nodiscard]] bool present() const { return ends_->server().has_value(); }
+  // The server that is asked now; and whether that one is still there.
+  [[nodiscard]] std::optional<Guid> server() const { return ends_->server(); }
+  [[nodiscard]] bool reaches(const Guid& server) const { return ends_->reaches(server); }
+  [[nodiscard]] const std::string& name() const { return name_; }
+  // `bytes` as for ServerEnds::answer(). `replied` is called once, in spin(): with the reply, or the error that there
+  // was none in time. Error, at once: no server is there.
+  [[nodiscard]] Expected<void> call(std::vector<std::byte> bytes, std::chrono::milliseconds patience, Replied replied);
 
-  void spin(Clock::time_point now) override {
-    for (int left = kTakenAtOnce; left > 0; --left) {
-      const auto taken = ends_->take(sample_);
-      if (!taken) break;
-      if (left == 1) node_.wake();  // there may be more
-      const auto found = waiting_.find(taken->first);
-      if (found == waiting_.end()) continue;
-      Replied replied = std::move(found->second.replied);
-      waiting_.erase(found);
-      typename S::Response response;
-      const auto read = wire::decode(taken->second, response);
-      replied(read ? Expected<typename S::Response>(std::move(response)) : std::unexpected(read.error()));
-    }
-    for (auto each = waiting_.begin(); each != waiting_.end();) {
-      if (now < each->second.until) {
-        ++each;
-        continue;
-      }
-      Replied replied = std::move(each->second.replied);
-      each = waiting_.erase(each);
-      replied(fail("no answer in time", name_,
-                   available() ? "the server is there: see what keeps it" : "the server has gone: start it again"));
-    }
-  }
-  [[nodiscard]] Clock::time_point due() const override {
-    auto due = Clock::time_point::max();
-    for (const auto& [number, waiting] : waiting_) due = std::min(due, waiting.until);
-    return due;
-  }
+  void spin(Clock::time_point now) override;
+  [[nodiscard]] Clock::time_point due() const override;
 
  private:
   struct Waiting {
@@ -220,11 +201,40 @@ class Client final : public Part {
   Sample sample_;
 };
 
+// The same with a type. Belongs to its node, which outlives it.
+template <Service S>
+class Client final : public Part {
+ public:
+  using Replied = std::function<void(Expected<typename S::Response>)>;
+  explicit Client(std::unique_ptr<ByteClient> bytes) : bytes_(std::move(bytes)) {}
+
+  [[nodiscard]] bool available() { return bytes_->available(); }
+  [[nodiscard]] bool present() const { return bytes_->present(); }
+  // As ByteClient::call(). Errors also: the request is longer than its type allows; later: the reply cannot be read.
+  [[nodiscard]] Expected<void> call(const typename S::Request& request, std::chrono::milliseconds patience,
+                                    Replied replied) {
+    auto bytes = bytes_of_request(request, bytes_->name());
+    if (!bytes) return std::unexpected(bytes.error());
+    return bytes_->call(*std::move(bytes), patience, [replied = std::move(replied)](const auto& reply) {
+      if (!reply) return replied(std::unexpected(reply.error()));
+      typename S::Response response;
+      const auto read = wire::decode(*reply, response);
+      replied(read ? Expected<typename S::Response>(std::move(response)) : std::unexpected(read.error()));
+    });
+  }
+
+  void spin(Clock::time_point now) override { bytes_->spin(now); }
+  [[nodiscard]] Clock::time_point due() const override { return bytes_->due(); }
+
+ private:
+  std::unique_ptr<ByteClient> bytes_;
+};
+
 template <Service S>
 [[nodiscard]] Expected<Client<S>*> client(Node& node, std::string_view name, const Qos& qos = kServiceQos) {
-  auto ends = ClientEnds::open(node, name, kTypesOf<S>, qos);
-  if (!ends) return std::unexpected(ends.error());
-  auto made = std::make_unique<Client<S>>(node, std::move(*ends), std::string(name));
+  auto bytes = ByteClient::open(node, std::string(name), kTypesOf<S>, qos);
+  if (!bytes) return std::unexpected(bytes.error());
+  auto made = std::make_unique<Client<S>>(*std::move(bytes));
   Client<S>* const there = made.get();
   node.add_part(std::move(made));
   return there;
