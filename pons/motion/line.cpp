@@ -6,10 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "pons/model/iterate.hpp"
 #include "pons/motion/assemble.hpp"
 #include "pons/motion/pace.hpp"
 #include "pons/motion/straight.hpp"
+#include "pons/motion/track.hpp"
 
 namespace pons::motion {
 namespace {
@@ -27,8 +27,6 @@ constexpr double kLongest_s = kCoarsest_s * kMovingPieces;
 constexpr double kStretch = 1.01;  // tried next where the fitted motion is beyond a limit
 constexpr int kStretches = 70;     // to twice as long
 constexpr double kTrusted = 0.8;   // of the steps that its excess asks for
-constexpr int kNewtonSteps = 8;
-constexpr double kExact = 1e-11;   // m and rad, together
 constexpr double kNothing = 1e-9;  // m and rad: no way, no turn
 
 // Poses that may still be asked for. Counted, never timed: the same line is planned or refused on any computer.
@@ -50,40 +48,17 @@ class Budget {
 // Joint angles for a pose close to one whose angles are known.
 class Tracker {
  public:
-  Tracker(const model::RobotModel& model, Budget& budget)
-      : model_(model),
-        budget_(budget),
-        redundant_(model.inverse_method() == model::RobotModel::InverseMethod::kIteration) {}
+  Tracker(const model::RobotModel& model, Budget& budget) : model_(model), budget_(budget) {}
 
   [[nodiscard]] bool spent() const { return budget_.spent(); }
-  // Of a redundant arm the nearest angles, by Newton's method: its inverse kinematics may choose others from pose to
-  // pose, and what follows a line must not.
   [[nodiscard]] Expected<AxisVector> operator()(const Pose& pose, const AxisVector& near) const {
     if (!budget_.take()) return budget_.error();
-    if (!redundant_) return model_.inverse(pose, near);
-    const model::Chain& chain = model_.chain();
-    AxisVector q = near;
-    Pose tip;
-    model::Jacobian jacobian;
-    for (int i = 0; i < kNewtonSteps; ++i) {
-      chain.evaluate(q, tip, jacobian);
-      const model::PoseError error = model::pose_error(pose, tip);
-      if (error.norm() < kExact) return inside(q) ? Expected<AxisVector>(q) : fail("beyond a position limit");
-      q += model::damped_step(jacobian, error, 0);
-      if (!q.allFinite()) break;
-    }
-    return fail("out of reach");
+    return angles_near(model_, pose, near);
   }
 
  private:
-  [[nodiscard]] bool inside(const AxisVector& q) const {
-    const AxisLimits& limits = model_.chain().limits();
-    return (q.array() >= limits.position_min.array()).all() && (q.array() <= limits.position_max.array()).all();
-  }
-
   const model::RobotModel& model_;
   Budget& budget_;
-  bool redundant_;
 };
 
 struct Node {

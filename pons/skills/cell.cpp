@@ -21,9 +21,8 @@ constexpr double kPlanShare = 0.97;         // of the enforced limits, so that r
 constexpr double kLoadedSpeedShare = 0.92;  // a swinging load drives the arm beyond what was planned
 // Of what the cups hold: a load on bellows swings to about twice, at a reversal thrice, what it would take if rigid.
 constexpr double kGripShare = 0.40;
-constexpr double kTorqueShare = 0.92;  // of the motors': the same load swings
-// Of the acceleration limits: so slowly hardly anything swings; weight alone, or a motion under way, may use up more.
-constexpr double kSlowestShare = 0.10, kSlowGripShare = 0.70;
+constexpr double kTorqueShare = 0.92;    // of the motors': the same load swings
+constexpr double kSlowGripShare = 0.70;  // as slowly as can be weight alone, or a motion under way, may use up more
 // Of one correction: a few are fine, but what no speed helps must come to an end.
 constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
@@ -436,6 +435,20 @@ AxisLimits Cell::limits_empty() const {
   return limits;
 }
 
+AxisLimits Cell::limits_timed() const {
+  AxisLimits limits = limits_planned();
+  if (held) limits.speed_rad_s *= kLoadedSpeedShare;
+  return limits;
+}
+
+Cell::LoadUse Cell::load_use(const motion::Trajectory& way) {
+  const double mass_kg = held->mass_kg + kUnsure_kg;
+  const double cups = grip_use(model, world.robot.tool, held->load, mass_kg, way);
+  const double motors = torque_use(model, world.robot, held->load, mass_kg, way);
+  return {std::max(cups / (kGripShare * grip_share), motors / kTorqueShare),
+          std::max(cups / (kSlowGripShare * grip_share), motors), cups, motors};
+}
+
 AxisLimits Cell::limits_loaded(double share) const {
   AxisLimits limits = limits_empty();
   limits.speed_rad_s *= kLoadedSpeedShare;
@@ -459,13 +472,10 @@ Expected<motion::Trajectory> Cell::carry_on(Time now, const Goal& goal, Search& 
     const motion::Waypoint end{*q, AxisVector::Zero(q->size())};
     auto way = router.route(state, from, end, &held->load, objects_, limits, &search.known);
     if (!way) return way;
-    const double mass_kg = held->mass_kg + kUnsure_kg;
-    const double cups = grip_use(model, world.robot.tool, held->load, mass_kg, *way);
-    const double motors = torque_use(model, world.robot, held->load, mass_kg, *way);
-    const double use = std::max(cups / (kGripShare * grip_share), motors / kTorqueShare);
+    const auto [use, slowly, cups, motors] = load_use(*way);
     if (use <= 1) return way;
     if (search.share <= kSlowestShare) {
-      if (search.must || (cups <= kSlowGripShare * grip_share && motors <= 1)) return way;
+      if (search.must || slowly <= 1) return way;
       return too_heavy(held->mass_kg, cups / grip_share, motors);
     }
     const double timid = search.corrections++ < kFineCorrections ? kTimid : kTimidAtLast;

@@ -179,6 +179,15 @@ class Cell {
   [[nodiscard]] AxisLimits limits_planned() const;
   // Likewise, and as slow as zones want it: what the arm keeps with the cups empty.
   [[nodiscard]] AxisLimits limits_empty() const;
+  // Of a motion whose times somebody else has chosen, with what is held; zones make it slower on its way.
+  [[nodiscard]] AxisLimits limits_timed() const;
+  // How much a motion with what is held asks for: of the cups' hold, and of the motors' torques. `most` may be 1; in a
+  // motion as slow as can be, with kSlowestShare of the acceleration limits, `slowly` may.
+  struct LoadUse {
+    double most = 0, slowly = 0, cups = 0, motors = 0;
+  };
+  static constexpr double kSlowestShare = 0.10;  // so slowly hardly anything swings
+  [[nodiscard]] LoadUse load_use(const motion::Trajectory& way);
   // How a carry is being found, while a tick is too short to find it; empty again when it has ended.
   struct Search {
     double share = 1;   // of the acceleration limits

@@ -1,5 +1,7 @@
 #include "pons/skills/detour.hpp"
 
+#include <algorithm>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,18 @@ constexpr int kRises = 8;
 // Enough for a post or a wall in a cell; and so many in a tick, which must not become long.
 constexpr int kSamples = 400, kShortcuts = 40, kStepsPerTick = 10;
 constexpr double kNearly_rad = 0.3;  // from what was asked for before: its path leads round the same things
+
+// Where a way is only looked at: the belt's top counts as so much lower, which leaves a centimetre of the margin; and
+// what touches at the beginning may come no closer than by that.
+constexpr double kBeltLower_m = 0.015, kNoCloser_m = 0.002;
+
+model::Box belt(const world::World& world, double lower_m) {
+  const world::Belt& belt = world.belt;
+  const double top_z = belt.surface_z_m - lower_m;
+  model::Box box{.size_m = {belt.x_end_m - belt.x_start_m, belt.width_m, top_z}};
+  box.world_from_box.translation() = Vector3(0.5 * (belt.x_start_m + belt.x_end_m), belt.y_center_m, 0.5 * top_z);
+  return box;
+}
 
 std::uint64_t seed_of(const AxisVector& from, const AxisVector& to) {
   Digest digest;
@@ -52,6 +66,38 @@ bool Detour::keeps_off(const motion::Trajectory& way, const Load* load) {
   if (!has_obstacles_) return true;
   scene_.carry(carried(load));
   return clear(way, scene_);
+}
+
+std::string Detour::touched(const std::function<AxisVector(Time)>& at, Time from, Time until, const Load* load,
+                            const AxisVector& leaves) {
+  std::vector<model::Box> boxes = standing(world_);
+  const std::size_t obstacles = boxes.size();
+  boxes.push_back(belt(world_, kBeltLower_m));
+  collision_.surround(boxes);
+  collision_.carry(carried(load));
+  const double least_m = std::min(0.0, collision_.clearance(leaves) - kNoCloser_m);
+  for (Time time = from; time < until; time += kCheckEvery) {
+    const AxisVector a = at(time), b = at(std::min(time + kCheckEvery, until));
+    if (collision_.clear(a, b)) continue;
+    for (const AxisVector& q : {a, AxisVector(0.5 * (a + b)), b}) {
+      if (collision_.clearance(q) > least_m) continue;
+      return named(collision_.touching(q), obstacles);
+    }
+  }
+  return {};
+}
+
+// Boxes are numbered from 1 in the order of the world's obstacles; the belt is the last one.
+std::string Detour::named(std::string touching, std::size_t obstacles) const {
+  constexpr std::string_view kBox = "box ";
+  const std::size_t at = touching.rfind(kBox);
+  if (at == std::string::npos) return touching;
+  std::size_t number = std::stoul(touching.substr(at + kBox.size()));
+  std::string name = "the belt";
+  for (const world::Place& place : world_.places) {
+    if (number <= obstacles && place.kind == world::PlaceKind::kObstacle && --number == 0) name = place.name;
+  }
+  return touching.replace(at, std::string::npos, name);
 }
 
 // Straight up until it is clear.

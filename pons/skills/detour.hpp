@@ -2,8 +2,10 @@
 // every tick.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pons/model/collision.hpp"
@@ -34,9 +36,14 @@ class Detour {
   [[nodiscard]] bool has_obstacles() const { return has_obstacles_; }
   // Whether a motion keeps off the world's own obstacles; where there are none, it does.
   [[nodiscard]] bool keeps_off(const motion::Trajectory& way, const Load* load);
+  // What touches what between two moments of a way, with all of the arm and what it carries: links one another, an
+  // obstacle, the belt. Empty: nothing. What already touches in the posture `leaves` may leave, but come no closer.
+  [[nodiscard]] std::string touched(const std::function<AxisVector(Time)>& at, Time from, Time until, const Load* load,
+                                    const AxisVector& leaves);
 
  private:
   [[nodiscard]] bool clear(const motion::Trajectory& way, model::CollisionModel& judge);
+  [[nodiscard]] std::string named(std::string touching, std::size_t obstacles) const;
   [[nodiscard]] Expected<AxisVector> lifted(const AxisVector& q);
   // Where the path from `from` to `to` turns.
   [[nodiscard]] Expected<std::vector<AxisVector>> corners(const AxisVector& from, const AxisVector& to,

@@ -49,6 +49,12 @@ Expected<void> Reach::over(const std::string& place, std::span<const double> hei
   return known != known_.end() ? known->second : known_.emplace(key, look(*target, heights_m)).first->second;
 }
 
+Expected<void> Reach::stands_free(const AxisVector& posture, const std::string& what) {
+  if (!standing_ || standing_->clear(posture)) return {};
+  return fail(fmt::format("at {} the arm touches what stands there ({})", what, standing_->touching(posture)), {},
+              "lead it around that");
+}
+
 Expected<void> Reach::can_press(const AxisVector& posture, double force_n) {
   const AxisVector still = AxisVector::Zero(posture.size());
   AxisVector torque_nm = still;

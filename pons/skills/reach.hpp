@@ -28,6 +28,10 @@ class Reach {
   // Cups empty, tool down over a point (m, world frame), turned as it may be. `what` names the point.
   [[nodiscard]] Expected<AxisVector> posture(const Vector3& point, const std::string& what);
 
+  // Whether at that posture (rad), which `what` names, the arm is free of what stands there for good. Error: what
+  // touches.
+  [[nodiscard]] Expected<void> stands_free(const AxisVector& posture, const std::string& what);
+
   // The drives can press so hard (N) straight down there.
   [[nodiscard]] Expected<void> can_press(const AxisVector& posture, double force_n);
 

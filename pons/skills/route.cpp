@@ -1,9 +1,13 @@
 #include "pons/skills/route.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "pons/motion/axis_profile.hpp"
@@ -26,6 +30,8 @@ constexpr double kToolRadius_m = 0.038;
 constexpr double kUsualHeight_m = 0.20;  // of what stands on the belt: a way over it is tried first
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
 constexpr int kMostChecks = 80;
+constexpr Duration kPiece =
+    std::chrono::milliseconds(200);  // of a way that is judged: when it touches is told as exactly
 
 // Points of tool or load that come lowest.
 std::vector<Vector3> probes(const Load* load) {
@@ -240,6 +246,50 @@ bool Router::clear(const motion::Trajectory& way, Time from, Time until, const L
 bool Router::clear_at(const AxisVector& q, Time from, Time until, const Load* load,
                       std::span<const ObjectBelief> obstacles) {
   return worst_clearance([&](Time) -> AxisVector { return q; }, from, until, 0, kEndGrow_m, load, obstacles, 0) >= 0;
+}
+
+std::string Router::below(const AxisVector& q) {
+  const Vector3 tip = model_.world_from_tip(q).translation();
+  const bool beside = std::abs(tip.y() - world_.belt.y_center_m) > 0.5 * world_.belt.width_m + kBeltMargin_m;
+  const char* const what = beside                    ? "the chutes' rims, or what is as high beside the belt"
+                           : tip.x() < unseen_end_m_ ? "what may ride there, where no camera looks"
+                                                     : "the belt";
+  return fmt::format("{}, with the tip at ({:.2f}, {:.2f}, {:.2f}) m", what, tip.x(), tip.y(), tip.z());
+}
+
+std::string Router::lowest_over(Time time, Sweep sweep) {
+  const std::vector<Neighbour> neighbours = std::exchange(sweep.neighbours, {});
+  if (clearance_at(time, sweep) < 0) return below(sweep.at(time));
+  for (const Neighbour& neighbour : neighbours) {
+    sweep.neighbours = {neighbour};
+    if (clearance_at(time, sweep) >= 0) continue;
+    const Vector3& top = neighbour.object->world_from_top.translation();
+    if (!neighbour.object->code.empty()) return neighbour.object->code;
+    return fmt::format("what lies at ({:.2f}, {:.2f}) m", top.x(), top.y());
+  }
+  return "what lies there";
+}
+
+Expected<void> Router::judge(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                             std::span<const ObjectBelief> obstacles) {
+  const Time start = way.front().start;
+  const auto hit = [&](Time time, const std::string& what) {
+    return fail(fmt::format("{:.2f} s on the way the arm would touch {}", to_s(time - start), what), {},
+                "lead it around that, or wait until it has gone");
+  };
+  const Positions at = [&](Time time) -> AxisVector { return motion::sample(way, time, model_.axes()).position; };
+  for (Time time = from; time < until; time += kPiece) {
+    const std::string what = detour_.touched(at, time, std::min(time + kPiece, until), load, at(start));
+    if (!what.empty()) return hit(time, what);
+  }
+  Sweep sweep{
+      at,           from, model_.world_from_tip(at(start)), model_.world_from_tip(at(way.back().end())), 0, load,
+      probes(load), {}};
+  sweep.neighbours = neighbours_of(sweep.points, sweep.first, start, kObjectGrow_m, obstacles);
+  for (Time time = from; time < until; time += kCheckEvery) {
+    if (clearance_at(time, sweep) < 0) return hit(time, lowest_over(time, sweep));
+  }
+  return {};
 }
 
 Expected<AxisVector> Router::raised(const AxisVector& q, double tip_z) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "pons/core/belief.hpp"
@@ -61,6 +62,11 @@ class Router {
   // Whether a way that was clear when it was planned still is, between two of its moments: more is believed by now.
   [[nodiscard]] bool clear(const motion::Trajectory& way, Time from, Time until, const Load* load,
                            std::span<const ObjectBelief> obstacles);
+  // Whether the arm may go a way that somebody else has chosen, between two of its moments; looked at as closely
+  // however long it is, so that a long one is judged in parts. Keeps what clear() does, and no part of the arm touches
+  // another (Detour::touched()). Error: when it would touch what.
+  [[nodiscard]] Expected<void> judge(const motion::Trajectory& way, Time from, Time until, const Load* load,
+                                     std::span<const ObjectBelief> obstacles);
 
  private:
   [[nodiscard]] double floor_z(double x, double y, Time time, Time begin, double belt_margin_m) const;
@@ -88,6 +94,8 @@ class Router {
   [[nodiscard]] bool exhausted() const;
   [[nodiscard]] bool passes(const motion::Trajectory& way, double close_m, const Task& task);
   struct Sweep;
+  [[nodiscard]] std::string below(const AxisVector& q);
+  [[nodiscard]] std::string lowest_over(Time time, Sweep sweep);
   [[nodiscard]] double clearance_at(Time time, const Sweep& sweep);
   [[nodiscard]] double worst_clearance(const Positions& at, Time begin, Time end, double further_m, double close_m,
                                        const Load* load, std::span<const ObjectBelief> obstacles, double enough_m);

@@ -34,7 +34,14 @@ std::ostream& operator<<(std::ostream& out, const Use& use) { return out << use.
 
 constexpr Use kUses[] = {
     {"detect", R"([{"skill":"detect","arguments":{"object":"P000001","within_s":20}}])"},
+    {"follow_path", R"([{"skill":"follow_path","arguments":{"points":[{"position":[0.1,0.1,1.1],"time_s":2},)"
+                    R"({"position":[-0.1,0.1,1.1],"time_s":3.5},{"position":[-0.1,0,1.15],"time_s":5}]}}])"},
     {"follow_policy", R"([{"skill":"follow_policy","arguments":{"policy":"hover","seconds":4}}])"},
+    {"follow_trajectory", R"([{"skill":"follow_trajectory","arguments":{)"
+                          R"("joints":["joint1","joint2","joint3","joint4","joint5","joint6","joint7"],)"
+                          R"("points":[{"positions":[0.4,-0.2067,0,-2.3596,0,2.1529,0],"time_s":2},)"
+                          R"({"positions":[0.6,-0.2067,0,-2.3596,0,2.1529,0.5],"time_s":3},)"
+                          R"({"positions":[-0.2,-0.2067,0,-2.3596,0,2.1529,0],"time_s":5}]}}])"},
     {"move_to",
      R"([{"skill":"move_to","arguments":{"place":"north"}},{"skill":"move_to","arguments":{"place":"home"}}])"},
     {"pick_and_place", ""},

@@ -1,0 +1,18 @@
+// follow_trajectory: moves the joints through given positions at given times, as ROS 2's FollowJointTrajectory asks.
+#pragma once
+
+#include "pons/skills/cell.hpp"
+#include "pons/task/skill.hpp"
+
+namespace pons::skills {
+
+inline constexpr std::size_t kMostTrajectoryPoints = 200;  // each is a piece of motion; the loop queues 256 of them
+
+// Arguments {"joints": names, "points": [{"positions": rad, "time_s": s, "velocities": rad/s}, …], "goal_tolerance":
+// rad}; velocities may be left out of any point, the tolerance too. Every joint of the arm exactly once, in any order.
+// The motion is motion::move_in_time(), its first point is reached from wherever the arm rests, and it ends at rest.
+// Ends kSucceeded when each joint is measured within the tolerance of the last point. How it is followed:
+// timed_way.hpp.
+[[nodiscard]] task::SkillType follow_trajectory(Cell& cell);
+
+}  // namespace pons::skills

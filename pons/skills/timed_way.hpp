@@ -1,0 +1,37 @@
+// What follow_trajectory and follow_path share: the arm goes through points at times that somebody else has chosen.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/motion/timed.hpp"
+#include "pons/skills/conduct.hpp"
+
+namespace pons::skills {
+
+inline constexpr double kLongestWay_s = 300;
+
+// What differs between them.
+struct TimedWay {
+  std::vector<motion::TimedPoint> points;  // times count from when the arm sets out
+  // A motion of the joints through such points, from rest at `start` (rad). Begins at Time{}.
+  std::function<Expected<motion::Trajectory>(const AxisVector& start, std::span<const motion::TimedPoint> points)> make;
+  // Whether the arm, measured there (rad), is where it was to end. Error: how far off it is.
+  std::function<Expected<void>(const AxisVector& measured, const AxisVector& planned)> arrived;
+};
+
+// Waits for rest; plans; looks at all of the way, some of it a tick, and at what is ahead of it while it goes
+// (Router::judge()); sees that the arm has arrived. A way that cannot be gone in its times, or is not clear, is refused
+// before anything moves: by point and axis, with the least time. Paused or stopped, it goes on from where the arm then
+// stands along the rest, with what longer times that takes; where somebody else has had it, from where it had left off.
+// `asked` may be an error: then it fails with that.
+[[nodiscard]] std::unique_ptr<ArmSkill> follow_timed(Cell& cell, Expected<TimedWay> asked);
+
+// Whether times make sense by themselves: they grow, by a tick of the loop at least, and do not end too late.
+[[nodiscard]] Expected<void> check_times(std::span<const motion::TimedPoint> points);
+
+}  // namespace pons::skills
