@@ -43,6 +43,7 @@ void Localiser::process(const RgbdFrame& frame, const Moment& moment) {
   belief_->map_from_base = map_from_base_;
   belief_->covariance = covariance_;
   belief_->wheels_rad = moment.joint_position.of[0];
+  belief_->ranges_m.assign(frame.depth_m.begin(), frame.depth_m.end());
   judge();
 }
 
@@ -70,7 +71,7 @@ void Localiser::take_ends(const RgbdFrame& frame) {
   const Pose2& at = lidar_.base_from_lidar;
   for (std::size_t i = 0; i < frame.depth_m.size(); ++i) {
     const double range_m = frame.depth_m[i];
-    if (!(range_m > 0)) continue;
+    if (!(range_m > 0) || !std::isfinite(range_m)) continue;
     const double angle = (static_cast<double>(i) - frame.intrinsics.cx) / frame.intrinsics.fx;
     ends_.push_back(at * Vector2(range_m * std::cos(angle), range_m * std::sin(angle)));
   }

@@ -66,7 +66,7 @@ TEST_F(OnItsFloor, ItsLidarMeasuresTheWalls) {
   for (std::size_t i = 0; i < 360; ++i) {
     const double angle = (static_cast<double>(i) - frame.intrinsics.cx) / frame.intrinsics.fx;
     const double range = frame.depth_m[i];
-    if (range == 0) continue;
+    if (range == 0 || std::isinf(range)) continue;
     ++seen;
     const Vector2 end = Vector2(0.05, 0) + range * Vector2(std::cos(angle), std::sin(angle));
     right += std::abs(world_.map->distance_m(end)) < 0.05 ? 1 : 0;
@@ -79,6 +79,29 @@ TEST_F(OnItsFloor, ItsLidarMeasuresTheWalls) {
   lidar->begin(Time(std::chrono::milliseconds(200)));
   ASSERT_TRUE(lidar->finish(frame));
   EXPECT_NE(frame.depth_m[180], noisy);
+}
+
+TEST_F(OnItsFloor, ItsLidarTellsWhatIsFarFromWhatIsLost) {
+  world_.cameras.front().range_m = 2;
+  simulation_ = BaseSimulation::create(world_, 1).value();
+  simulation_->advance_to(Time(std::chrono::milliseconds(100)));
+  body::Camera* const lidar = simulation_->cameras().front();
+  lidar->begin(Time(std::chrono::milliseconds(100)));
+  RgbdFrame frame;
+  ASSERT_TRUE(lidar->finish(frame));
+  int far = 0, lost = 0;
+  for (std::size_t i = 0; i < 360; ++i) {
+    const double angle = (static_cast<double>(i) - frame.intrinsics.cx) / frame.intrinsics.fx;
+    lost += frame.depth_m[i] == 0 ? 1 : 0;
+    if (!std::isinf(frame.depth_m[i])) continue;
+    ++far;
+    // Nothing of the map is within its range there.
+    for (double range = 0.1; range < 1.9; range += 0.1)
+      EXPECT_GT(world_.map->distance_m(Vector2(0.05 + range * std::cos(angle), range * std::sin(angle))), 0) << angle;
+  }
+  EXPECT_GT(far, 30);
+  EXPECT_GT(lost, 0);
+  EXPECT_LT(lost, 30);
 }
 
 TEST_F(OnItsFloor, WithoutPowerItsBrakesHoldIt) {

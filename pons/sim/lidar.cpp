@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "pons/core/random.hpp"
 
@@ -51,8 +52,10 @@ Expected<void> SimLidar::finish(RgbdFrame& frame) {
   for (std::size_t i = 0; i < rays; ++i) {
     const bool lost = chance.uniform() < spec_.depth_dropout;
     const double measured = ranges_m_[i] + spec_.depth_noise_m * chance.normal();
-    const bool back = ranges_m_[i] >= 0 && measured > 0 && measured <= spec_.range_m && !lost;
-    frame.depth_m[i] = back ? static_cast<float>(measured) : 0.0F;
+    const bool far = ranges_m_[i] < 0 || measured > spec_.range_m;
+    frame.depth_m[i] = lost || (!far && measured <= 0) ? 0.0F
+                       : far                           ? std::numeric_limits<float>::infinity()
+                                                       : static_cast<float>(measured);
   }
   return {};
 }

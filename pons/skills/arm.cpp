@@ -23,6 +23,7 @@ Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
       rest_(at_rest(world.robot.home)) {}
 
 void Arm::refresh(Time now) {
+  now_ = now;
   link_.latest(state_);
   if (state_.safety != safety_before_ || state_.controller != controlled_before_) {
     // After a stop the arm is where it came to rest, whatever was planned; after it gave way, where that brought it.
@@ -163,7 +164,9 @@ Expected<void> Arm::recover(Time now) {
 bool Arm::send(link::Command command) {
   command.sequence = ++sequence_;
   command.epoch = state_.epoch;
-  return link_.send(command);
+  if (!link_.send(command)) return false;
+  if (show_sent_ && command.kind != link::CommandKind::kHeartbeat) show_sent_(now_, command);
+  return true;
 }
 
 }  // namespace pons::skills

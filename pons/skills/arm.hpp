@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -57,6 +58,9 @@ class Arm {
   [[nodiscard]] Expected<void> stream(const motion::Trajectory& trajectory);
   // What was sent since the last call.
   [[nodiscard]] std::vector<SentMotion> take_sent() { return std::exchange(sent_, {}); }
+  // Shown each command from now on once it is sent, heartbeats left out, and the time of the tick that it is sent in.
+  using ShowSent = std::function<void(Time, const link::Command&)>;
+  void show_sent(ShowSent show) { show_sent_ = std::move(show); }
   // From the splice time to standstill along the limits.
   [[nodiscard]] Expected<void> stop(Time now);
 
@@ -90,6 +94,8 @@ class Arm {
   link::State state_;
   motion::Trajectory asked_;  // in the motion's time
   std::vector<SentMotion> sent_;
+  ShowSent show_sent_;
+  Time now_;        // of the last refresh
   AxisState rest_;  // in force when nothing was asked for since arming
   std::uint64_t sequence_ = 0;
   double contact_n_ = 0;

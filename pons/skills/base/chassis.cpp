@@ -26,6 +26,7 @@ void Chassis::refresh(Time now) {
   const link::State& state = wheels.state();
   if (state.position.size() != 2 || (!turned_.empty() && turned_.back().stamp >= state.stamp)) return;
   if (!turned_.empty()) map_from_base_ = drive.rolled(map_from_base_, turned_.back().wheels_rad, state.position);
+  odometry_.take(state.position);
   turned_.push_back({state.stamp, state.position});
   while (turned_.front().stamp + kRemembered < now) turned_.pop_front();
 }

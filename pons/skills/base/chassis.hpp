@@ -8,6 +8,7 @@
 #include "pons/model/diff_drive.hpp"
 #include "pons/skills/arm.hpp"
 #include "pons/skills/base/floor.hpp"
+#include "pons/skills/base/odometry.hpp"
 #include "pons/skills/base/steer.hpp"
 #include "pons/world/world.hpp"
 
@@ -29,6 +30,26 @@ class Chassis {
   [[nodiscard]] bool sure() const;
   // Where it is as of the last refresh: the belief, carried on by what the wheels have turned since.
   [[nodiscard]] const Pose2& map_from_base() const { return map_from_base_; }
+  // What the wheels alone say of it, as of the last refresh.
+  [[nodiscard]] const Odometry& odometry() const { return odometry_; }
+
+  // Where the skill that drives now is going to; nothing: none is.
+  struct Heading {
+    Pose2 goal;
+    double left_m = 0;  // along its way; straight while it has none
+    int detours = 0;    // ways that something stood in
+  };
+  [[nodiscard]] const std::optional<Heading>& heading() const { return heading_; }
+  void head_for(const std::optional<Heading>& heading) { heading_ = heading; }
+
+  // How somebody who steers wants it to move, and since when; nothing: nobody has yet.
+  struct Wish {
+    model::Twist2 twist;
+    Time at;
+  };
+  [[nodiscard]] const std::optional<Wish>& wish() const { return wish_; }
+  void wish(const model::Twist2& twist, Time now) { wish_ = {twist, now}; }
+
   // Where it will be, and how its wheels turn, if they go on as they were asked to.
   [[nodiscard]] Rolling expected(Time at) const;
 
@@ -44,6 +65,9 @@ class Chassis {
   };
   std::optional<BaseBelief> belief_;
   Pose2 map_from_base_;
+  Odometry odometry_{drive};
+  std::optional<Heading> heading_;
+  std::optional<Wish> wish_;
   std::deque<Turned> turned_;  // measured, since the newest scan or a little longer
 };
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "pons/skills/base/base_skills.hpp"
-#include "pons/skills/standstill.hpp"
+#include "pons/skills/base/driven.hpp"
 
 namespace pons::skills {
 namespace {
@@ -26,89 +26,29 @@ constexpr Duration kWaitsForSight = std::chrono::seconds(10);
 constexpr Duration kHeadway = std::chrono::seconds(20);  // without getting nearer by kNearer_m
 constexpr double kNearer_m = 0.05, kNearer_rad = 0.1;
 constexpr int kCorrections = 8;
-constexpr Duration kHaltWithin = std::chrono::seconds(3);
 
 task::Json json_of(const Pose2& pose) { return {{"x", pose.x}, {"y", pose.y}, {"yaw", wrapped(pose.yaw)}}; }
 
-class Navigate final : public task::Skill {
+class Navigate final : public Driven {
  public:
   Navigate(Chassis& chassis, const Pose2& goal)
-      : chassis_(chassis),
-        goal_(goal),
-        steer_(chassis.floor, *chassis.world.base, chassis.world.robot.limits),
-        standstill_(chassis.wheels) {}
+      : Driven(chassis), goal_(goal), steer_(chassis.floor, *chassis.world.base, chassis.world.robot.limits) {}
+
+  ~Navigate() override { chassis_.head_for(std::nullopt); }
 
   Progress tick(Time now) override {
-    Progress progress = advance(now);
+    Progress progress = Driven::tick(now);
+    const Vector2 here = chassis_.map_from_base().position();
+    const bool on_way = !steer_.way().empty() && phase_ != Phase::kPlans;
+    chassis_.head_for({{goal_, on_way ? left_along(steer_.way(), here) : (goal_.position() - here).norm(), detours_}});
     progress.notes = std::exchange(notes_, {});
     return progress;
   }
 
-  void pause(Time now, Pause) override {
-    if (mode_ == Mode::kGoes) stop(now, Mode::kRests);
-  }
-  void resume(Time) override {
-    if (mode_ != Mode::kRests) return;
-    mode_ = Mode::kGoes;
-    plan_anew();
-  }
-  void cancel(Time now) override {
-    if (mode_ == Mode::kGoes || mode_ == Mode::kRests) stop(now, Mode::kEnds);
-  }
-  void halt(Time now) override {
-    if (mode_ == Mode::kHalts) return;
-    mode_ = Mode::kHalts;
-    halted_at_ = now;
-    stands_.reset();
-    chassis_.wheels.halt();
-  }
-
  private:
-  enum class Mode : std::uint8_t { kGoes, kRests, kEnds, kHalts };
   enum class Phase : std::uint8_t { kPlans, kDrives, kSettles };
 
-  Progress advance(Time now) {
-    switch (mode_) {
-      case Mode::kGoes:
-        return go(now);
-      case Mode::kRests:
-        return rest(now, {Status::kPaused});
-      case Mode::kEnds:
-        return rest(now, {Status::kFailed, "cancelled"});
-      case Mode::kHalts:
-        return halted(now);
-    }
-    return {Status::kFailed, "unreachable"};
-  }
-
-  void stop(Time now, Mode mode) {
-    mode_ = mode;
-    stands_.reset();
-    brake(now);
-    standstill_.expect(now);
-  }
-  void brake(Time now) {
-    if (chassis_.wheels.operational() && now < chassis_.wheels.motion_end()) (void)chassis_.wheels.stop(now);
-  }
-
-  // Stopped on purpose: what is said then, once it stands.
-  Progress rest(Time now, Progress verdict) {
-    if (!stands_) stands_ = standstill_.look(now);
-    if (!stands_) return {};
-    verdict.stop = stands_;
-    return verdict;
-  }
-
-  // Before the command has arrived the cerebellum tells nothing of a stop.
-  Progress halted(Time now) {
-    if (!stands_ && chassis_.wheels.operational()) chassis_.wheels.halt();
-    if (!stands_ && !chassis_.wheels.operational()) stands_ = standstill_.look(now);
-    if (!stands_ && now < halted_at_ + kHaltWithin) return {};
-    Progress progress{Status::kFailed, "halted"};
-    progress.stop = stands_.value_or(task::StopResult::kFailed);
-    return progress;
-  }
-
+  void begin_anew() override { plan_anew(); }
   void plan_anew() {
     phase_ = Phase::kPlans;
     search_.reset();
@@ -116,7 +56,7 @@ class Navigate final : public task::Skill {
     headway_at_.reset();
   }
 
-  Progress go(Time now) {
+  Progress go(Time now) override {
     if (!chassis_.wheels.operational()) {
       plan_anew();
       return {};
@@ -258,23 +198,18 @@ class Navigate final : public task::Skill {
             {"corrections", corrections_}};
   }
 
-  Chassis& chassis_;
   const Pose2 goal_;
   Steer steer_;
-  Standstill standstill_;
-  Mode mode_ = Mode::kGoes;
   Phase phase_ = Phase::kPlans;
   std::optional<WaySearch> search_;
   std::optional<Error> refused_;  // by the last search
   std::uint64_t version_ = 0;     // of the floor when the way was last looked at
   std::optional<Time> renewed_at_, blocked_since_, unsure_since_, headway_at_;
   Pose2 headway_from_;
-  Time halted_at_;
   bool arrives_ = false;
   int corrections_ = 0, detours_ = 0;
   double way_m_ = 0;
   std::vector<task::Note> notes_;
-  std::optional<task::StopResult> stands_;
 };
 
 // What a tree's blackboard has brought about: nobody could review it before.

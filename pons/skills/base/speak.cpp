@@ -74,8 +74,10 @@ task::SkillType speak(task::Speech& speech) {
           }};
 }
 
-void add_base_skills(task::SkillRegistry& registry, Chassis& chassis, task::Speech& speech) {
+void add_base_skills(task::SkillRegistry& registry, Chassis& chassis, task::Speech& speech,
+                     std::function<bool()> wanted) {
   registry.add(navigate(chassis));
+  registry.add(drive(chassis, std::move(wanted)));
   registry.add(scan(chassis));
   registry.add(speak(speech));
   if (chassis.world.base->station("dock") != nullptr) registry.add(dock(chassis));

@@ -24,6 +24,8 @@ constexpr double kBrake = 0.45;        // of the limit, where it slows for the e
 constexpr double kSettles_1_s = 2.5;   // how fast the last of a way, or of an angle, is closed
 constexpr double kSlowest_m_s = 0.12;  // by what is near
 constexpr double kShortestLook_m = 0.12;
+constexpr int kHeldPieces = 15;
+constexpr double kCreeps_m_s = 0.1, kCreeps_rad_s = 0.4;
 constexpr Duration kLook = std::chrono::milliseconds(20);
 
 double clamped(double value, double most) { return std::clamp(value, -most, most); }
@@ -85,6 +87,30 @@ std::optional<Steered> Steer::try_out(const Rolling& start, Time at, const Manne
   steered.wheels.insert(steered.wheels.end(), rest->begin(), rest->end());
   if (!has_room(start, steered.wheels)) return std::nullopt;
   return steered;
+}
+
+std::optional<motion::Trajectory> Steer::hold(const Rolling& start, Time at, const model::Twist2& wished,
+                                              Room room) const {
+  const bool known = room == Room::kKnown;
+  const model::Twist2 most{known ? limits_.ahead_m_s : kCreeps_m_s, known ? limits_.turn_rad_s : kCreeps_rad_s};
+  for (const double share : {1.0, 0.7, 0.4, 0.2, 0.0}) {
+    const model::Twist2 held{share * clamped(wished.ahead, most.ahead), clamped(wished.turn, most.turn)};
+    Thought thought{.pose = start.map_from_base,
+                    .speed = drive_.twist(start.wheels.speed),
+                    .rate = drive_.twist(start.wheels.acceleration)};
+    AxisState wheels = start.wheels;
+    motion::Trajectory trajectory;
+    for (int i = 0; i < kHeldPieces; ++i) {
+      Segment piece{.start = at + i * kPiece, .duration = kPiece};
+      step(thought, held, wheels, piece);
+      trajectory.push_back(piece);
+    }
+    const auto rest = motion::stop(wheels, trajectory.back().end(), wheel_limits_);
+    if (!rest) return std::nullopt;
+    trajectory.insert(trajectory.end(), rest->begin(), rest->end());
+    if (!known || has_room(start, trajectory)) return trajectory;
+  }
+  return std::nullopt;
 }
 
 // Where there is too little room already, it may leave: what counts is that it gets no closer.

@@ -36,6 +36,9 @@ struct Steered {
   bool arrives = false;  // it ends at the goal
 };
 
+// Whether it is known what room there is, which it is where the base knows where it stands.
+enum class Room : std::uint8_t { kKnown, kUnknown };
+
 class Steer {
  public:
   // All must outlive it.
@@ -47,6 +50,10 @@ class Steer {
 
   // The motion from `at` on. Nothing: there is no room for any, not even for turning.
   [[nodiscard]] std::optional<Steered> look_ahead(const Rolling& start, Time at);
+  // Likewise, without a way: brings it to such a speed and turning, or to as much of them as its limits and the room
+  // allow, holds that for a while, and comes to rest. Where the room is unknown it creeps.
+  [[nodiscard]] std::optional<motion::Trajectory> hold(const Rolling& start, Time at, const model::Twist2& wished,
+                                                       Room room) const;
 
  private:
   struct Manner {

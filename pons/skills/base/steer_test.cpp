@@ -167,5 +167,14 @@ TEST_F(Driven, StopsBeforeWhatStandsOnItsWay) {
   EXPECT_GT(end.pose.x, 0.8);
 }
 
+TEST_F(OnTheFloor, HowMuchOfAWayIsLeft) {
+  const Way bent{{0, 0}, {2, 0}, {2, 1}};
+  EXPECT_DOUBLE_EQ(left_along(bent, {0, 0}), 3);
+  EXPECT_DOUBLE_EQ(left_along(bent, {1.5, -0.1}), 0.1 + 1.5);
+  EXPECT_DOUBLE_EQ(left_along(bent, {2, 0.75}), 0.25);
+  EXPECT_DOUBLE_EQ(left_along(bent, {2, 1}), 0);
+  EXPECT_DOUBLE_EQ(left_along({{1, 1}, {1, 1}}, {0, 1}), 1);
+}
+
 }  // namespace
 }  // namespace pons::skills

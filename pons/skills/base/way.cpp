@@ -118,6 +118,21 @@ Way WaySearch::pulled_straight() const {
   return way;
 }
 
+double left_along(const Way& way, const Vector2& here) {
+  double least = (way.back() - here).norm(), left = 0, best = 0;
+  for (std::size_t leg = way.size() - 1; leg > 0; --leg) {
+    const Vector2 along = way[leg] - way[leg - 1];
+    const double share = along.squaredNorm() < 1e-12 ? 1 : (here - way[leg - 1]).dot(along) / along.squaredNorm();
+    const Vector2 nearest = way[leg - 1] + std::clamp(share, 0.0, 1.0) * along;
+    if ((nearest - here).norm() < least) {
+      least = (nearest - here).norm();
+      best = left + (way[leg] - nearest).norm();
+    }
+    left += along.norm();
+  }
+  return least + best;
+}
+
 Error WaySearch::blocked() const {
   const std::string goal = fmt::format("({:.2f}, {:.2f}) m", to_.x(), to_.y());
   const world::Grid& map = floor_.map();

@@ -44,6 +44,9 @@ class WaySearch {
   std::vector<Open> open_;  // a heap
 };
 
+// From `here` to the nearest point of the way, and from there along it to its end, m.
+[[nodiscard]] double left_along(const Way& way, const Vector2& here);
+
 // The least room that the base has along the line.
 [[nodiscard]] double clearance_along(const Floor& floor, const Vector2& from, const Vector2& to);
 
