@@ -146,11 +146,18 @@ bool FaultPlan::any() const {
   return std::ranges::any_of(rates, [](const FaultRate& rate) { return rate.often > 0; });
 }
 
-Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
-  if (named == "none") return FaultPlan{};
+std::optional<fs::path> faults_file(const World& world, const std::string& named) {
+  if (named == "none") return std::nullopt;
   const Plans plans = plans_of(world);
   const auto known = plans.find(named);
-  const fs::path file = known != plans.end() ? known->second : fs::path(named);
+  return known != plans.end() ? known->second : fs::path(named);
+}
+
+Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
+  const auto found = faults_file(world, named);
+  if (!found) return FaultPlan{};
+  const Plans plans = plans_of(world);
+  const fs::path& file = *found;
   std::error_code code;
   if (!fs::is_regular_file(file, code)) {
     std::string names = "none";

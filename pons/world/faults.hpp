@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -56,6 +58,9 @@ struct FaultCounts {
   std::array<std::int64_t, kFaults> of{};
   std::int64_t& operator[](Fault fault) { return of[static_cast<std::size_t>(fault)]; }
 };
+
+// What load_faults would read: `named`'s file, whether or not there is one. Nothing: none is needed.
+[[nodiscard]] std::optional<std::filesystem::path> faults_file(const World& world, const std::string& named);
 
 // `named` is "none", a plan by its name, of the world's folder faults/ or else of the one beside the worlds, or a
 // file's path. Errors name file, line and key as those of world.yaml; no such plan, with the names that exist.

@@ -28,6 +28,12 @@ void read_arms(const YamlValue& value, World& world);
 
 [[nodiscard]] Review read_review(const YamlValue& value);
 
+// Skills that others serve; what they hold must be among the world's resources.
+[[nodiscard]] std::vector<OutsideSkill> read_outside(const YamlValue& value, const std::vector<Resource>& resources);
+
+// How tasks may be asked for in the words of others.
+[[nodiscard]] std::vector<Dialect> read_dialects(const YamlValue& value);
+
 // The robot of a world with a base: its two wheels. No tool, no flange, no capsules.
 [[nodiscard]] Robot read_wheels(const YamlValue& value, const std::filesystem::path& folder);
 

@@ -225,11 +225,13 @@ void read_common(const YamlMap& map, World& world) {
   world.resources = read_resources(map["resources"]);
   if (map.has("schedule")) world.schedule = read_schedule(map["schedule"]);
   if (map.has("review")) world.review = read_review(map["review"]);
+  if (map.has("dialects")) world.dialects = read_dialects(map["dialects"]);
+  if (map.has("skills")) world.outside_skills = read_outside(map["skills"], world.resources);
 }
 
 World read_rounds(const YamlValue& file, World world) {
   const YamlMap map(file, {"scene_mjcf", "physics_step_s", "robot", "base", "map", "lidars", "stations", "resources"},
-                    {"schedule", "review", "tasks"});
+                    {"schedule", "review", "dialects", "skills", "tasks"});
   read_common(map, world);
   world.robot = read_wheels(map["robot"], world.folder);
   world.base = read_base(map["base"], world.robot);
@@ -257,7 +259,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   }
   const YamlMap map(
       file, {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "review", "zones", "arms", "fallback"});
+      {"schedule", "review", "dialects", "skills", "zones", "arms", "fallback"});
   read_common(map, world);
   const Arms arms = map.has("arms") ? Arms::kSeveral : Arms::kOne;
   world.robot = read_robot(map["robot"], folder, arms);
@@ -269,6 +271,8 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   if (map.has("fallback")) world.fallback = read_fallback(map["fallback"]);
   world.rules = read_rules(map["rules"], world.robot);
   world.arrivals = read_arrivals(map["arrivals"], world.rules);
+  if (arms == Arms::kSeveral && !world.outside_skills.empty())
+    map["skills"].refuse("are served in real time, and several arms run in virtual time", "leave them out");
   if (arms == Arms::kSeveral) read_arms(map["arms"], world);
   return world;
 }

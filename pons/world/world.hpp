@@ -17,7 +17,9 @@
 #include "pons/core/pose.hpp"
 #include "pons/core/pose2.hpp"
 #include "pons/core/time.hpp"
+#include "pons/world/dialect.hpp"
 #include "pons/world/grid.hpp"
+#include "pons/world/outside.hpp"
 #include "pons/world/review.hpp"
 
 namespace pons::world {
@@ -228,6 +230,8 @@ struct World {
   std::vector<Resource> resources;
   Schedule schedule;
   Review review;
+  std::vector<OutsideSkill> outside_skills;  // that nodes of others serve
+  std::vector<Dialect> dialects;             // over ROS 2; each kind once
   Fallback fallback;
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;

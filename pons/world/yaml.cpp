@@ -166,6 +166,20 @@ std::vector<YamlValue> YamlValue::list(std::size_t shortest, std::size_t longest
   return values;
 }
 
+std::vector<std::pair<std::string, YamlValue>> YamlValue::members(std::size_t most) const {
+  if (!node_.IsMap()) refuse("is not a mapping", "write NAME: VALUE, a line each");
+  if (node_.size() > most) refuse(fmt::format("has {} entries", node_.size()), fmt::format("write at most {}", most));
+  std::vector<std::pair<std::string, YamlValue>> values;
+  std::set<std::string> seen;
+  for (const auto& entry : node_) {
+    const std::string key = YamlValue(file_, entry.first, key_).scalar("a key");
+    YamlValue value(file_, entry.second, key_.empty() ? printable(key) : key_ + "." + printable(key));
+    if (!seen.insert(key).second) value.refuse("the key is there twice", "keep one of them");
+    values.emplace_back(key, std::move(value));
+  }
+  return values;
+}
+
 Vector3 YamlValue::vector(double reach) const {
   Vector3 vector = Vector3::Zero();
   const auto values = list(3, 3);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pons/core/axes.hpp"
@@ -37,6 +38,8 @@ class YamlValue {
   // 1 to 64 of a–z, 0–9 and _.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::vector<YamlValue> list(std::size_t shortest, std::size_t longest) const;
+  // Of a mapping with any keys, each there once.
+  [[nodiscard]] std::vector<std::pair<std::string, YamlValue>> members(std::size_t most) const;
   // Each component in [-reach, reach].
   [[nodiscard]] Vector3 vector(double reach) const;
   // `count` numbers, each in [low, high]; count 0 takes any length up to kMaxAxes.
