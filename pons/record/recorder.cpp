@@ -26,10 +26,10 @@ Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {
     return fail("the queue is too small", name, fmt::format("give it {} bytes or more", kLeastQueue));
   if (options.quota_bytes && *options.quota_bytes / 2 < options.file_bytes)
     return fail("the quota is less than two files'", name, "raise it, or make the files smaller");
-  auto rotation = Rotation::open(options.folder, name);
+  auto rotation = Rotation::open(options.folder, name, options.first);
   if (!rotation) return std::unexpected(rotation.error());
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(*rotation)));
-  if (auto begun = recorder->begin_file(); !begun) return std::unexpected(begun.error());
+  if (auto begun = recorder->begin_file(0); !begun) return std::unexpected(begun.error());
   return recorder;
 }
 
@@ -91,6 +91,14 @@ bool Recorder::attach(mcap::Attachment attachment) {
   return true;
 }
 
+bool Recorder::note(mcap::Metadata metadata) {
+  const std::scoped_lock lock(mutex_);
+  if (closed_) return false;
+  notes_.push_back(std::move(metadata));
+  if (std::exchange(idle_, false)) more_.notify_one();
+  return true;
+}
+
 void Recorder::advance(Timestamp now) {
   const std::scoped_lock lock(mutex_);
   now_ = std::max(now_, now);
@@ -118,7 +126,9 @@ void Recorder::work() {
   while (true) {
     if (work_off()) continue;
     std::unique_lock lock(mutex_);
-    const auto something = [&] { return halves_[filling_].used > 0 || !attachments_.empty() || advanced_; };
+    const auto something = [&] {
+      return halves_[filling_].used > 0 || !attachments_.empty() || !notes_.empty() || advanced_;
+    };
     if (closed_ && !something()) break;
     idle_ = true;
     more_.wait(lock, [&] { return closed_ || something(); });
@@ -131,13 +141,14 @@ bool Recorder::work_off() {
   std::unique_lock lock(mutex_);
   const bool advanced = std::exchange(advanced_, false);
   Half& half = halves_[filling_];
-  if (half.used == 0 && attachments_.empty() && !advanced) return false;
+  if (half.used == 0 && attachments_.empty() && notes_.empty() && !advanced) return false;
   filling_ = 1 - filling_;
   for (std::size_t i = known_.size(); i < topics_.size(); ++i) {
     known_.push_back(topics_[i]);
     words_ += topics_[i].name.size() + kCountInWords;
   }
   const auto attachments = std::exchange(attachments_, {});
+  const auto notes = std::exchange(notes_, {});
   attachment_bytes_ = 0;
   const Timestamp now = now_;
   lock.unlock();
@@ -150,6 +161,7 @@ bool Recorder::work_off() {
     half.copying.wait(copying);
   write_half(half);
   for (const mcap::Attachment& each : attachments) write_attachment(each);
+  for (const mcap::Metadata& each : notes) write_note(each, now);
   if (writer_ && writer_->oldest_waiting() &&
       *writer_->oldest_waiting() + static_cast<Timestamp>(options_.writer.chunk_span.count()) <= now) {
     if (auto flushed = writer_->flush(); !flushed) failed(flushed.error(), now);
@@ -167,7 +179,7 @@ bool Recorder::work_off() {
 void Recorder::write_attachment(const mcap::Attachment& attachment) {
   if (writer_ && is_full(attachment.data.size() + attachment.name.size() + attachment.media_type.size() + 128)) {
     end_file();
-    if (auto begun = begin_file(); !begun) failed(begun.error(), attachment.log_time);
+    if (auto begun = begin_file(attachment.log_time); !begun) failed(begun.error(), attachment.log_time);
   }
   const bool had_file = writer_ != nullptr;
   const auto attached = had_file ? writer_->attach(attachment) : Expected<void>{};
@@ -177,11 +189,19 @@ void Recorder::write_attachment(const mcap::Attachment& attachment) {
   ++status_.lost_attachments;
 }
 
+// A few words: they may make a file a little longer than it was to be.
+void Recorder::write_note(const mcap::Metadata& metadata, Timestamp now) {
+  if (!writer_) return;
+  if (auto noted = writer_->note(metadata); !noted) failed(noted.error(), now);
+}
+
 void Recorder::write_half(Half& half) {
   for (std::size_t at = 0; at < half.used;) {
     Item item;
     std::memcpy(&item, half.room.get() + at, sizeof item);
-    write_one(item, {half.room.get() + at + sizeof item, item.size});
+    const std::span<const std::byte> data(half.room.get() + at + sizeof item, item.size);
+    write_one(item, data);
+    if (known_[item.topic].latched) newest_[item.topic] = {item, {data.begin(), data.end()}};
     at += sizeof item + aligned(item.size);
   }
 }
@@ -189,7 +209,7 @@ void Recorder::write_half(Half& half) {
 void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
   if (!writer_) {
     if (retry_at_ && item.log_time < *retry_at_) return lose(item.topic, 1);
-    if (auto begun = begin_file(); !begun) {
+    if (auto begun = begin_file(item.log_time); !begun) {
       failed(begun.error(), item.log_time);
       return lose(item.topic, 1);
     }
@@ -197,7 +217,7 @@ void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
   auto channel = channel_of(item.topic);
   if (channel && is_full(data.size())) {
     end_file();
-    const auto begun = begin_file();
+    const auto begun = begin_file(item.log_time);
     channel = begun ? channel_of(item.topic) : std::unexpected(begun.error());
   }
   if (!channel) {
@@ -209,7 +229,7 @@ void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
   if (!done) failed(done.error(), item.log_time);
 }
 
-Expected<void> Recorder::begin_file() {
+Expected<void> Recorder::begin_file(Timestamp now) {
   if (options_.quota_bytes) {
     auto room = rotation_.make_room(options_.file_bytes, *options_.quota_bytes);
     if (!room) return room;
@@ -223,9 +243,22 @@ Expected<void> Recorder::begin_file() {
   schemas_.clear();
   in_file_.assign(known_.size(), {});
   retry_at_.reset();
+  if (auto repeated = repeat_latched(now); !repeated) return repeated;
   const std::scoped_lock lock(mutex_);
   ++status_.files;
+  status_.file = writer_->path();
   status_.failing = false;
+  return {};
+}
+
+Expected<void> Recorder::repeat_latched(Timestamp now) {
+  for (const auto& [topic, newest] : newest_) {
+    const auto channel = channel_of(topic);
+    if (!channel) return std::unexpected(channel.error());
+    ++in_file_[topic].repeated;
+    const mcap::Message message{*channel, newest.item.sequence, now, newest.item.publish_time, newest.data};
+    if (auto done = writer_->write(message); !done) return done;
+  }
   return {};
 }
 
@@ -283,7 +316,8 @@ void Recorder::end_file() {
   for (std::size_t i = 0; i < in_file_.size(); ++i) {
     const auto written = counts.find(in_file_[i].channel);
     const std::uint64_t held = in_file_[i].channel == 0 || written == counts.end() ? 0 : written->second;
-    if (in_file_[i].handed > held) lose(static_cast<TopicId>(i), in_file_[i].handed - held);
+    const auto& [channel, handed, repeated] = in_file_[i];
+    if (handed + repeated > held) lose(static_cast<TopicId>(i), std::min(handed, handed + repeated - held));
   }
   if (ended) told_before_ = told_;
   rotation_.add(writer_->path(), writer_->bytes());

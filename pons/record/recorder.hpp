@@ -37,6 +37,7 @@ inline constexpr std::string_view kDropsName = "pons.drops";
 struct RecorderOptions {
   std::filesystem::path folder;
   std::string name;                                  // of NAME_0.mcap, NAME_1.mcap, …
+  FirstFile first = FirstFile::kNumbered;            // kPlain: of NAME.mcap, NAME_1.mcap, …
   std::size_t queue_bytes = std::size_t{64} << 20U;  // taken at once; half of it fills while the other half is written
   std::uint64_t file_bytes = std::uint64_t{1} << 30U;  // at most, but for a single message that is longer
   std::optional<std::uint64_t> quota_bytes;            // of all files of that name; the oldest are removed
@@ -50,6 +51,9 @@ struct Topic {
   std::string name, type;
   std::string schema_encoding, schema, message_encoding;
   mcap::Texts metadata;
+  // Its newest message stands at the beginning of each later file, too, with the log time at which that begins, and its
+  // own publish time and number: who has only that file must know it.
+  bool latched = false;
 };
 
 // As rosbag2 would have it.
@@ -60,7 +64,8 @@ template <wire::Message T>
               "ros2msg",
               wire::ros2msg_schema<T>(),
               "cdr",
-              {{"offered_qos_profiles", offered_qos_profiles(qos)}}};
+              {{"offered_qos_profiles", offered_qos_profiles(qos)}},
+              qos.durability == Durability::kTransientLocal && qos.depth == 1};
   // Of a package's other form the hash has our name in it.
   if (topic.type == T::kName) topic.metadata.emplace("topic_type_hash", T::kHash);
   return topic;
@@ -77,6 +82,7 @@ struct TopicStatus {
 struct RecorderStatus {
   std::vector<TopicStatus> topics;                  // by TopicId
   std::uint64_t files = 0, bytes = 0, removed = 0;  // files begun; bytes of them all now; files that the quota took
+  std::filesystem::path file;                       // begun last
   std::optional<Error> error;                       // the last one; it may be over
   bool failing = false;                             // nothing is recorded now
   std::uint64_t lost_attachments = 0;
@@ -108,6 +114,8 @@ class Recorder {
   }
   // Into the file that is being written. False: the queue is full.
   bool attach(mcap::Attachment attachment);
+  // Likewise, behind what was recorded before. False: close() was called.
+  bool note(mcap::Metadata metadata);
   // Log time has come so far though nothing is to be recorded: what waits longer than a chunk may is written.
   void advance(mcap::Timestamp now);
   // Nothing will come any more: what does is dropped.
@@ -146,6 +154,12 @@ class Recorder {
   struct InFile {
     std::uint16_t channel = 0;  // 0: none yet
     std::uint64_t handed = 0;
+    std::uint64_t repeated = 0;  // of latched topics, from earlier files
+  };
+  // Of a latched topic.
+  struct Newest {
+    Item item;
+    std::vector<std::byte> data;
   };
 
   explicit Recorder(RecorderOptions options, Rotation rotation);
@@ -155,8 +169,10 @@ class Recorder {
   // The writing thread's.
   void write_half(Half& half);
   void write_one(const Item& item, std::span<const std::byte> data);
-  [[nodiscard]] Expected<void> begin_file();
+  [[nodiscard]] Expected<void> begin_file(mcap::Timestamp now);
+  [[nodiscard]] Expected<void> repeat_latched(mcap::Timestamp now);
   void write_attachment(const mcap::Attachment& attachment);
+  void write_note(const mcap::Metadata& metadata, mcap::Timestamp now);
   // With so many bytes more.
   [[nodiscard]] bool is_full(std::size_t size) const;
   [[nodiscard]] Expected<std::uint16_t> channel_of(TopicId topic);
@@ -177,6 +193,7 @@ class Recorder {
   std::vector<Counts> counts_;  // by TopicId
   std::vector<mcap::Attachment> attachments_;
   std::size_t attachment_bytes_ = 0;
+  std::vector<mcap::Metadata> notes_;
   mcap::Timestamp now_ = 0;
   bool advanced_ = false, closed_ = false, idle_ = false;
   RecorderStatus status_;
@@ -186,6 +203,7 @@ class Recorder {
   std::unique_ptr<McapWriter> writer_;
   std::vector<Topic> known_;  // topics_, as it was last seen
   std::vector<InFile> in_file_;
+  std::map<TopicId, Newest> newest_;
   std::size_t words_ = 64;  // how long what a file says of drops may become
   std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;  // of the file, by type and text
   std::vector<std::uint64_t> told_before_;  // drops that earlier files tell of, by TopicId

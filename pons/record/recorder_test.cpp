@@ -204,6 +204,62 @@ TEST_F(RecorderTest, NothingIsLostFromOneFileToTheNext) {
   for (const auto& path : files()) EXPECT_EQ((*McapReader::open(path))->contents().metadata.at(0).name, "pons.run");
 }
 
+// Who has only the last file knows what was said once.
+TEST_F(RecorderTest, WhatIsLatchedIsSaidAgainInEachFile) {
+  RecorderOptions told = options();
+  told.file_bytes = 10'000;
+  auto recorder = Recorder::open(told);
+  ASSERT_TRUE(recorder);
+  Topic standing = plain("/standing");
+  standing.latched = true;
+  const auto said = (*recorder)->add_topic(standing), other = (*recorder)->add_topic(plain("/other"));
+  for (const char* words : {"older", "newest"}) {
+    ASSERT_TRUE((*recorder)->record(said, 7, 3, bytes_of(words)));
+    EXPECT_TRUE((*recorder)->work_off());
+  }
+  for (std::uint32_t i = 10; i < 60; ++i) {
+    ASSERT_TRUE((*recorder)->record(other, i, i, bytes_of(std::string(500, 'x'))));
+    EXPECT_TRUE((*recorder)->work_off());
+  }
+  finish(**recorder);
+  ASSERT_GT(files().size(), 2U);
+  for (std::size_t i = 1; i < files().size(); ++i) {
+    const auto kept = read_all(**McapReader::open(files()[i])).messages;
+    ASSERT_GE(kept.size(), 2U);
+    EXPECT_EQ(kept[0], (Kept{"/standing", 1, kept[1].log_time, 3, "newest"}));
+    EXPECT_GE(kept[1].log_time, 10U);
+  }
+  EXPECT_EQ((*recorder)->status().topics.at(said).offered, 2U);
+  EXPECT_EQ((*recorder)->status().topics.at(said).dropped, 0U);
+}
+
+TEST_F(RecorderTest, TheFirstFileMayHaveThePlainName) {
+  RecorderOptions told = options();
+  told.first = FirstFile::kPlain;
+  for (const char* name : {"run.mcap", "run_1.mcap", "run_2.mcap"}) {
+    EXPECT_TRUE(Rotation::open(folder_.path(), "run", told.first)->empty() == (std::string(name) == "run.mcap"));
+    auto recorder = Recorder::open(told);
+    ASSERT_TRUE(recorder) << recorder.error().line();
+    EXPECT_EQ((*recorder)->status().file, folder_ / name);
+    finish(**recorder);
+    EXPECT_TRUE(std::filesystem::exists(folder_ / name));
+  }
+}
+
+TEST_F(RecorderTest, ANoteStandsBehindWhatWasRecorded) {
+  auto recorder = Recorder::open(options());
+  ASSERT_TRUE(recorder);
+  EXPECT_TRUE((*recorder)->note({"pons.end", {{"how", "complete"}}}));
+  finish(**recorder);
+  EXPECT_FALSE((*recorder)->note({"pons.end", {}})) << "it is closed";
+  const auto reader = McapReader::open(folder_ / "run_0.mcap");
+  ASSERT_TRUE(reader);
+  ASSERT_THAT((*reader)->contents().metadata, SizeIs(1));
+  const auto note = (*reader)->metadata((*reader)->contents().metadata[0]);
+  ASSERT_TRUE(note);
+  EXPECT_EQ(note->texts, (mcap::Texts{{"how", "complete"}}));
+}
+
 TEST_F(RecorderTest, ALaterRunGoesOnCounting) {
   for (int i = 0; i < 2; ++i) {
     auto recorder = Recorder::open(options());

@@ -18,10 +18,11 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kEnding = ".mcap";
 
-// Of "NAME_12.mcap" 12.
-std::optional<std::uint64_t> number_of(std::string_view file, std::string_view name) {
+// Of "NAME_12.mcap" 12; of "NAME.mcap" 0, where the first is called so.
+std::optional<std::uint64_t> number_of(std::string_view file, std::string_view name, FirstFile first) {
   if (!file.starts_with(name) || !file.ends_with(kEnding)) return std::nullopt;
   file.remove_suffix(kEnding.size());
+  if (first == FirstFile::kPlain && file == name) return 0;
   if (file.size() < name.size() + 2 || file[name.size()] != '_') return std::nullopt;
   file.remove_prefix(name.size() + 1);
   std::uint64_t number = 0;
@@ -32,15 +33,15 @@ std::optional<std::uint64_t> number_of(std::string_view file, std::string_view n
 
 }  // namespace
 
-Expected<Rotation> Rotation::open(const fs::path& folder, const std::string& name) {
+Expected<Rotation> Rotation::open(const fs::path& folder, const std::string& name, FirstFile first) {
   if (name.empty() || name.find('/') != std::string::npos)
     return fail("no name for a recording", name, "give it one that can be a part of a file's");
-  Rotation rotation(folder.empty() ? fs::path(".") : folder, name);
+  Rotation rotation(folder.empty() ? fs::path(".") : folder, name, first);
   std::error_code error;
   std::map<std::uint64_t, File> found;
   for (fs::directory_iterator each(rotation.folder_, error), end; !error && each != end; each.increment(error)) {
     std::error_code vanished;
-    const auto number = number_of(each->path().filename().string(), name);
+    const auto number = number_of(each->path().filename().string(), name, first);
     const std::uint64_t size = number ? fs::file_size(each->path(), vanished) : 0;
     if (number && !vanished) found.emplace(*number, File{each->path(), size});
   }
@@ -54,7 +55,11 @@ Expected<Rotation> Rotation::open(const fs::path& folder, const std::string& nam
   return rotation;
 }
 
-fs::path Rotation::next_path() { return folder_ / fmt::format("{}_{}{}", name_, next_++, kEnding); }
+fs::path Rotation::next_path() {
+  const std::uint64_t number = next_++;
+  if (number == 0 && first_ == FirstFile::kPlain) return folder_ / fmt::format("{}{}", name_, kEnding);
+  return folder_ / fmt::format("{}_{}{}", name_, number, kEnding);
+}
 
 void Rotation::add(const fs::path& path, std::uint64_t bytes) {
   files_.push_back({path, bytes});

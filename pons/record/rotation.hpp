@@ -1,5 +1,5 @@
-// The files of one recording: NAME_0.mcap, NAME_1.mcap, and so on, in one folder; the oldest go when they take too much
-// room together. One thread at a time; blocks on the disk.
+// The files of one recording: NAME_0.mcap, or NAME.mcap where it is to be so, then NAME_1.mcap and so on, in one
+// folder; the oldest go when they take too much room together. One thread at a time; blocks on the disk.
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,15 @@
 
 namespace pons::record {
 
+// The name of the first.
+enum class FirstFile : std::uint8_t { kNumbered, kPlain };
+
 class Rotation {
  public:
   // Finds the files of that name that are there; new ones follow them. Errors: the folder is missing or cannot be read;
   // `name` is empty or no file name.
-  [[nodiscard]] static Expected<Rotation> open(const std::filesystem::path& folder, const std::string& name);
+  [[nodiscard]] static Expected<Rotation> open(const std::filesystem::path& folder, const std::string& name,
+                                               FirstFile first = FirstFile::kNumbered);
 
   // For a new file.
   [[nodiscard]] std::filesystem::path next_path();
@@ -25,6 +29,7 @@ class Rotation {
   // Removes the oldest until they and `needed` bytes more take no more than `quota`. Errors: one cannot be removed.
   [[nodiscard]] Expected<void> make_room(std::uint64_t needed, std::uint64_t quota);
 
+  [[nodiscard]] bool empty() const { return files_.empty(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t removed() const { return removed_; }  // files
 
@@ -34,10 +39,12 @@ class Rotation {
     std::uint64_t bytes = 0;
   };
 
-  Rotation(std::filesystem::path folder, std::string name) : folder_(std::move(folder)), name_(std::move(name)) {}
+  Rotation(std::filesystem::path folder, std::string name, FirstFile first)
+      : folder_(std::move(folder)), name_(std::move(name)), first_(first) {}
 
   std::filesystem::path folder_;
   std::string name_;
+  FirstFile first_;
   std::deque<File> files_;  // oldest first
   std::uint64_t next_ = 0, bytes_ = 0, removed_ = 0;
 };
