@@ -24,7 +24,8 @@ constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
     "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "approve",
-                    "observe", "chunk", "health", "robot", "stop", "emergency_stop", "reset", "arm"]},
+                    "observe", "chunk", "health", "base", "drive", "robot", "stop", "emergency_stop", "reset", "arm", "rest",
+                    "go_on", "end"]},
     "task": {"type": "object"},
     "tasks": {"type": "array", "items": {"type": "object"}},
     "which": {"enum": ["open", "ended"]},
@@ -38,7 +39,9 @@ constexpr std::string_view kSchema = R"({
     "observed": {"type": "number", "minimum": 0, "maximum": 1000000000},
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
     "actions": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
-    "last": {"type": "boolean"}
+    "last": {"type": "boolean"},
+    "ahead_m_s": {"type": "number", "minimum": -100, "maximum": 100},
+    "turn_rad_s": {"type": "number", "minimum": -100, "maximum": 100}
   }
 })";
 
@@ -46,7 +49,8 @@ constexpr std::string_view kSchema = R"({
 const std::map<std::string, Operation, std::less<>> kBare = {
     {"observe", Operation::kObserve}, {"health", Operation::kHealth}, {"robot", Operation::kRobot},
     {"stop", Operation::kStop},       {"reset", Operation::kReset},   {"emergency_stop", Operation::kEmergencyStop},
-    {"arm", Operation::kArm},
+    {"arm", Operation::kArm},         {"rest", Operation::kRest},     {"go_on", Operation::kGoOn},
+    {"end", Operation::kEnd},         {"base", Operation::kBase},
 };
 
 const Schema& schema() {
@@ -75,13 +79,16 @@ const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
     {"observed", {"chunk"}},
     {"period_ms", {"chunk"}},
     {"actions", {"chunk"}},
-    {"last", {"chunk"}}};
+    {"last", {"chunk"}},
+    {"ahead_m_s", {"drive"}},
+    {"turn_rad_s", {"drive"}}};
 constexpr std::array<std::string_view, 7> kOptional = {"task", "tasks", "after", "which", "limit", "reason", "last"};
 
 Expected<void> check_members(const Json& json, std::string_view operation) {
   for (const auto& [member, belongs_to] : kMembers) {
     const bool belongs = std::ranges::find(belongs_to, operation) != belongs_to.end();
-    const bool needed = belongs && std::ranges::find(kOptional, member) == kOptional.end();
+    const bool all_tasks = member == "id" && operation == "watch";
+    const bool needed = belongs && !all_tasks && std::ranges::find(kOptional, member) == kOptional.end();
     if (json.contains(member) ? belongs : !needed) continue;
     return fail(fmt::format("'{}' {}", member, needed ? "is missing" : "does not belong there"),
                 fmt::format("/{}", member), fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
@@ -124,7 +131,7 @@ Expected<Asked> asked_from(std::string_view text) {
   if (operation == "submit") return submitted(*json);
   if (const auto of_task = kOfTask.find(operation); of_task != kOfTask.end()) {
     return Asked{.operation = of_task->second,
-                 .task = json->at("id").get<std::string>(),
+                 .task = json->value("id", std::string{}),
                  .reason = json->value("reason", std::string{}),
                  .tier = json->value("tier", std::string{}),
                  .by = json->value("by", std::string{}),
@@ -137,7 +144,19 @@ Expected<Asked> asked_from(std::string_view text) {
                  .limit = json->value("limit", kListed)};
   }
   if (operation == "chunk") return chunk_from(*json);
+  if (operation == "drive") {
+    return Asked{.operation = Operation::kDrive,
+                 .ahead_m_s = json->at("ahead_m_s").get<double>(),
+                 .turn_rad_s = json->at("turn_rad_s").get<double>()};
+  }
   return Asked{.operation = kBare.at(operation)};
+}
+
+bool asks_to_stop(std::string_view text) {
+  constexpr std::size_t kLongest = 256;  // of what is looked at: a stop has nothing beside its name
+  if (text.size() > kLongest) return false;
+  const auto asked = asked_from(text);
+  return asked && (asked->operation == Operation::kStop || asked->operation == Operation::kEmergencyStop);
 }
 
 std::optional<std::string> submission_in(std::string_view text) {

@@ -29,6 +29,10 @@ TEST(AskedFrom, ReadsEachQuestion) {
   EXPECT_EQ(watch->operation, Operation::kWatch);
   EXPECT_EQ(watch->after, 117);
   EXPECT_EQ(asked_from(R"({"op":"watch","id":"a"})")->after, 0);
+  const auto all = asked_from(R"({"op":"watch","after":117})");
+  ASSERT_TRUE(all) << all.error().line();
+  EXPECT_EQ(all->operation, Operation::kWatch);
+  EXPECT_EQ(all->task, "");
   const auto pause = asked_from(R"({"op":"pause","id":"a","reason":"lunch"})");
   EXPECT_EQ(pause->operation, Operation::kPause);
   EXPECT_EQ(pause->task, "a");
@@ -38,11 +42,26 @@ TEST(AskedFrom, ReadsEachQuestion) {
   EXPECT_EQ(asked_from(R"({"op":"halt","id":"a","reason":""})")->operation, Operation::kHalt);
   EXPECT_EQ(asked_from(R"({"op":"robot"})")->operation, Operation::kRobot);
   EXPECT_EQ(asked_from(R"({"op":"health"})")->operation, Operation::kHealth);
+  EXPECT_EQ(asked_from(R"({"op":"base"})")->operation, Operation::kBase);
   EXPECT_EQ(asked_from(R"({"op":"stop"})")->operation, Operation::kStop);
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);
   EXPECT_EQ(asked_from(R"({"op":"reset"})")->operation, Operation::kReset);
   EXPECT_EQ(asked_from(R"({"op":"arm"})")->operation, Operation::kArm);
+  EXPECT_EQ(asked_from(R"({"op":"rest"})")->operation, Operation::kRest);
+  EXPECT_EQ(asked_from(R"({"op":"go_on"})")->operation, Operation::kGoOn);
+  EXPECT_EQ(asked_from(R"({"op":"end"})")->operation, Operation::kEnd);
   EXPECT_EQ(asked_from(R"({"op":"observe"})")->operation, Operation::kObserve);
+}
+
+TEST(AskedFrom, ReadsHowToDrive) {
+  const auto asked = asked_from(R"({"op":"drive","ahead_m_s":0.25,"turn_rad_s":-1})");
+  ASSERT_TRUE(asked) << asked.error().line();
+  EXPECT_EQ(asked->operation, Operation::kDrive);
+  EXPECT_EQ(asked->ahead_m_s, 0.25);
+  EXPECT_EQ(asked->turn_rad_s, -1);
+  EXPECT_EQ(asked_from(R"({"op":"drive","ahead_m_s":0})").error().where, "/turn_rad_s");
+  EXPECT_EQ(asked_from(R"({"op":"drive","ahead_m_s":1e9,"turn_rad_s":0})").error().where, "/ahead_m_s");
+  EXPECT_FALSE(asked_from(R"({"op":"stop","ahead_m_s":0})"));
 }
 
 TEST(AskedFrom, ReadsAChunk) {
@@ -101,6 +120,14 @@ TEST(AskedFrom, RefusesEverythingElse) {
     EXPECT_EQ(refusal(asked.error()).at("ok"), false);
     EXPECT_EQ(refusal(asked.error()).at("error"), asked.error().line());
   }
+}
+
+TEST(AsksToStop, KnowsBothStopsAndNothingElse) {
+  for (const char* text : {R"({"op":"stop"})", R"( {"op" : "emergency_stop"} )"})
+    EXPECT_TRUE(asks_to_stop(text)) << text;
+  for (const char* text :
+       {"", "stop", R"({"op":"reset"})", R"({"op":"stop","id":"a"})", R"({"op":"cancel","id":"stop"})"})
+    EXPECT_FALSE(asks_to_stop(text)) << text;
 }
 
 TEST(SubmissionIn, TellsWhatWasToBeATaskFromQuestions) {

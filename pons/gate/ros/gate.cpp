@@ -24,9 +24,7 @@ Expected<std::unique_ptr<Gate>> Gate::open(const NodeSettings& settings) {
 Gate::Gate(std::unique_ptr<Node> node) : node_(std::move(node)) { answers_->node = node_.get(); }
 
 Gate::~Gate() {
-  stop_ = true;
-  node_->wake();
-  if (thread_.joinable()) thread_.join();
+  stop();
   const std::scoped_lock lock(answers_->mutex);
   answers_->node = nullptr;
 }
@@ -35,10 +33,17 @@ void Gate::start() {
   thread_ = std::thread([this] { run(); });
 }
 
+void Gate::stop() {
+  stop_ = true;
+  node_->wake();
+  if (thread_.joinable()) thread_.join();
+}
+
 void Gate::run() {
   while (!stop_) {
     node_->spin_for(kLooksAtLeast);
     take_answers();
+    look_who_hears();
     write_all();
     auto lines = node_->take_warnings();
     const std::scoped_lock lock(mutex_);
@@ -52,6 +57,7 @@ Expected<std::size_t> Gate::add_topic(std::string_view topic, std::string_view t
   auto writer = node_->add_writer(topic, Use::kTopic, type, hash, qos);
   if (!writer) return std::unexpected(writer.error());
   writers_.push_back(std::move(*writer));
+  wanted_.emplace_back(false);
   return writers_.size() - 1;
 }
 
@@ -79,11 +85,16 @@ void Gate::write_all() {
     if (!writers_[writer]->write(bytes)) ++dropped_;
 }
 
-void Gate::ask(std::string request, std::function<void(const Json&)> answered) {
+void Gate::look_who_hears() {
+  for (std::size_t topic = 0; topic < writers_.size(); ++topic) wanted_[topic] = !writers_[topic]->matched().empty();
+}
+
+void Gate::put_question(Asked asked, std::function<void(const Json&)> answered, Urgency urgency) {
   {
     const std::scoped_lock lock(mutex_);
-    if (asked_.size() < kAskedMost) {
-      asked_.push_back({std::move(request), ++numbers_});
+    if (asked_.size() < kAskedMost + (urgency == Urgency::kUrgent ? kUrgentMost : 0)) {
+      asked.number = ++numbers_;
+      asked_.push_back(std::move(asked));
       open_.emplace_back(numbers_, std::move(answered));
       return;
     }
@@ -99,12 +110,14 @@ std::vector<Request> Gate::poll() {
   }
   std::vector<Request> requests;
   for (Asked& each : asked) {
-    requests.push_back({std::move(each.text), [answers = answers_, number = each.number](const Json& answer) {
+    requests.push_back({std::move(each.text),
+                        [answers = answers_, number = each.number](const Json& answer) {
                           const std::scoped_lock lock(answers->mutex);
                           if (answers->node == nullptr) return;
                           answers->came.emplace_back(number, answer);
                           answers->node->wake();
-                        }});
+                        },
+                        std::move(each.refused)});
   }
   return requests;
 }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -61,12 +62,17 @@ class Gate final : public Visitors {
   // What it is told to do is done on its thread from start() on.
   [[nodiscard]] Node& node() { return *node_; }
   void start();
+  // Ends that thread: what its node was told to do is done no more. Likewise.
+  void stop();
 
   // ---- on any thread ----
 
   // Leaves a message, CDR with its encapsulation, to the node's thread. Waits for nothing; what finds no room is
   // dropped and counted.
   void put(std::size_t topic, std::vector<std::byte> message);
+
+  // Whether anybody hears that topic, as of a moment ago.
+  [[nodiscard]] bool wanted(std::size_t topic) const { return wanted_[topic]; }
 
   // ---- on the thread of whoever answers ----
 
@@ -79,16 +85,27 @@ class Gate final : public Visitors {
 
   // ---- on the node's thread ----
 
+  // What is urgent has room when nothing else has. Ask for so little of it that this is enough.
+  enum class Urgency : std::uint8_t { kAny, kUrgent };
+  static constexpr std::size_t kUrgentMost = 16;  // kAskedMost not counted
+
   // `answered` is called on the node's thread, once, unless whoever polls goes without answering.
-  void ask(const Json& request, std::function<void(const Json&)> answered) {
-    ask(dump_line(request), std::move(answered));
+  void ask(const Json& request, std::function<void(const Json&)> answered, Urgency urgency = Urgency::kAny) {
+    ask(dump_line(request), std::move(answered), urgency);
   }
-  void ask(std::string request, std::function<void(const Json&)> answered);
+  void ask(std::string request, std::function<void(const Json&)> answered, Urgency urgency = Urgency::kAny) {
+    put_question({std::move(request), std::nullopt}, std::move(answered), urgency);
+  }
+  // For what came and cannot be asked, so that whoever answers can write it down: its text, and why. Answered likewise.
+  void refuse(std::string text, Error why, std::function<void(const Json&)> answered) {
+    put_question({std::move(text), std::move(why)}, std::move(answered), Urgency::kAny);
+  }
 
  private:
   struct Asked {
     std::string text;
-    std::uint64_t number;
+    std::optional<Error> refused;
+    std::uint64_t number = 0;
   };
   // What the two sides share; the answers' part may outlive the gate.
   struct Answers {
@@ -100,10 +117,13 @@ class Gate final : public Visitors {
   explicit Gate(std::unique_ptr<Node> node);
   void run();
   void write_all();
+  void look_who_hears();
   void take_answers();
+  void put_question(Asked asked, std::function<void(const Json&)> answered, Urgency urgency);
 
   std::unique_ptr<Node> node_;
   std::vector<std::unique_ptr<Writer>> writers_;
+  std::deque<std::atomic<bool>> wanted_;                                          // a writer; all may ask
   std::vector<std::pair<std::uint64_t, std::function<void(const Json&)>>> open_;  // of the node's thread, as is:
   std::uint64_t numbers_ = 0;
   std::shared_ptr<Answers> answers_ = std::make_shared<Answers>();

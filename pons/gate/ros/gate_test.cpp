@@ -62,6 +62,16 @@ TEST(RosGate, WhatIsAskedIsPolledAndAnsweredAcrossThreads) {
   EXPECT_EQ(Json::parse(replied).at("asked"), (Json{{"op", "robot"}, {"on", true}}));
 }
 
+TEST(RosGate, WhatCannotBeAskedIsPolledWithTheReason) {
+  const auto gate = test_gate();
+  gate->refuse("what came", {"is nonsense", "somewhere", "say something else"}, [](const Json&) {});
+  const std::vector<Request> requests = gate->poll();
+  ASSERT_EQ(requests.size(), 1U);
+  EXPECT_EQ(requests[0].text, "what came");
+  ASSERT_TRUE(requests[0].refused);
+  EXPECT_EQ(requests[0].refused->what, "is nonsense");
+}
+
 TEST(RosGate, AnAnswerMayComeWhenTheGateHasGone) {
   auto gate = test_gate();
   gate->ask(Json{{"op", "robot"}}, [](const Json&) { FAIL() << "nobody is there to hear it"; });
@@ -78,6 +88,47 @@ TEST(RosGate, WhoAsksTooMuchIsRefused) {
     gate->ask(Json{{"op", "robot"}}, [&](const Json& told) { refused = told.at("error"); });
   EXPECT_THAT(refused, ::testing::HasSubstr("1024 requests wait already"));
   EXPECT_EQ(gate->poll().size(), Gate::kAskedMost);
+}
+
+TEST(RosGate, WhatIsUrgentHasRoomWhenNothingElseHas) {
+  const auto gate = test_gate();
+  int refused = 0;
+  const auto count = [&](const Json&) { ++refused; };
+  for (std::size_t i = 0; i < Gate::kAskedMost; ++i) gate->ask(Json{{"op", "robot"}}, count);
+  for (std::size_t i = 0; i < Gate::kUrgentMost; ++i) gate->ask(Json{{"op", "stop"}}, count, Gate::Urgency::kUrgent);
+  EXPECT_EQ(refused, 0);
+  gate->ask(Json{{"op", "robot"}}, count);
+  gate->ask(Json{{"op", "stop"}}, count, Gate::Urgency::kUrgent);
+  EXPECT_EQ(refused, 2);
+}
+
+TEST(RosGate, KnowsWhetherAnybodyHears) {
+  const auto gate = test_gate();
+  const auto topic = gate->add_topic("said", String::kName, String::kHash, kTopicQos);
+  ASSERT_TRUE(topic);
+  gate->start();
+  EXPECT_FALSE(gate->wanted(*topic));
+  {
+    const auto node = test_node("listener");
+    ASSERT_TRUE(node->subscribe<String>("said", kTopicQos, [](const String&) {}));
+    EXPECT_TRUE(spin_until({node.get()}, [&] { return gate->wanted(*topic); }));
+  }
+  const auto other = test_node("another");
+  EXPECT_TRUE(spin_until({other.get()}, [&] { return !gate->wanted(*topic); }));
+}
+
+// As /rosout and /parameter_events have it: more than the library keeps of itself.
+TEST(RosGate, ATopicKeepsAThousandForWhoComesLater) {
+  const auto gate = test_gate();
+  auto outlet = gate->outlet<String>("said", kRosoutQos);
+  ASSERT_TRUE(outlet);
+  gate->start();
+  for (int i = 0; i < 1200; ++i) outlet->put({std::to_string(i)});
+  const auto node = test_node("listener");
+  std::vector<std::string> heard;
+  ASSERT_TRUE(node->subscribe<String>("said", kRosoutQos, [&](const String& text) { heard.push_back(text.data); }));
+  EXPECT_TRUE(spin_until({node.get()}, [&] { return !heard.empty() && heard.back() == "1199"; }));
+  EXPECT_GE(heard.size(), 1000U);
 }
 
 TEST(RosGate, WhatFindsNoRoomIsCounted) {

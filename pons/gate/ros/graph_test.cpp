@@ -133,6 +133,36 @@ TEST(Graph, AnotherTypeIsToldWhoeverCameFirst) {
   }
 }
 
+// They go to a terminal.
+TEST(Graph, WhatOthersCallThingsIsFitForALine) {
+  Graph graph(kNode, kOurs);
+  graph.add_own(kWriter);
+  Heard other = reader("");
+  other.type = "a\nros2: all is well\x1b[2J" + std::string(10'000, 'x');
+  graph.heard(other);
+  const auto lines = graph.take_warnings();
+  ASSERT_THAT(lines, ElementsAre(HasSubstr("a\\x0aros2: all is well\\x1b")));
+  EXPECT_LT(lines[0].size(), 600U);
+}
+
+TEST(Graph, RemembersNoMoreThanAThousandParticipants) {
+  Graph graph(kNode, kOurs);
+  for (std::uint8_t many = 0; many < 5; ++many) {
+    for (std::uint8_t i = 0; i < 250; ++i) {
+      Guid sender = guid(i, 9);
+      sender[10] = 1 + many;
+      ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "one", {}), {sender, 1}));
+    }
+  }
+  EXPECT_EQ(graph.nodes().size(), 1000U);
+  EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("more than 1000 participants")));
+  // Whoever is known is heard further.
+  Guid known = guid(0, 9);
+  known[10] = 1;
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "two", {}), {known, 2}));
+  EXPECT_THAT(graph.nodes(), ::testing::Contains("/two"));
+}
+
 TEST(Graph, QualitiesThatDoNotFitAreNamed) {
   Graph graph(kNode, kOurs);
   graph.add_own(kWriter);

@@ -173,6 +173,10 @@ void fill(const Qos& from, const std::string& user_data, Entity& to) {
                                                                              : dds::VOLATILE_DURABILITY_QOS;
   to.history().kind = from.depth > 0 ? dds::KEEP_LAST_HISTORY_QOS : dds::KEEP_ALL_HISTORY_QOS;
   if (from.depth > 0) to.history().depth = from.depth;
+  // The library refuses a depth that is more than so many, and there is one instance: topics have no keys.
+  auto& room = to.resource_limits();
+  room.max_samples_per_instance = std::max(room.max_samples_per_instance, from.depth);
+  room.max_samples = std::max(room.max_samples, room.max_samples_per_instance);
   // A transient-local writer of Cyclone's rules keeps what it offers to those who come later by these.
   to.durability_service().history_kind = to.history().kind;
   to.durability_service().history_depth = to.history().depth;
