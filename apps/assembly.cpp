@@ -5,10 +5,16 @@
 #include <utility>
 
 #include "apps/cell_facts.hpp"
+#include "apps/outside.hpp"
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
 #include "apps/views/arms_view.hpp"
+#include "apps/views/beliefs_view.hpp"
 #include "apps/views/clock_view.hpp"
+#include "apps/views/frames.hpp"
+#include "apps/views/link_view.hpp"
+#include "apps/views/low_level_view.hpp"
+#include "apps/visitors.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/rt/clock.hpp"
 #include "pons/runner/thinker.hpp"
@@ -146,8 +152,12 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     auto node = RosNode::open(*options.ros);
     if (!node) return std::unexpected(node.error());
     self->ros = std::move(*node);
+    if (auto served = self->ros->serve_parameters(world.name); !served) return std::unexpected(served.error());
+    if (auto connected = self->ros->connect(self->outside); !connected) return std::unexpected(connected.error());
+    if (auto speaks = self->ros->speak(world.dialects, registry); !speaks) return std::unexpected(speaks.error());
     self->outlets.add(*self->ros);
   }
+  for (Sink* const sink : options.sinks) self->outlets.add(*sink);
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, registry, world);
@@ -156,8 +166,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   brain::Brain& brain = self->add_brain(world, manifest, options);
 
-  self->observer = std::make_unique<runner::Observer>(world, *self->perception, meeting.frames, meeting.pages,
-                                                      meeting.pixels, meeting.pace);
+  if (auto added = self->add_observer(world, meeting); !added) return std::unexpected(added.error());
   if (realtime) {
     self->inference = std::make_unique<runner::Thinker>();
   } else {
@@ -167,44 +176,115 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
       std::make_unique<brain::PolicyRunner>(policies_of(self->cell().world, self->cell().model), *self->inference);
   const auto visitors = [half = self.get()](Time now) {
     half->policies->attend(half->cell().stream, now);
-    for (const auto& view : half->views) view->show(now);
+    half->show(now);
     if (half->desk) half->desk->attend(now);
   };
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
   if (self->outlets.needed()) {
-    if (auto opened = self->open_views(world); !opened) return std::unexpected(opened.error());
+    if (auto opened = self->open_views(world, options); !opened) return std::unexpected(opened.error());
   }
-  if (socket || self->ros) {
+  if (socket || self->ros || !options.visitors.empty()) {
     if (self->ros) self->ros->start();
-    std::unique_ptr<gate::Visitors> asked = std::move(socket);
+    auto asked = together(std::move(socket), options.visitors);
     if (self->ros) asked = self->ros->visitors(std::move(asked));
     self->desk =
         std::make_unique<Desk>(std::move(asked), *self->bridge, *self->journal, self->bridge_side->armings(),
                                self->bridge_side->health(), [half = self.get()] { return half->cell().stream; });
+    self->desk->serve(*self->bridge_side);
   }
   return self;
 }
 
+// Somebody may look on.
+Expected<void> BridgeHalf::add_observer(const world::World& world, const Meeting& meeting) {
+  perception::Sight* sight = perception.get();
+  if (outlets.needed()) {
+    auto opened = CamerasView::open(outlets, world, *perception, meeting.pace);
+    if (!opened) return std::unexpected(opened.error());
+    cameras = *std::move(opened);
+    sight = cameras.get();
+  }
+  observer =
+      std::make_unique<runner::Observer>(world, *sight, meeting.frames, meeting.pages, meeting.pixels, meeting.pace);
+  return {};
+}
+
 // What it shows, to all who are there by now.
-Expected<void> BridgeHalf::open_views(const world::World& world) {
-  std::vector<ArmsView::Arm> shown;
+Expected<void> BridgeHalf::open_views(const world::World& world, const BridgeOptions& options) {
+  std::vector<ShownRobot> shown;
   const auto stations = world.arms();
   for (std::size_t i = 0; i < arms.size(); ++i)
     shown.push_back({arms.size() > 1 ? stations[i].arm : std::string(), arms[i]->cell.model.copy(),
                      [&cell = arms[i]->cell]() -> const link::State& { return cell.arm.state(); }});
-  auto robots = ArmsView::open(outlets, std::move(shown));
+  auto robots = ArmsView::open(outlets, std::move(shown), {.transforms = cameras->frames()});
   if (!robots) return std::unexpected(robots.error());
   views.push_back(std::move(*robots));
   auto clock = ClockView::open(outlets);
   if (!clock) return std::unexpected(clock.error());
   views.push_back(std::move(*clock));
+  if (auto seen = open_inner_views(); !seen) return seen;
+  const gate::ros::NodeName name = options.ros ? options.ros->name : gate::ros::NodeName{"/", "pons"};
+  auto run = RunViews::open(outlets, *bridge, name, health_sources(world, name));
+  if (!run) return std::unexpected(run.error());
+  run_views_ = run->get();
+  views.push_back(std::move(*run));
   return {};
+}
+
+// What it believes, and what crosses the link.
+Expected<void> BridgeHalf::open_inner_views() {
+  auto beliefs =
+      BeliefsView::open(outlets, [side = bridge_side.get()]() -> const runner::Snapshot& { return side->seen(); });
+  if (!beliefs) return std::unexpected(beliefs.error());
+  views.push_back(std::move(*beliefs));
+  std::vector<LinkView::Robot> robots;
+  std::vector<LowLevelView::Robot> moved;
+  for (std::size_t robot = 0; robot < arms.size(); ++robot)
+    moved.push_back({arms.size() > 1 ? arms[robot]->cell.world.arm : std::string(), &arms[robot]->cell.arm,
+                     arms[robot]->cell.model.copy(), [half = bridge.get(), robot] { return half->mover(robot); }});
+  auto commands = LowLevelView::open(outlets, std::move(moved));
+  if (!commands) return std::unexpected(commands.error());
+  views.push_back(std::move(*commands));
+  for (const auto& arm : arms) {
+    const world::Robot& robot = arm->cell.world.robot;
+    robots.push_back({.name = arms.size() > 1 ? arm->cell.world.arm : std::string(),
+                      .hand = &arm->cell.arm,
+                      .frame = std::string(kWorldFrame),
+                      .axes = static_cast<std::size_t>(robot.home.size()),
+                      .cups = robot.tool.cups_m.size()});
+  }
+  auto links = LinkView::open(outlets, std::move(robots));
+  if (!links) return std::unexpected(links.error());
+  views.push_back(std::move(*links));
+  return {};
+}
+
+HealthView::Sources BridgeHalf::health_sources(const world::World& world, const gate::ros::NodeName& name) {
+  HealthView::Sources sources{
+      .node = name.name, .hardware = world.name, .health = &bridge_side->health(), .loops = {}, .dropped = {}};
+  for (const auto& arm : arms)
+    sources.loops.emplace_back(arms.size() > 1 ? arm->cell.world.arm : std::string(),
+                               [&cell = arm->cell]() -> const link::State& { return cell.arm.state(); });
+  if (ros) sources.dropped.emplace_back("ROS 2", [node = ros.get()] { return node->dropped(); });
+  return sources;
+}
+
+void BridgeHalf::show(Time now) {
+  if (cameras) cameras->show(now);
+  for (const auto& view : views) view->show(now);
+}
+
+void BridgeHalf::say(std::uint8_t level, Time at, std::string_view line) {
+  if (run_views_ != nullptr) run_views_->say(level, at, line);
 }
 
 Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& meeting) {
   const bool realtime = meeting.pace == runner::Pace::kRealTime;
+  auto served = gate::ros::OutsideSkills::compile(world.outside_skills);
+  if (!served) return std::unexpected(served.error());
+  outside = *std::move(served);
   const auto stations = world.arms();
   for (std::size_t i = 0; i < stations.size(); ++i) {
     auto model = model::RobotModel::load(stations[i].robot);
@@ -219,6 +299,7 @@ Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& me
                                          realtime ? kRealTimeLead : skills::kSpliceLead));
     // There is one stream of chunks at most, and it is the first arm's.
     skills::add_skills(arms[i]->registry, arms[i]->cell, policy_names());
+    if (auto added = outside.add_to(arms[i]->registry); !added) return added;
     if (auto good = check_resources(arms[i]->registry, world); !good) return good;
   }
   for (const auto& one : arms) {
@@ -306,7 +387,11 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
          .takes_until_m = cell.world.belt.pick_x_max_m,
          .lets_pass = [&cell] { return cell.lets_pass(); },
          .restore = [&take_up](const task::Json& carried) { take_up.restore(carried); },
-         .resume = [&take_up](const task::Task& task, std::size_t done) { return resumption(take_up, task, done); },
+         .resume =
+             [&take_up, this](const task::Task& task, std::size_t done) {
+               const auto served = outside_resumption(outside, task, done);
+               return served ? *served : resumption(take_up, task, done);
+             },
          .settle = [&take_up](Time now) { return take_up.settle(now); }});
   }
   return ports;
@@ -353,6 +438,8 @@ Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
   BridgeOptions bridge{.journal = options_.journal,
                        .socket = options_.socket,
                        .ros = options_.ros,
+                       .sinks = options_.sinks,
+                       .visitors = options_.visitors,
                        .recovery = options_.recovery,
                        .keep_free = options_.keep_free,
                        .comes = comes,

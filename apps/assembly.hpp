@@ -8,12 +8,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "apps/desk.hpp"
 #include "apps/ros_node.hpp"
+#include "apps/views/cameras_view.hpp"
 #include "apps/views/outlets.hpp"
+#include "apps/views/run_views.hpp"
 #include "pons/brain/dispatcher.hpp"
 #include "pons/brain/far_brain.hpp"
 #include "pons/brain/liar.hpp"
@@ -21,6 +24,7 @@
 #include "pons/bridge/bridge.hpp"
 #include "pons/cerebellum/cerebellum.hpp"
 #include "pons/core/error.hpp"
+#include "pons/gate/ros/outside_skill.hpp"
 #include "pons/link/frames.hpp"
 #include "pons/link/link.hpp"
 #include "pons/perception/perception.hpp"
@@ -88,6 +92,8 @@ struct BridgeOptions {
   std::string journal;                          // a place as in journal/place.hpp; ":memory:" for none on disk
   std::optional<std::filesystem::path> socket;  // where visitors may ask
   std::optional<gate::ros::NodeSettings> ros;   // likewise, and see
+  std::vector<Sink*> sinks = {};                // where else it shows itself; they outlive it
+  std::vector<gate::Visitors*> visitors = {};   // who else may ask; likewise
   // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
   // holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
@@ -121,12 +127,18 @@ class BridgeHalf {
   [[nodiscard]] skills::Cell& cell() { return arms.front()->cell; }
   // Whether any arm has something on its cups.
   [[nodiscard]] bool holds_something() const;
+  // What there is to be shown now, once a period; and after the last, for what that has brought.
+  void show(Time now);
+  // A line for people, to whoever looks on; `level` is one of LogView::Log's.
+  void say(std::uint8_t level, Time at, std::string_view line);
   // Goes as a killed process does: what its journal has not made durable is lost.
   static void kill(std::unique_ptr<BridgeHalf> half);
 
   std::unique_ptr<bridge::Journal> journal;
   runner::Helper helper;  // perception's
   std::unique_ptr<perception::Perception> perception;
+  gate::ros::OutsideSkills outside;
+  std::unique_ptr<CamerasView> cameras;    // only where somebody may look on
   std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<bridge::Bridge> bridge;
   std::unique_ptr<brain::Dispatcher> dispatcher;
@@ -144,17 +156,24 @@ class BridgeHalf {
  private:
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
-  [[nodiscard]] Expected<void> open_views(const world::World& world);
+  [[nodiscard]] Expected<void> add_observer(const world::World& world, const Meeting& meeting);
+  [[nodiscard]] Expected<void> open_views(const world::World& world, const BridgeOptions& options);
+  [[nodiscard]] Expected<void> open_inner_views();
+  [[nodiscard]] HealthView::Sources health_sources(const world::World& world, const gate::ros::NodeName& name);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
   // As the bridge hears it.
   [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,
                                         const BridgeOptions& options);
+
+  RunViews* run_views_ = nullptr;  // one of the views
 };
 
 struct AssemblyOptions {
   std::string journal;                          // as in BridgeOptions
   std::optional<std::filesystem::path> socket;  // likewise
   std::optional<gate::ros::NodeSettings> ros;   // likewise
+  std::vector<Sink*> sinks = {};                // likewise
+  std::vector<gate::Visitors*> visitors = {};   // likewise
   BodySetup body;
   runner::Pace pace = runner::Pace::kLockstep;
   runner::Recovery recovery = runner::Recovery::kRefused;

@@ -8,10 +8,13 @@
 
 #include "apps/assembly.hpp"
 #include "apps/commands.hpp"
+#include "apps/foxglove_sink.hpp"
 #include "apps/meeting.hpp"
+#include "apps/outside.hpp"
 #include "apps/paths.hpp"
 #include "apps/progress.hpp"
 #include "apps/ros_options.hpp"
+#include "apps/run_along.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
@@ -28,6 +31,8 @@ struct BridgeCommandOptions {
   fs::path socket;
   std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
   RosOptions ros;
+  RecordOptions record;
+  FoxgloveOptions foxglove;
   double wait_s = 10;
   bool quiet = false, recover = false;
 };
@@ -38,20 +43,75 @@ int failed(const Error& error) {
   return error.what == runner::kBodyGone ? kExitBodyGone : kExitBadRun;
 }
 
+RunFacts facts_of(const BridgeCommandOptions& options) {
+  return {.world = options.world,
+          .pace = runner::Pace::kRealTime,
+          .attended = options.ros.on ? "--socket, --ros" : "--socket",
+          .seed = options.parcels.seed,
+          .keep_free_mib = options.keep_free_mib,
+          .parcels = options.parcels.manifest.empty() || options.parcels.parcels_given
+                         ? std::optional(options.parcels.parcels)
+                         : std::nullopt,
+          .manifest = {},
+          .faults_file = {},
+          .visits = {},
+          .arm_at = {},
+          .recovers = options.recover,
+          .errands = {}};
+}
+
+// All outlive it.
+runner::Watch watch_of(const BridgeCommandOptions& options, BridgeHalf& half, const RunAlong& along,
+                       link::Border& border, Progress& progress, std::int64_t total) {
+  return {.interrupted = [&along] { return along.asks_to_end(); },
+          .progress =
+              [&, total](Time now) {
+                for (const std::string& warning : along.take_warnings()) progress.put(alert_line(warning));
+                const auto& [sorted, settled] = half.dispatcher->tally();
+                if (half.ros) {
+                  for (const std::string& warning : half.ros->take_warnings()) {
+                    progress.put(ros_line(warning));
+                    half.say(LogView::Log::WARN, now, warning);
+                  }
+                }
+                if (options.quiet) return;
+                progress.show({now, std::min(settled, total), sorted, half.bridge->queue_length()});
+              },
+          .said = {},
+          .alerted =
+              [&](std::string_view alert) {
+                if (!options.quiet) progress.put(alert_line(alert));
+              },
+          .refused =
+              [&](std::string_view what) {
+                progress.put(degraded_line(what));
+                half.say(LogView::Log::WARN, border.clock.now(), degraded_line(what));
+              },
+          .limit = border.clock.now() + slowest(static_cast<std::size_t>(total))};
+}
+
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
                const MeetingPlace& place) {
   link::Border& border = place.border();
   auto ros = ros_settings(options.ros);
   if (!ros) return bad_input(ros.error());
+  const auto along =
+      RunAlong::begin(options.record, options.foxglove, Earlier::kFollowed, facts_of(options), world, nullptr);
+  if (!along) return bad_input(along.error());
   const BridgeOptions half_options{
       .journal = options.journal,
       .socket = options.socket.empty() ? default_socket() : options.socket,
       .ros = *std::move(ros),
+      .sinks = along->sinks(),
+      .visitors = along->visitors(),
       .body = border.body,
       .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused,
       .keep_free = bytes_of(options.keep_free_mib)};
   auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
-  if (!half) return bad_input(half.error());
+  if (!half) {
+    along->withdraw();
+    return bad_input(half.error());
+  }
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
   const runner::Crossing crossing = place.crossing({});
   if (auto begun = runner::await_begin(crossing, interrupted); !begun) return failed(begun.error());
@@ -61,29 +121,16 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
 
   const auto total = static_cast<std::int64_t>(manifest.size());
   Progress progress(stderr, total);
-  const runner::Watch watch{
-      .interrupted = interrupted,
-      .progress =
-          [&](Time now) {
-            const auto& [sorted, settled] = (*half)->dispatcher->tally();
-            if ((*half)->ros) {
-              for (const std::string& warning : (*half)->ros->take_warnings()) progress.put(ros_line(warning));
-            }
-            if (options.quiet) return;
-            progress.show({now, std::min(settled, total), sorted, (*half)->bridge->queue_length()});
-          },
-      .said = {},
-      .alerted =
-          [&](std::string_view alert) {
-            if (!options.quiet) progress.put(alert_line(alert));
-          },
-      .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
-      .limit = border.clock.now() + slowest(manifest.size())};
+  const runner::Watch watch = watch_of(options, **half, *along, border, progress, total);
   const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);
   progress.finish();
   const brain::Tally tally = (*half)->dispatcher->tally();
   // Said at once; what perception is in the middle of may take its time to end.
   const int code = result ? kExitGood : failed(result.error());
+  if (result) {
+    (*half)->show(result->end);
+    along->end(*result);
+  }
   half->reset();  // the journal is closed: the body may read it
   if (!result) return code;
   const bool asked = border.now_at() == link::Stage::kEnding;
@@ -92,6 +139,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
                   "journal: {}\n",
                   result->complete ? "complete" : "broken off", std::min(tally.settled, total), total, tally.sorted,
                   result->bridge->p50_ms, result->bridge->max_ms, bridge::shown(options.journal)));
+  say(stdout, along->line());
   if (!result->degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->degraded));
   // A bridge that a person ends leaves its body to the next one.
   if (interrupted() && !asked) return kExitInterrupted;
@@ -104,8 +152,9 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
 
 int bridge(const BridgeCommandOptions& options) {
   watch_interrupts();
-  const std::array<FileOption, 3> files{{{"--manifest", options.parcels.manifest},
+  const std::array<FileOption, 4> files{{{"--manifest", options.parcels.manifest},
                                          {"--journal", file_of(options.journal)},
+                                         {"--record", options.record.file},
                                          {"--socket", options.socket}}};
   if (auto possible = check_files(files, {}); !possible) return bad_input(possible.error());
   if (options.journal.empty())
@@ -113,6 +162,8 @@ int bridge(const BridgeCommandOptions& options) {
         {"no journal is named", "pons bridge", "name a file with --journal: the next bridge goes on from it"});
   const auto world = cell_named(options.world, "pons bridge");
   if (!world) return bad_input(world.error());
+  if (auto served = check_outside(*world, options.ros, runner::Pace::kRealTime); !served)
+    return bad_input(served.error());
   const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
   if (!manifest) return bad_input(manifest.error());
   // Before it waits: the files may have changed by then.
@@ -148,6 +199,8 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
                       "taken up");
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
   add_ros_options(*command, options->ros);
+  add_record_options(*command, options->record);
+  add_foxglove_options(*command, options->foxglove);
   command->add_option("--wait", options->wait_s, "How long to wait for the body, in seconds (10)")
       ->check(CLI::Range(0.0, 86400.0));
   add_keep_free(*command, options->keep_free_mib);

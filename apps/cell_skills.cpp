@@ -4,6 +4,7 @@
 
 #include "apps/paths.hpp"
 #include "apps/policies.hpp"
+#include "pons/gate/ros/outside_skill.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/runner/speaker.hpp"
 
@@ -19,10 +20,13 @@ Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) 
   self->world = *std::move(world);
   self->link = std::make_unique<link::Link>();
   self->end = std::make_unique<link::BridgeEnd>(*self->link);
+  const auto outside = gate::ros::OutsideSkills::compile(self->world.outside_skills);
+  if (!outside) return std::unexpected(outside.error());
   if (self->world.base) {
     self->chassis = std::make_unique<skills::Chassis>(*self->end, self->world);
     self->speech = std::make_unique<runner::Speaker>(".", runner::Pace::kLockstep);
     skills::add_base_skills(self->registry, *self->chassis, *self->speech);
+    if (auto added = outside->add_to(self->registry); !added) return std::unexpected(added.error());
     return self;
   }
   const world::World& station = self->world.arms().front();
@@ -30,6 +34,7 @@ Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) 
   if (!model) return std::unexpected(model.error());
   self->cell = std::make_unique<skills::Cell>(*self->end, station, std::move(*model));
   skills::add_skills(self->registry, *self->cell, policy_names());
+  if (auto added = outside->add_to(self->registry); !added) return std::unexpected(added.error());
   return self;
 }
 

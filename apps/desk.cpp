@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -82,7 +83,11 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 
 void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
-  for (gate::Request& request : visitors_->poll()) {
+  std::vector<gate::Request> requests = visitors_->poll();
+  // No stop waits for what came before it.
+  std::ranges::stable_partition(
+      requests, [](const gate::Request& request) { return !request.refused && gate::asks_to_stop(request.text); });
+  for (gate::Request& request : requests) {
     auto asked =
         request.refused ? Expected<gate::Asked>(std::unexpected(*request.refused)) : gate::asked_from(request.text);
     if (!asked) note_refusal(request.text, asked.error(), now);
@@ -91,6 +96,7 @@ void Desk::attend(Time now) {
       continue;
     }
     Json answered = asked ? answer(*asked, now) : gate::refusal(asked.error());
+    if (!asked || tells_of_tasks(asked->operation)) answered["time_s"] = now.s();
     if (asked && tells_of_tasks(asked->operation)) {
       of_tasks.emplace_back(std::move(request), std::move(answered));
     } else {
@@ -148,6 +154,9 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
       return take(asked, now);
     case gate::Operation::kHealth:
       return {{"ok", true}, {"time_s", now.s()}, {"health", health_.describe()}};
+    case gate::Operation::kBase:
+    case gate::Operation::kDrive:
+      return ask_base(asked, now);
     case gate::Operation::kRobot:
     case gate::Operation::kStop:
     case gate::Operation::kEmergencyStop:
@@ -155,11 +164,16 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kArm:
       if (auto told = tell_arm(asked.operation, now); !told) return gate::refusal(told.error());
       return {{"ok", true}, {"robot", describe()}};
+    case gate::Operation::kRest:
+    case gate::Operation::kGoOn:
+    case gate::Operation::kEnd:
+      return tell_run(asked.operation, now);
   }
   return gate::refusal({"unknown operation", "request", "pons/gate/request.hpp lists them"});
 }
 
 Json Desk::submit(const std::string& task, Time now) {
+  const std::int64_t before = journal_.newest();
   const auto admitted = bridge_.submit_all(task, now);
   if (!admitted) return gate::refusal(admitted.error());
   Json tasks = Json::array();
@@ -167,7 +181,7 @@ Json Desk::submit(const std::string& task, Time now) {
     tasks.push_back({{"id", one.id}, {"accepted", one.accepted == bridge::Accepted::kNew ? "new" : "already"}});
     if (!one.differences.empty()) tasks.back()["differences"] = one.differences;
   }
-  Json told{{"ok", true}, {"tasks", std::move(tasks)}};
+  Json told{{"ok", true}, {"tasks", std::move(tasks)}, {"after", before}};
   if (admitted->size() == 1) told.update(told.at("tasks").at(0));
   return told;
 }
@@ -214,9 +228,10 @@ Json Desk::history(const std::string& order) const {
 }
 
 std::optional<Json> Desk::news(const gate::Asked& asked) const {
-  auto events = journal_.history(asked.task, asked.after);
+  const bool all = asked.task.empty();
+  auto events = all ? journal_.since(asked.after, gate::kWatchedAtOnce) : journal_.history(asked.task, asked.after);
   if (!events) return gate::refusal(events.error());
-  if (events->empty() && asked.after == 0) return history(asked.task);  // nothing is known of it
+  if (!all && events->empty() && asked.after == 0) return history(asked.task);  // nothing is known of it
   std::erase_if(*events, [&](const bridge::Event& event) { return event.sequence > journal_.durable(); });
   if (!events->empty()) return Json{{"ok", true}, {"events", to_json(*events)}, {"after", events->back().sequence}};
   return std::nullopt;
@@ -249,6 +264,24 @@ Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {
     if (!told) return told;
   }
   return {};
+}
+
+Json Desk::ask_base(const gate::Asked& asked, Time now) {
+  if (!base_) return gate::refusal({"the robot is no base", "base", "ask in a world with one, as rounds"});
+  if (asked.operation == gate::Operation::kBase) return base_->describe(now);
+  const auto driven = base_->drive(asked.ahead_m_s, asked.turn_rad_s, now);
+  if (!driven) return gate::refusal(driven.error());
+  return {{"ok", true}, {"id", *driven}};
+}
+
+Json Desk::tell_run(gate::Operation operation, Time now) {
+  if (run_ == nullptr) return gate::refusal({"this run cannot be told to rest or to end", "run", "end it with Ctrl-C"});
+  if (operation == gate::Operation::kEnd) {
+    (void)std::raise(SIGINT);  // as a person would, who may press Ctrl-C as well
+    return {{"ok", true}};
+  }
+  operation == gate::Operation::kRest ? run_->rest(now) : run_->go_on(now);
+  return {{"ok", true}, {"rests", run_->rests()}};
 }
 
 // The first robot that waits for something; where none does, the first.

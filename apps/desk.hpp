@@ -13,6 +13,7 @@
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
 #include "pons/runner/arming.hpp"
+#include "pons/runner/bridge_side.hpp"
 #include "pons/runner/health.hpp"
 #include "pons/task/policy.hpp"
 
@@ -26,6 +27,15 @@ class Desk {
   // arming for those that wait for a person.
   Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
        std::vector<runner::Arming*> arming, const runner::Health& health, Stream stream);
+  // Of which it may be asked that it rests, goes on or ends, which is refused without; it outlives this.
+  void serve(runner::BridgeSide& run) { run_ = &run; }
+  // What may be asked of a base; without, it is refused.
+  struct Base {
+    std::function<bridge::Json(Time)> describe;  // as gate/request.hpp has it
+    // The id of the task that drives. Error: why nothing comes of it.
+    std::function<Expected<std::string>(double ahead_m_s, double turn_rad_s, Time)> drive;
+  };
+  void serve(Base base) { base_ = std::move(base); }
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
@@ -45,6 +55,8 @@ class Desk {
   void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json describe() const;
+  [[nodiscard]] bridge::Json ask_base(const gate::Asked& asked, Time now);
+  [[nodiscard]] bridge::Json tell_run(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;
   [[nodiscard]] bridge::Json take(const gate::Asked& asked, Time now);
 
@@ -54,6 +66,8 @@ class Desk {
   std::vector<runner::Arming*> arming_;
   const runner::Health& health_;
   Stream stream_;
+  runner::BridgeSide* run_ = nullptr;
+  std::optional<Base> base_;
   struct Watcher {
     gate::Request request;
     gate::Asked asked;

@@ -13,6 +13,7 @@
 #include "apps/paths.hpp"
 #include "apps/rounds.hpp"
 #include "apps/run_kit.hpp"
+#include "pons/gate/ros/outside_skill.hpp"
 #include "pons/model/robot_model.hpp"
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/base/way.hpp"
@@ -105,6 +106,8 @@ Finding try_world(const std::string& name) {
   const std::string what = "world " + name;
   const auto world = world::load(worlds_folder(), name);
   if (!world) return say(Finding::kBad, what, world.error().line());
+  if (auto served = gate::ros::OutsideSkills::compile(world->outside_skills); !served)
+    return say(Finding::kBad, what, served.error().line());
   if (world->base) return std::max(try_base(what, *world), try_speech());
   const auto manifest = world::draw_manifest(*world, 1, 1);
   if (!manifest) return say(Finding::kBad, what, manifest.error().line());

@@ -43,7 +43,7 @@ int skills(const std::string& name, const std::string& world_name) {
   if (!cell) return bad_input(cell.error());
   const task::SkillRegistry& registry = (*cell)->registry;
   if (name.empty()) {
-    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<13} {}\n", skill_name, type.summary);
+    for (const auto& [skill_name, type] : registry.all()) fmt::print("{:<17} {}\n", skill_name, type.summary);
     return kExitGood;
   }
   const task::SkillType* type = registry.find(name);

@@ -51,6 +51,7 @@ int run_command_line(int argc, char** argv) {
   add_journal(app, chosen);
   add_book(app, chosen);
   add_recording(app, chosen);
+  add_replay(app, chosen);
   add_robot(app, chosen);
   add_health(app, chosen);
   add_doctor(app, chosen);

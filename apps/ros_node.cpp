@@ -1,11 +1,21 @@
 #include "apps/ros_node.hpp"
 
 #include <algorithm>
+#include <initializer_list>
 #include <iterator>
 #include <utility>
 
+#include "apps/dialects/interpreter.hpp"
+#include "pons/wire/types/sensor_msgs/msg/compressed_image.hpp"
+#include "pons/wire/types/sensor_msgs/msg/image.hpp"
+#include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
+#include "pons/wire/types/tf2_msgs/msg/tf_message.hpp"
+
 namespace pons::apps {
 namespace {
+
+// Of what a parameter paces; what is slower is once an hour.
+constexpr double kFastest_hz = 1000, kSlowest_hz = 1.0 / 3600;
 
 class Together final : public gate::Visitors {
  public:
@@ -29,15 +39,71 @@ Expected<std::unique_ptr<RosNode>> RosNode::open(const gate::ros::NodeSettings& 
   std::unique_ptr<RosNode> node(new RosNode(std::move(*gate)));
   node->tasks_ = std::make_unique<RosTasks>(*node->gate_);
   if (auto served = node->tasks_->serve(); !served) return std::unexpected(served.error());
+  node->robot_ = std::make_unique<RosRobot>(*node->gate_);
+  if (auto served = node->robot_->serve(); !served) return std::unexpected(served.error());
+  node->lifecycle_ = std::make_unique<RosLifecycle>(*node->gate_);
+  if (auto served = node->lifecycle_->serve(); !served) return std::unexpected(served.error());
   return node;
 }
 
-Expected<std::size_t> RosNode::add(const ShownTopic& topic) {
-  return gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos);
+Expected<void> RosNode::serve_base(const std::vector<world::OutsideSkill>& others) {
+  goals_ = std::make_unique<RosGoals>(*gate_);
+  if (auto served = goals_->serve(others); !served) return served;
+  drive_ = std::make_unique<RosDrive>(*gate_);
+  return drive_->serve();
 }
 
-void RosNode::put(std::size_t topic, Time, std::span<const std::byte> message) {
-  gate_->put(topic, {message.begin(), message.end()});
+Expected<void> RosNode::speak(const std::vector<world::Dialect>& dialects, const task::SkillRegistry& skills) {
+  auto interpreter = std::make_unique<Interpreter>(*gate_);
+  Interpreter& speaks = *interpreter;
+  gate_->node().add_part(std::move(interpreter));
+  return speaks.speak(dialects, skills);
+}
+
+Expected<void> RosNode::serve_parameters(std::string_view world) {
+  parameters_ = std::make_unique<RosParameters>(*gate_);
+  parameters_->add("use_sim_time", "Its stamps are of the run's time, which it tells on /clock",
+                   parameter_value(false));
+  parameters_->add("version", "Of Pons", parameter_value(PONS_VERSION));
+  parameters_->add("world", "That the run is in", parameter_value(world));
+  states_hz_ = &parameters_->add("states_rate_hz",
+                                 "How often joint_states and /tf come at most; 0: whenever there is something new", 0,
+                                 0, kFastest_hz);
+  images_hz_ = &parameters_->add("images_rate_hz",
+                                 "How often a camera's pictures come at most, of each form; 0: each that it takes", 0,
+                                 0, kFastest_hz);
+  return parameters_->serve();
+}
+
+Expected<std::size_t> RosNode::add(const ShownTopic& topic) {
+  auto number = gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos);
+  if (!number) return number;
+  paced_.resize(*number + 1);
+  const bool latched = topic.qos.durability == gate::ros::Qos::Durability::kTransientLocal;
+  const auto is_one_of = [&](std::initializer_list<std::string_view> types) {
+    return std::ranges::find(types, topic.type) != types.end();
+  };
+  if (!latched && is_one_of({wire::sensor_msgs::msg::JointState::kName, wire::tf2_msgs::msg::TFMessage::kName}))
+    paced_[*number].rate_hz = states_hz_;
+  if (is_one_of({wire::sensor_msgs::msg::Image::kName, wire::sensor_msgs::msg::CompressedImage::kName}))
+    paced_[*number].rate_hz = images_hz_;
+  return number;
+}
+
+bool RosNode::is_due(std::size_t topic, Time now) {
+  Paced& paced = paced_[topic];
+  const double rate_hz = paced.rate_hz == nullptr ? 0 : paced.rate_hz->load();
+  if (rate_hz <= 0) return true;
+  const Duration period = from_s(1 / std::max(rate_hz, kSlowest_hz)), since = now - paced.shown;
+  if (since < period) return false;
+  // On average as often as was asked for; after a pause from now on.
+  paced.shown = since < 2 * period ? paced.shown + period : now;
+  return true;
+}
+
+void RosNode::put(std::size_t topic, Time now, std::span<const std::byte> message) {
+  if (parameters_) parameters_->now(now);
+  if (is_due(topic, now)) gate_->put(topic, {message.begin(), message.end()});
 }
 
 std::unique_ptr<gate::Visitors> RosNode::visitors(std::unique_ptr<gate::Visitors> others) {

@@ -52,26 +52,39 @@ Expected<brain::Errand> errand_of(const std::string& text) {
 // What one run needs beside its parts, and what comes of it.
 class Run {
  public:
-  Run(const RoundsOptions& options, Rounds& rounds) : options_(options), rounds_(rounds) {}
+  Run(const RoundsOptions& options, const RunAlong& along, Rounds& rounds)
+      : options_(options), along_(along), rounds_(rounds) {}
 
   int go() {
     LoopLog log;
     if (auto opened = log.open(options_.log); !opened) return bad_input(opened.error());
     runner::Parts parts = rounds_.parts();
-    const runner::Watch watch{.interrupted = [] { return interrupted(); },
+    const bool ends = options_.ends == RoundsSetup::Ends::kWithItsTasks;
+    const runner::Watch watch{.interrupted = [this] { return along_.asks_to_end(); },
+                              .progress =
+                                  [this](Time) {
+                                    for (const std::string& warning : along_.take_warnings())
+                                      say(stderr, alert_line(warning));
+                                    if (!rounds_.ros) return;
+                                    for (const std::string& warning : rounds_.ros->take_warnings())
+                                      say(stderr, ros_line(warning));
+                                  },
                               .said = [&log](Time at, std::string_view text) { log.say(at, text); },
                               .alerted =
                                   [this](std::string_view alert) {
                                     if (options_.alerts == Alerts::kTold) say(stderr, alert_line(alert));
                                   },
                               .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
-                              .limit = Time(kSlowestTask),
+                              .limit = ends ? Time(kSlowestTask) : Time{},
                               .attended = rounds_.desk != nullptr};
     const auto began = std::chrono::steady_clock::now();
     const bool realtime = options_.pace == runner::Pace::kRealTime;
     const auto result = realtime ? runner::run_realtime(parts, watch) : runner::run_lockstep(parts, watch);
     const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     if (!result) return bad_run(result.error());
+    rounds_.show(result->end);
+    along_.end(*result);
+    if (along_.onlooker() != nullptr) return kExitGood;
     return reckon(*result, wall_s);
   }
 
@@ -92,6 +105,7 @@ class Run {
       return bad_run(told.error());
     if (auto taken = take_picture(); !taken) return bad_run(taken.error());
     if (!options_.log.empty()) say(stdout, fmt::format("log: {}\n", options_.log.string()));
+    say(stdout, along_.line());
     if (!options_.speech.empty()) say(stdout, fmt::format("speech: {}\n", options_.speech.string()));
     if (!options_.journal.empty())
       say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options_.journal, rounds_.world.name))));
@@ -142,6 +156,7 @@ class Run {
   }
 
   const RoundsOptions& options_;
+  const RunAlong& along_;
   Rounds& rounds_;
 };
 
@@ -165,14 +180,15 @@ Expected<std::vector<brain::Errand>> errands_for(const RoundsOptions& options, c
   if (!options.of_a_cell.empty())
     return fail("is for a cell with an arm; " + world.name + " has a base", options.of_a_cell, "leave it out");
   std::vector<std::string> files = options.tasks;
-  if (files.empty()) {
+  const bool waits = options.ends == RoundsSetup::Ends::kWhenInterrupted;
+  if (files.empty() && !waits) {
     for (const fs::path& task : world.tasks) files.push_back(task.string());
   }
-  if (files.empty()) return fail("nothing is asked of the base", "--task", "name a file with a task");
+  if (files.empty() && !waits) return fail("nothing is asked of the base", "--task", "name a file with a task");
   return errands_of(files);
 }
 
-int run_rounds(const RoundsOptions& options, world::World world) {
+int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world) {
   auto errands = errands_for(options, world);
   if (!errands) return bad_input(errands.error());
 
@@ -190,17 +206,31 @@ int run_rounds(const RoundsOptions& options, world::World world) {
   RoundsSetup setup{.seed = options.seed,
                     .journal = *journal,
                     .socket = {},
+                    .ros = {},
                     .speech = *speech,
                     .pace = options.pace,
-                    .keep_free = options.keep_free};
+                    .keep_free = options.keep_free,
+                    .ends = options.ends};
   if (!options.socket.empty()) {
     setup.socket = options.socket;
   } else if (options.pace == runner::Pace::kRealTime) {
     setup.socket = default_socket();
   }
+  auto ros = ros_settings(options.ros);
+  if (!ros) return bad_input(ros.error());
+  setup.ros = *std::move(ros);
+  facts.errands = *errands;
+  const auto along =
+      RunAlong::begin(options.record, options.foxglove, Earlier::kRefused, facts, world, options.onlooker);
+  if (!along) return bad_input(along.error());
+  setup.sinks = along->sinks();
+  setup.visitors = along->visitors();
   auto rounds = Rounds::build(std::move(world), *errands, setup);
-  if (!rounds) return bad_input(rounds.error());
-  return Run(options, **rounds).go();
+  if (!rounds) {
+    along->withdraw();
+    return bad_input(rounds.error());
+  }
+  return Run(options, *along, **rounds).go();
 }
 
 }  // namespace pons::apps

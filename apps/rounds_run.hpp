@@ -6,6 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/foxglove_sink.hpp"
+#include "apps/ros_options.hpp"
+#include "apps/rounds.hpp"
+#include "apps/run_along.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/brain/errands.hpp"
 #include "pons/runner/photographer.hpp"
@@ -22,7 +26,12 @@ struct RoundsOptions {
   Explain explain = Explain::kNothing;
   Alerts alerts = Alerts::kTold;
   std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
-  std::string of_a_cell = {};                   // an option was given that only a cell with an arm knows: its name
+  RosOptions ros = {};
+  RecordOptions record = {};
+  FoxgloveOptions foxglove = {};
+  const Onlooker* onlooker = nullptr;
+  RoundsSetup::Ends ends = RoundsSetup::Ends::kWithItsTasks;
+  std::string of_a_cell = {};  // an option was given that only a cell with an arm knows: its name
 };
 
 // The tasks in those files, each to be asked for at its time. Error: a file that is none, a time that is none.
@@ -32,7 +41,8 @@ struct RoundsOptions {
 // knows; nothing is asked.
 [[nodiscard]] Expected<std::vector<brain::Errand>> errands_for(const RoundsOptions& options, const world::World& world);
 
-// Returns the exit code. Bad unless every task succeeded and the referee found nothing.
-[[nodiscard]] int run_rounds(const RoundsOptions& options, world::World world);
+// Returns the exit code. Bad unless every task succeeded and the referee found nothing; with an onlooker, good if the
+// run could be made. `facts`: all but what is asked of the base.
+[[nodiscard]] int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world);
 
 }  // namespace pons::apps

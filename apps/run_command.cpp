@@ -1,6 +1,9 @@
 // pons run: one run of a world, from the first parcel to the report.
 
+#include "apps/run_command.hpp"
+
 #include <fmt/format.h>
+
 #include <chrono>
 #include <filesystem>
 #include <optional>
@@ -11,6 +14,7 @@
 #include "apps/assembly.hpp"
 #include "apps/body_setup.hpp"
 #include "apps/commands.hpp"
+#include "apps/outside.hpp"
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/progress.hpp"
@@ -25,26 +29,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct RunOptions {
-  std::string world;
-  ParcelOptions parcels;
-  BodySetupOptions body;
-  std::string journal;
-  fs::path report, log, picture, socket, speech;
-  std::vector<std::string> tasks;
-  RosOptions ros;
-  std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
-  bool realtime = false, lockstep = false, quiet = false, explain = false, recover = false;
-};
-
 constexpr int kPictureWidth = 1280, kPictureHeight = 800;
 
 Expected<void> check_files_of(const RunOptions& options) {
-  const std::array<FileOption, 6> files{{{"--manifest", options.parcels.manifest},
+  const std::array<FileOption, 7> files{{{"--manifest", options.parcels.manifest},
                                          {"--journal", file_of(options.journal)},
                                          {"--report", options.report},
                                          {"--log", options.log},
                                          {"--picture", options.picture},
+                                         {"--record", options.record.file},
                                          {"--socket", options.socket}}};
   const std::array<fs::path, 3> written{options.report, options.log, options.picture};
   return check_files(files, written);
@@ -57,16 +50,20 @@ Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
 }
 
 // Watches the run: Ctrl-C, the progress bar, the loop's events, and the moment for the picture.
-runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progress, LoopLog& log, std::int64_t total,
-                    bool& pictured) {
-  return {.interrupted = [] { return interrupted(); },
+runner::Watch watch(const RunOptions& options, Assembly& cell, const RunAlong& along, Progress& progress, LoopLog& log,
+                    std::int64_t total, bool& pictured) {
+  return {.interrupted = [&along] { return along.asks_to_end(); },
           .progress =
               [&, total](Time now) {
+                for (const std::string& warning : along.take_warnings()) progress.put(alert_line(warning));
                 const auto& [sorted, settled] = cell.above->dispatcher->tally();
                 const std::int64_t done = std::min(settled, total);
                 if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
                 if (cell.above->ros) {
-                  for (const std::string& warning : cell.above->ros->take_warnings()) progress.put(ros_line(warning));
+                  for (const std::string& warning : cell.above->ros->take_warnings()) {
+                    progress.put(ros_line(warning));
+                    cell.above->say(LogView::Log::WARN, now, warning);
+                  }
                 }
                 // With something on the cups, halfway: that is what the cell looks like.
                 if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
@@ -74,28 +71,39 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, Progress& progres
                   pictured = take_picture(cell, options.picture).has_value();
                 }
               },
-          .said = [&log](Time at, std::string_view text) { log.say(at, text); },
+          .said =
+              [&](Time at, std::string_view text) {
+                log.say(at, text);
+                if (cell.above) cell.above->say(LogView::Log::INFO, at, text);
+              },
           .alerted =
               [&](std::string_view alert) {
                 if (!options.quiet) progress.put(alert_line(alert));
               },
-          .refused = [&progress](std::string_view what) { progress.put(degraded_line(what)); },
+          .refused =
+              [&](std::string_view what) {
+                progress.put(degraded_line(what));
+                cell.above->say(LogView::Log::WARN, Time{}, degraded_line(what));
+              },
           .limit = Time(slowest(static_cast<std::size_t>(total))),
           .attended = cell.above->desk != nullptr};
 }
 
-int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
+int run_cell(const RunOptions& options, Assembly& cell, const RunAlong& along, std::int64_t total) {
   Progress progress(stderr, total);
   LoopLog log;
   if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
   bool pictured = false;
   runner::Parts parts = cell.parts();
-  const runner::Watch watcher = watch(options, cell, progress, log, total, pictured);
+  const runner::Watch watcher = watch(options, cell, along, progress, log, total, pictured);
   const auto began = std::chrono::steady_clock::now();
   const auto result = options.realtime ? runner::run_realtime(parts, watcher) : runner::run_lockstep(parts, watcher);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   progress.finish();
   if (!result) return bad_run(result.error());
+  cell.above->show(result->end);
+  along.end(*result);
+  if (along.onlooker() != nullptr) return kExitGood;
 
   runner::BridgeSide& bridge_side = *cell.above->bridge_side;
   world::FaultCounts injected;
@@ -113,12 +121,48 @@ int run_cell(const RunOptions& options, Assembly& cell, std::int64_t total) {
     say(stdout, fmt::format("picture: {}\n", options.picture.string()));
   }
   if (!options.log.empty()) say(stdout, fmt::format("log: {}\n", options.log.string()));
+  say(stdout, along.line());
   if (!options.journal.empty())
     say(stdout, fmt::format("journal: {}\n", bridge::shown(bridge::named(options.journal, cell.world.name))));
   if (interrupted()) return kExitInterrupted;
   if (!result->complete)
     say(stderr, fmt::format("pons: broken off: {}; --journal keeps what happened\n", result->broken_off));
   return result->complete && reckoning->good() ? kExitGood : kExitBadRun;
+}
+
+// But for what a base is asked for. Error: a file that holds some of it cannot be read; of a base there is none.
+Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world) {
+  RunFacts facts{.world = options.world};
+  facts.pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
+  if (!options.socket.empty() || options.realtime) facts.attended = "--socket";
+  if (options.ros.on) facts.attended += facts.attended.empty() ? "--ros" : ", --ros";
+  if (options.foxglove.tasks) facts.attended += facts.attended.empty() ? "--foxglove-tasks" : ", --foxglove-tasks";
+  facts.seed = options.parcels.seed;
+  facts.keep_free_mib = options.keep_free_mib;
+  const bool whole = !options.parcels.manifest.empty() && !options.parcels.parcels_given;
+  if (!whole) facts.parcels = options.parcels.parcels;
+  facts.faults = options.body.faults;
+  facts.visits = options.body.visits;
+  facts.arm_at = options.body.arm_at;
+  facts.recovers = options.recover;
+  facts.stays = options.stay;
+  if (!options.record.on() || world.base) return facts;
+  if (!options.parcels.manifest.empty()) {
+    auto text = text_in(options.parcels.manifest);
+    if (!text) return std::unexpected(text.error());
+    facts.manifest = *std::move(text);
+  }
+  if (const auto file = world::faults_file(world, options.body.faults); file && *file == options.body.faults) {
+    auto text = text_in(*file);
+    if (!text) return std::unexpected(text.error());
+    facts.faults = file->filename().string();
+    facts.faults_file = *std::move(text);
+  }
+  return facts;
+}
+
+runner::Pace pace_of(const RunOptions& options) {
+  return options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
 }
 
 RoundsOptions rounds_options(const RunOptions& options) {
@@ -130,7 +174,12 @@ RoundsOptions rounds_options(const RunOptions& options) {
                        .picture = options.picture,
                        .socket = options.socket,
                        .speech = options.speech};
-  rounds.pace = options.realtime ? runner::Pace::kRealTime : runner::Pace::kLockstep;
+  rounds.pace = pace_of(options);
+  rounds.ros = options.ros;
+  rounds.record = options.record;
+  rounds.foxglove = options.foxglove;
+  rounds.onlooker = options.onlooker;
+  if (options.stay) rounds.ends = RoundsSetup::Ends::kWhenInterrupted;
   rounds.keep_free = bytes_of(options.keep_free_mib);
   rounds.alerts = options.quiet ? Alerts::kUntold : Alerts::kTold;
   rounds.explain = options.explain ? Explain::kFindings : Explain::kNothing;
@@ -140,7 +189,6 @@ RoundsOptions rounds_options(const RunOptions& options) {
   if (!options.body.arm_at.empty()) rounds.of_a_cell = "--arm-at";
   if (options.body.faults != world::FaultPlan{}.name) rounds.of_a_cell = "--faults";
   if (options.recover) rounds.of_a_cell = "--recover";
-  if (options.ros.on) rounds.of_a_cell = "--ros";
   return rounds;
 }
 
@@ -151,6 +199,8 @@ struct CellInputs {
 };
 
 Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& world) {
+  if (options.stay)
+    return fail(world.name + " has an arm, which is done when its parcels are", "--stay", "leave it out");
   if (!options.tasks.empty() || !options.speech.empty()) {
     return fail("a cell with an arm gets its tasks from its dispatcher", options.tasks.empty() ? "--speech" : "--task",
                 "leave it out; pons task submit sends others to a run");
@@ -166,6 +216,37 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
   return CellInputs{std::move(*manifest), std::move(*setup)};
 }
 
+void add_options(CLI::App& command, RunOptions& options) {
+  command.add_option("world", options.world, "A world's name; `pons worlds` lists them");
+  add_parcel_options(command, options.parcels);
+  auto* lockstep =
+      command.add_flag("--lockstep", options.lockstep, "Virtual time, as fast as possible, repeatable (default)");
+  command.add_flag("--realtime", options.realtime, "Wall-clock pace, control loop on its own thread")
+      ->excludes(lockstep);
+  command.add_option("--journal", options.journal,
+                     "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes (a temporary file)");
+  command.add_option("--report", options.report, "JSON file for the figures of the run");
+  command.add_option("--log", options.log, "Text file for what the control loop did: stops, arming, refused commands");
+  command.add_option("--picture", options.picture, "PNG file for a picture of the cell at work");
+  command.add_option("--socket", options.socket, "Where `pons task` reaches this run (on by default with --realtime)");
+  add_ros_options(command, options.ros);
+  add_record_options(command, options.record);
+  add_foxglove_options(command, options.foxglove);
+  command.add_option("--task", options.tasks,
+                     "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
+  command.add_flag("--stay", options.stay,
+                   "Of a base: go on until Ctrl-C, and do what is asked for meanwhile; without --task nothing else");
+  command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");
+  add_body_setup_options(command, options.body);
+  add_keep_free(command, options.keep_free_mib);
+  command.add_flag("--recover", options.recover, "Bring an arm that is found outside its position limits slowly in");
+  command.add_flag("--explain", options.explain, "A line for each parcel that was not sorted as ordered");
+  command.add_flag("--quiet", options.quiet, "No progress");
+  refuse_empty(command);
+}
+
+}  // namespace
+
 int run(const RunOptions& options) {
   // Before anything is opened: what is built is also taken down.
   watch_interrupts();
@@ -173,9 +254,12 @@ int run(const RunOptions& options) {
   if (auto possible = check_files_of(options); !possible) return bad_input(possible.error());
   auto world = world_named(options.world, "pons run");
   if (!world) return bad_input(world.error());
-  if (world->base) return run_rounds(rounds_options(options), std::move(*world));
+  if (auto served = check_outside(*world, options.ros, pace_of(options)); !served) return bad_input(served.error());
+  if (world->base) return run_rounds(rounds_options(options), *facts_of(options, *world), std::move(*world));
   auto inputs = cell_inputs(options, *world);
   if (!inputs) return bad_input(inputs.error());
+  const auto facts = facts_of(options, *world);
+  if (!facts) return bad_input(facts.error());
   const world::Manifest manifest = std::move(inputs->manifest);
 
   std::optional<TemporaryFolder> temporary;
@@ -195,37 +279,18 @@ int run(const RunOptions& options) {
   auto ros = ros_settings(options.ros);
   if (!ros) return bad_input(ros.error());
   assembly.ros = *std::move(ros);
+  const auto along =
+      RunAlong::begin(options.record, options.foxglove, Earlier::kRefused, *facts, *world, options.onlooker);
+  if (!along) return bad_input(along.error());
+  assembly.sinks = along->sinks();
+  assembly.visitors = along->visitors();
   auto cell = Assembly::build(std::move(*world), manifest, assembly);
-  if (!cell) return bad_input(cell.error());
-  return run_cell(options, **cell, static_cast<std::int64_t>(manifest.size()));
+  if (!cell) {
+    along->withdraw();
+    return bad_input(cell.error());
+  }
+  return run_cell(options, **cell, *along, static_cast<std::int64_t>(manifest.size()));
 }
-
-void add_options(CLI::App& command, RunOptions& options) {
-  command.add_option("world", options.world, "A world's name; `pons worlds` lists them");
-  add_parcel_options(command, options.parcels);
-  auto* lockstep =
-      command.add_flag("--lockstep", options.lockstep, "Virtual time, as fast as possible, repeatable (default)");
-  command.add_flag("--realtime", options.realtime, "Wall-clock pace, control loop on its own thread")
-      ->excludes(lockstep);
-  command.add_option("--journal", options.journal,
-                     "SQLite file, or postgresql://…#NAME, that keeps tasks and outcomes (a temporary file)");
-  command.add_option("--report", options.report, "JSON file for the figures of the run");
-  command.add_option("--log", options.log, "Text file for what the control loop did: stops, arming, refused commands");
-  command.add_option("--picture", options.picture, "PNG file for a picture of the cell at work");
-  command.add_option("--socket", options.socket, "Where `pons task` reaches this run (on by default with --realtime)");
-  add_ros_options(command, options.ros);
-  command.add_option("--task", options.tasks,
-                     "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
-  command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");
-  add_body_setup_options(command, options.body);
-  add_keep_free(command, options.keep_free_mib);
-  command.add_flag("--recover", options.recover, "Bring an arm that is found outside its position limits slowly in");
-  command.add_flag("--explain", options.explain, "A line for each parcel that was not sorted as ordered");
-  command.add_flag("--quiet", options.quiet, "No progress");
-  refuse_empty(command);
-}
-
-}  // namespace
 
 void add_run(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<RunOptions>();
@@ -246,6 +311,7 @@ Expected<void> check_run(const std::vector<std::string>& words) {
   if (auto possible = check_files_of(options); !possible) return possible;
   const auto world = world_named(options.world, "pons run");
   if (!world) return std::unexpected(world.error());
+  if (auto served = check_outside(*world, options.ros, pace_of(options)); !served) return served;
   if (world->base) {
     const auto errands = errands_for(rounds_options(options), *world);
     return errands ? Expected<void>{} : std::unexpected(errands.error());

@@ -183,18 +183,29 @@ const std::map<std::string_view, std::string (*)(const Json&)> kTellers = {
     {"mistaken", mistaken},
 };
 
+// What an event says of its kind.
+std::string told(const Json& event) {
+  const auto detail = event.is_object() ? event.find("detail") : event.end();
+  if (detail == event.end()) return {};
+  const auto teller = kTellers.find(text(event, "kind"));
+  if (teller != kTellers.end()) return teller->second(*detail);
+  return detail->empty() ? std::string() : detail->dump();
+}
+
 }  // namespace
 
 std::string story_line(const Json& event) {
   const std::string kind = text(event, "kind");
   if (kind == bridge::kCheckpointEvent) return {};
-  const auto detail = event.is_object() ? event.find("detail") : event.end();
-  const auto teller = kTellers.find(kind);
-  std::string told;
-  if (detail != event.end()) {
-    told = teller != kTellers.end() ? teller->second(*detail) : (detail->empty() ? "" : detail->dump());
-  }
-  return fmt::format("{:>10.3f} s  {:<14} {:<13} {}\n", number(event, "time_s"), text(event, "task"), kind, told);
+  return fmt::format("{:>10.3f} s  {:<14} {:<13} {}\n", number(event, "time_s"), text(event, "task"), kind,
+                     told(event));
+}
+
+std::string story_text(const Json& event) {
+  const std::string kind = text(event, "kind");
+  if (kind == bridge::kCheckpointEvent) return {};
+  const std::string said = told(event);
+  return said.empty() ? kind : fmt::format("{}: {}", kind, said);
 }
 
 }  // namespace pons::apps

@@ -10,5 +10,7 @@ namespace pons::apps {
 // One line of `pons task history` with its end, of an event as in journal_json.hpp; empty for what is only for
 // machines, as a tree's checkpoints are.
 [[nodiscard]] std::string story_line(const task::Json& event);
+// Likewise, without time, task and end: "attempt: step 0, pick, try 1".
+[[nodiscard]] std::string story_text(const task::Json& event);
 
 }  // namespace pons::apps

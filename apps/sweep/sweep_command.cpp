@@ -46,7 +46,7 @@ constexpr std::size_t kMostJobs = 1000;
 
 // What the sweep says itself of each run, and what runs that go on at once would quarrel about.
 Expected<void> check_further(const SweepOptions& options) {
-  constexpr std::array<std::pair<const char*, const char*>, 13> kNot{
+  constexpr std::array<std::pair<const char*, const char*>, 14> kNot{
       {{"--seed", "name seeds with --seeds"},
        {"--parcels", "write it before --"},
        {"--faults", "write it before --"},
@@ -55,6 +55,7 @@ Expected<void> check_further(const SweepOptions& options) {
        {"--explain", "each run's log has it"},
        {"--quiet", "write it before --"},
        {"--journal", "repeat a run by its command, with it"},
+       {"--record", "repeat a run by its command, with it"},
        {"--picture", "repeat a run by its command, with it"},
        {"--speech", "repeat a run by its command, with it"},
        {"--socket", "repeat a run by its command, with it"},

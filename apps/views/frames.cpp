@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 
 namespace pons::apps {
@@ -15,6 +16,13 @@ wire::geometry_msgs::msg::TransformStamped transform(const Pose& parent_from_chi
   made.transform.translation = {at.x(), at.y(), at.z()};
   const Eigen::Quaterniond turn(parent_from_child.linear());
   made.transform.rotation = {turn.x(), turn.y(), turn.z(), turn.w()};
+  return made;
+}
+
+wire::geometry_msgs::msg::Pose pose_message(const Pose2& pose) {
+  wire::geometry_msgs::msg::Pose made;
+  made.position = {pose.x, pose.y, 0};
+  made.orientation = {0, 0, std::sin(pose.yaw / 2), std::cos(pose.yaw / 2)};
   return made;
 }
 

@@ -23,7 +23,7 @@ enum class Audience { kAll, kLive };  // kLive: not a recording, which has it in
 
 // What a sink needs to know of a topic.
 struct ShownTopic {
-  std::string name;       // without a slash before it: in the namespace of whoever shows it
+  std::string name;       // without a slash before it: in the namespace of whoever shows it; after ~/: under his name
   std::string_view type;  // of T, as T::kName
   std::string_view hash;  // RIHS01
   gate::ros::Qos qos;     // transient local: who comes later is shown the last one, too
@@ -50,6 +50,8 @@ class Outlet {
   Outlet(Outlets& outlets, std::size_t topic) : outlets_(&outlets), topic_(topic) {}
   [[nodiscard]] bool wanted() const;
   void put(Time now, const T& message);
+  // Likewise, of a T that somebody has encoded before, CDR with its encapsulation.
+  void put_encoded(Time now, std::span<const std::byte> message);
 
  private:
   Outlets* outlets_;
@@ -93,7 +95,12 @@ bool Outlet<T>::wanted() const {
 template <wire::Message T>
 void Outlet<T>::put(Time now, const T& message) {
   if (!wire::encode(message, outlets_->bytes_)) return;  // longer than its type allows
-  for (const auto& [sink, number] : outlets_->topics_[topic_]) sink->put(number, now, outlets_->bytes_);
+  put_encoded(now, outlets_->bytes_);
+}
+
+template <wire::Message T>
+void Outlet<T>::put_encoded(Time now, std::span<const std::byte> message) {
+  for (const auto& [sink, number] : outlets_->topics_[topic_]) sink->put(number, now, message);
 }
 
 // Something that a run shows of itself.

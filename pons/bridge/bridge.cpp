@@ -464,9 +464,14 @@ std::vector<std::string> Bridge::running() const {
   return ids;
 }
 
-bool Bridge::uses_resources(std::size_t robot) const {
-  return std::ranges::any_of(
-      running_, [&](const auto& entry) { return entry.second->robot == robot && !entry.second->resources.empty(); });
+bool Bridge::uses_resources(std::size_t robot) const { return !mover(robot).empty(); }
+
+std::string Bridge::mover(std::size_t robot) const {
+  const auto moves = [&](const auto& entry) {
+    return entry.second->robot == robot && !entry.second->resources.empty();
+  };
+  const auto found = std::ranges::find_if(running_, moves);
+  return found == running_.end() ? std::string() : found->first;
 }
 
 void Bridge::tell(Open& open, Time now, std::string_view kind, const Json& detail) {

@@ -146,6 +146,9 @@ class Bridge {
   // Since the last call, in the order of their writing; none before the journal holds it for good.
   [[nodiscard]] std::vector<OutcomeReport> take_outcomes();
 
+  // Whether a task holds that resource; whether one waits for it.
+  [[nodiscard]] bool has_holder(std::string_view resource) const { return arbiter_.has_holder(resource); }
+  [[nodiscard]] bool is_waited_for(std::string_view resource) const { return arbiter_.is_waited_for(resource); }
   [[nodiscard]] std::size_t queue_length() const { return arbiter_.queue_length(); }
   [[nodiscard]] std::vector<std::string> queue() const { return arbiter_.queue(); }
   [[nodiscard]] std::vector<std::string> running() const;  // also paused on their way; in the order of their ids
@@ -163,6 +166,8 @@ class Bridge {
   [[nodiscard]] std::set<std::string> set_aside() const;
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
+  // The first of these; empty where there is none.
+  [[nodiscard]] std::string mover(std::size_t robot = 0) const;
   [[nodiscard]] bool idle() const { return open_.empty(); }
   [[nodiscard]] const Journal& journal() const { return journal_; }
   [[nodiscard]] bool held() const;                                 // all robots

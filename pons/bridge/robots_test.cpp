@@ -80,6 +80,8 @@ TEST_F(Robots, EachTaskRunsOnOneThatIsFree) {
   EXPECT_EQ(robot_of("b"), "arm_2");
   EXPECT_EQ(robot_of("c"), "");
   EXPECT_TRUE(bridge_->uses_resources(0) && bridge_->uses_resources(1));
+  EXPECT_EQ(bridge_->mover(0), "a");
+  EXPECT_EQ(bridge_->mover(1), "b");
   tick(60);
   EXPECT_TRUE(bridge_->idle());
   EXPECT_EQ(actors_[0].log.started.size() + actors_[1].log.started.size(), 3U);

@@ -44,6 +44,7 @@ struct BaseBelief {
   Vector2 eye = Vector2::Zero();                         // where the rays come from, map frame
   std::vector<Vector2> ends;                             // where those that came back end, likewise
   std::vector<Vector2> unmapped;                         // of these, those that end far from anything on the map
+  std::vector<float> ranges_m = {};                      // all that it measured, as in RgbdFrame::depth_m
 };
 
 // Between the two as seen from above, along the side of one of them that parts them most; less than 0: they overlap.

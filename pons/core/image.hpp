@@ -69,7 +69,8 @@ struct RgbdFrame {
   Intrinsics intrinsics;
   Pose world_from_optical = Pose::Identity();
   PixelArray<std::uint8_t> rgb;  // height × width × 3
-  PixelArray<float> depth_m;     // height × width, along the optical z; 0 where the sensor has no reading
+  PixelArray<float> depth_m;     // height × width, along the optical z; 0 where the sensor has no reading. Of a lidar
+                                 // the ranges; infinity where nothing came back because nothing is near enough
 };
 
 }  // namespace pons

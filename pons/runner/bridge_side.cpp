@@ -218,7 +218,12 @@ void BridgeSide::look_after_parts(Time now) {
   vitals_.bridge(bridge_.open_count(), now);
   vitals_.journal(bridge_.journal(), now);
   // What is begun goes on. A new task would be one more that a camera has to show the way to.
-  bridge_.withhold(vitals_.belt_unseen() ? bridge::Arbiter::Withheld::kResources : bridge::Arbiter::Withheld::kNothing);
+  bridge_.withhold(vitals_.belt_unseen() || resting_ ? bridge::Arbiter::Withheld::kResources
+                                                     : bridge::Arbiter::Withheld::kNothing);
+  if (resting_) {
+    bridge_.refuse_new(Error{"the robot rests, and takes no tasks", "run", "have it go on, and send them again"});
+    return;
+  }
   bridge_.refuse_new(vitals_.lacks_room().empty()
                          ? std::nullopt
                          : std::optional(Error{"no room for new tasks: " + vitals_.lacks_room(), "journal",
@@ -249,6 +254,12 @@ std::optional<double> BridgeSide::taken_until_m() const {
 }
 
 bool BridgeSide::ask_brain(const std::vector<ObjectBelief>& objects, Time now) {
+  // It is not its silence.
+  if (resting_) {
+    decided_ = brain_heard_ = now;
+    vitals_.brain(brain_heard_, now);
+    return true;
+  }
   const bool stalled = stalls_ != nullptr && stalls_->on(now);
   // A brain that says nothing asks for nothing, nor is it asked for what there is no room for.
   std::optional<brain::Decisions> decisions;
@@ -358,6 +369,26 @@ void BridgeSide::stop(Time now, const std::string& reason) {
   stopping_ = true;
   bridge_.note("shutdown", {{"reason", reason}}, now);
   bridge_.stop(now, reason);
+}
+
+void BridgeSide::rest(Time now) {
+  if (!std::exchange(resting_, true)) bridge_.note("rest", {{"rests", true}}, now);
+  for (const std::string& id : bridge_.running()) {
+    const std::string_view state = bridge_.state(id);
+    if (state == "running" && bridge_.pause(id, now, "the robot is to rest")) set_to_rest_.insert(id);
+  }
+}
+
+void BridgeSide::go_on(Time now) {
+  if (!std::exchange(resting_, false)) return;
+  bridge_.note("rest", {{"rests", false}}, now);
+  // One that has ended meanwhile, or that somebody has resumed before, is not paused any more.
+  for (const std::string& id : std::exchange(set_to_rest_, {})) (void)bridge_.resume(id, now);
+}
+
+bool BridgeSide::rests() const {
+  const auto moves = [this](const std::string& id) { return bridge_.state(id) != "paused"; };
+  return resting_ && std::ranges::none_of(bridge_.running(), moves);
 }
 
 bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,6 +52,12 @@ class BridgeSide {
   // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
   void stop(Time now, const std::string& reason);
   [[nodiscard]] bool idle() const;
+  // Nothing new is decided, taken or begun, but for tasks that use no resource; the belt waits; tasks that run stand at
+  // their next safe point, and go on with go_on(). Either may be called again.
+  void rest(Time now);
+  void go_on(Time now);
+  // Whether all that stands by now.
+  [[nodiscard]] bool rests() const;
   // Writes what became of orders that were never identified. Once, at the end of a run.
   void close(Time now);
 
@@ -59,6 +66,8 @@ class BridgeSide {
   // See Vitals.
   void keep_free(std::uint64_t bytes) { vitals_.keep_free(bytes); }
 
+  // What perception said last; with no stamp before it has said anything.
+  [[nodiscard]] const Snapshot& seen() const { return seen_; }
   [[nodiscard]] Time last_outcome() const { return last_outcome_; }  // of a task that the brain asked for
   [[nodiscard]] std::int64_t retries() const { return retries_before_ + bridge_.retries(); }
   [[nodiscard]] std::int64_t stops() const;
@@ -124,6 +133,8 @@ class BridgeSide {
   world::Spells* stalls_ = nullptr;
   std::int64_t unlabelled_ = 0, retries_before_ = 0;
   bool stopping_ = false;
+  bool resting_ = false;
+  std::set<std::string> set_to_rest_;  // tasks that were paused for that
 };
 
 }  // namespace pons::runner

@@ -37,8 +37,8 @@ struct SkillPort {
   std::function<std::vector<ObjectBelief>()> unseen;
   std::function<const link::State&()> state;                   // as of the last refresh
   std::function<std::vector<std::uint32_t>()> take_forgotten;  // tracks that were taken off the belt
-  // What is found to have come along with others, or not to have fallen where it was let go of, {"code", "fell_into"} each
-  // (see skills::Stray), since the last call; may be empty.
+  // What is found to have come along with others, or not to have fallen where it was let go of, {"code", "fell_into"}
+  // each (see skills::Stray), since the last call; may be empty.
   std::function<std::vector<bridge::Json>()> take_strays;
   std::function<void(Time)> arm;                // one step out of a stop, towards operational
   std::function<double()> outside_rad;          // how far the arm stands outside its position limits

@@ -61,7 +61,8 @@ struct Speaker::Run {
       return promise.set_value(fail("ended without having spoken", program, "try it by hand; pons doctor does"));
     const auto length_s = wav_length_s(file);
     if (!length_s) return promise.set_value(std::unexpected(length_s.error()));
-    promise.set_value(task::Spoken{file.string(), *length_s});
+    // Its name alone: the folder may be one of this run only, and equal runs say the same.
+    promise.set_value(task::Spoken{file.filename().string(), *length_s});
   }
 };
 

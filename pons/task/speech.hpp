@@ -10,7 +10,7 @@
 namespace pons::task {
 
 struct Spoken {
-  std::string file;     // a WAV file
+  std::string file;     // name of the WAV file, in the folder that the voice has for all
   double length_s = 0;  // of what is heard
 };
 

@@ -77,7 +77,7 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
   };
   const std::string tasks = fmt::format(kTaskColumns, acceptances(database->dialect())), events(kEventColumns);
   const std::string in_order = fmt::format(kTaskColumns, in_their_order(database->dialect()));
-  const std::array<std::pair<Statement*, std::string>, 13> reads{{
+  const std::array<std::pair<Statement*, std::string>, 14> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
       {&all_tasks, tasks + "ORDER BY a.sequence"},
       {&one_task, tasks + "AND a.task = ?1"},
@@ -92,6 +92,7 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
                                   "UNION SELECT e.sequence FROM event a JOIN event e ON e.task = a.task "
                                   "WHERE a.order_id = ?1 AND a.order_id <> '' AND a.kind = 'accepted' "
                                   "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
+      {&events_since, events + "WHERE sequence > ?1 AND sequence <= ?2 ORDER BY sequence LIMIT ?3"},
       {&every_event, events + "ORDER BY task, sequence"},
       {&newest, "SELECT coalesce(max(sequence), 0) FROM event"},
       {&count, "SELECT count(*) FILTER (WHERE kind = 'accepted'), count(*) FROM event"},

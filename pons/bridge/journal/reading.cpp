@@ -115,6 +115,12 @@ Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64
   return impl_->all_of(impl_->events_of_order.bind(order).bind(after));
 }
 
+Expected<std::vector<Event>> Journal::since(std::int64_t after, std::int64_t most, Until until) const {
+  const std::int64_t last = until == Until::kDurable ? impl_->durable : newest();
+  if (after >= last) return std::vector<Event>{};
+  return impl_->all_of(impl_->events_since.bind(after).bind(last).bind(most));
+}
+
 Expected<void> Journal::each_event(const std::function<Expected<void>(const Event&)>& take) const {
   return impl_->each_of(impl_->every_event, take);
 }

@@ -33,6 +33,19 @@ void Arbiter::add(const Claim& claim) {
   wait(entry);
 }
 
+bool Arbiter::has_holder(std::string_view resource) const {
+  const auto bit = bits_.find(resource);
+  return bit != bits_.end() && (held_ >> bit->second & 1U) != 0;
+}
+
+bool Arbiter::is_waited_for(std::string_view resource) const {
+  const auto bit = bits_.find(resource);
+  if (bit == bits_.end()) return false;
+  return std::ranges::any_of(lanes_, [&](const auto& lane) {
+    return std::ranges::any_of(lane.first, [&](Mask needs) { return (needs >> bit->second & 1U) != 0; });
+  });
+}
+
 Arbiter::Mask Arbiter::mask_of(const std::vector<std::string>& resources) const {
   Mask mask = 0;
   for (const std::string& name : resources) {

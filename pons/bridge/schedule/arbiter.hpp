@@ -81,6 +81,10 @@ class Arbiter {
   using Stays = std::function<bool(std::string_view id)>;
   [[nodiscard]] std::vector<Preemption> preemptions(const Stays& stays = {}, const Fits& fits = {}) const;
 
+  // Whether somebody holds that resource; whether somebody waits for it.
+  [[nodiscard]] bool has_holder(std::string_view resource) const;
+  [[nodiscard]] bool is_waited_for(std::string_view resource) const;
+
   [[nodiscard]] std::vector<std::string> queue() const;  // in order
   [[nodiscard]] std::size_t queue_length() const { return waiting_.size(); }
 

@@ -1,0 +1,117 @@
+#include "apps/replay/recorded.hpp"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "pons/record/mcap_reader.hpp"
+
+namespace pons::apps {
+namespace {
+
+namespace fs = std::filesystem;
+namespace mcap = record::mcap;
+
+constexpr std::size_t kAheadBytes = std::size_t{16} << 20U;
+
+std::vector<fs::path> files_of(const fs::path& first) {
+  std::vector<fs::path> files{first};
+  std::error_code error;
+  for (std::uint64_t number = 1;; ++number) {
+    fs::path next = first.parent_path() / fmt::format("{}_{}.mcap", first.stem().string(), number);
+    if (!fs::exists(next, error)) return files;
+    files.push_back(std::move(next));
+  }
+}
+
+}  // namespace
+
+RecordedMessages::RecordedMessages(const fs::path& file) : reads_([this, files = files_of(file)] { read(files); }) {}
+
+RecordedMessages::~RecordedMessages() {
+  {
+    const std::scoped_lock lock(mutex_);
+    unwanted_ = true;
+  }
+  changed_.notify_all();
+  reads_.join();
+}
+
+const RecordedMessage* RecordedMessages::front() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ended_ || !messages_.empty(); });
+  return messages_.empty() ? nullptr : &messages_.front();
+}
+
+void RecordedMessages::pop() {
+  {
+    const std::scoped_lock lock(mutex_);
+    bytes_ -= messages_.front().bytes.size();
+    messages_.pop_front();
+  }
+  changed_.notify_all();
+}
+
+std::string RecordedMessages::cut() {
+  const std::scoped_lock lock(mutex_);
+  return cut_;
+}
+
+void RecordedMessages::read(const std::vector<fs::path>& files) {
+  for (const fs::path& file : files) {
+    if (!read_one(file)) break;
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+}
+
+bool RecordedMessages::read_one(const fs::path& file) {
+  const auto cut = [&](const std::string& why) {
+    const std::scoped_lock lock(mutex_);
+    cut_ = why;
+    return false;
+  };
+  const auto reader = record::McapReader::open(file);
+  if (!reader) return cut(reader.error().line());
+  bool goes_on = true;
+  std::string gap;
+  const auto read = (*reader)->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
+    // What stands, said again: a run begins with what is new.
+    if (next_.empty() && message.publish_time != message.log_time)
+      gap = fmt::format("{}: begins in the middle of its run", file.string());
+    std::uint32_t& next = next_[channel.topic];
+    if (message.sequence < next) return true;
+    if (gap.empty() && message.sequence > next)
+      gap = fmt::format("{}: of {} the messages from number {} to {} are missing", file.string(), channel.topic, next,
+                        message.sequence - 1);
+    if (!gap.empty()) return false;
+    ++next;
+    goes_on = push({channel.topic,
+                    std::string((*reader)->contents().type_of(channel)),
+                    message.sequence,
+                    message.publish_time,
+                    {message.data.begin(), message.data.end()}});
+    return goes_on;
+  });
+  if (!read) return cut(read.error().line());
+  if (!gap.empty()) return cut(gap);
+  if (*read) return cut((*read)->error(file.string()).line());
+  if (!(*reader)->contents().finished) return cut(fmt::format("{}: was not finished", file.string()));
+  return goes_on;
+}
+
+bool RecordedMessages::push(RecordedMessage message) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return unwanted_ || bytes_ < kAheadBytes; });
+  if (unwanted_) return false;
+  bytes_ += message.bytes.size();
+  messages_.push_back(std::move(message));
+  lock.unlock();
+  changed_.notify_all();
+  return true;
+}
+
+}  // namespace pons::apps

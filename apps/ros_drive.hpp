@@ -1,0 +1,29 @@
+// How nodes of ROS 2 steer a base by hand: the topic cmd_vel. Everything happens on the node's thread.
+#pragma once
+
+#include <string>
+
+#include "pons/core/error.hpp"
+#include "pons/gate/ros/gate.hpp"
+#include "pons/wire/types/geometry_msgs/msg/twist.hpp"
+
+namespace pons::apps {
+
+class RosDrive {
+ public:
+  using Twist = wire::geometry_msgs::msg::Twist;
+  // `gate` outlives it, and has not been started.
+  explicit RosDrive(gate::ros::Gate& gate) : gate_(gate) {}
+  // Errors: those of Node::subscribe().
+  [[nodiscard]] Expected<void> serve();
+
+ private:
+  void take(const Twist& twist);
+  // Said once, until it is another thing or all is well again: these come twenty times a second.
+  void refuse(const std::string& why);
+
+  gate::ros::Gate& gate_;
+  std::string refused_;
+};
+
+}  // namespace pons::apps

@@ -1,0 +1,53 @@
+// What nodes of ROS 2 ask of the robot: to stop, to be reset, to be armed. Everything happens on the node's thread;
+// whoever polls the gate answers.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pons/core/error.hpp"
+#include "pons/gate/ros/gate.hpp"
+#include "pons/gate/ros/service.hpp"
+#include "pons/wire/types/std_srvs/srv/trigger.hpp"
+
+namespace pons::apps {
+
+class RosRobot {
+ public:
+  // `gate` is outlived by it, and has not been started.
+  explicit RosRobot(gate::ros::Gate& gate) : gate_(gate) {}
+  // The services ~/emergency_stop, ~/stop, ~/reset and ~/arm; and the topic /emergency_stop, on which true is an
+  // emergency stop and false nothing: as with a button on a wall, letting go of it moves nothing and resets nothing,
+  // for others may have pressed theirs. Errors: those of serve() and Node::subscribe().
+  [[nodiscard]] Expected<void> serve();
+
+ private:
+  using Trigger = wire::std_srvs::srv::Trigger;
+  using Clock = std::chrono::steady_clock;
+  // Whoever asks the same while it is being answered gets that answer: what he asked for had not been done before.
+  struct Verb {
+    std::string_view name;  // of the service and the request
+    gate::ros::Gate::Urgency urgency;
+    bool asked = false;
+    std::vector<gate::ros::Answer<Trigger>> waiting = {};
+  };
+  static constexpr std::size_t kWaitingMost = 256;
+  // A button that stays pressed says so again and again.
+  static constexpr std::chrono::milliseconds kPressedAgain{500};
+
+  void ask(Verb& verb);
+  void answer(Verb& verb, const gate::Json& told);
+  void pressed(Clock::time_point now);
+
+  gate::ros::Gate& gate_;
+  Verb emergency_stop_{"emergency_stop", gate::ros::Gate::Urgency::kUrgent};
+  Verb stop_{"stop", gate::ros::Gate::Urgency::kUrgent};
+  Verb reset_{"reset", gate::ros::Gate::Urgency::kAny}, arm_{"arm", gate::ros::Gate::Urgency::kAny};
+  bool is_pressed_ = false;
+  Clock::time_point pressed_at_;
+};
+
+}  // namespace pons::apps
