@@ -8,7 +8,8 @@ out=$PWD/build/colcon
 
 command -v colcon >/dev/null || die "colcon is not installed; run tools/setup"
 [ "$(colcon --log-base /dev/null list --base-paths . --names-only)" = pons ] || die "colcon does not find one package, pons"
-colcon --log-base "$out/log" build --base-paths . --build-base "$out/build" --install-base "$out/install" \
+# Builds in build/pons, as deep below the checkout as a preset's: what that compiled, ccache has for this one.
+colcon --log-base "$out/log" build --base-paths . --build-base build --install-base "$out/install" \
   --event-handlers console_direct+ --cmake-args -G Ninja -DCMAKE_BUILD_TYPE=Release -DPONS_BUILD_TESTS=OFF
 
 prefix=$out/install/pons

@@ -46,6 +46,8 @@ CMAKE
 package builtin_interfaces
 package unique_identifier_msgs
 package action_msgs builtin_interfaces unique_identifier_msgs
+package std_msgs builtin_interfaces
+package geometry_msgs builtin_interfaces std_msgs
 cp -r tests/ros_workspace/* "$out/src/"
 ln -s "$PWD/ros2/pons_msgs" "$out/src/pons_msgs"
 
@@ -53,7 +55,7 @@ colcon --log-base "$out/log" build --base-paths "$out/src" --build-base "$out/bu
   --executor sequential --event-handlers console_direct+ \
   --cmake-args -G Ninja -DCMAKE_BUILD_TYPE=Debug -DPython3_EXECUTABLE=/usr/bin/python3 "-DPONS_INCLUDES=$PWD;$types" || die "colcon could not build it"
 
-for name in msg/TaskStatus.msg msg/TaskStatusArray.msg srv/CommandTask.srv srv/SubmitTask.srv action/ExecuteTask.action; do
+for name in msg/LinkCommand.msg msg/ObjectBelief.msg msg/ObjectBeliefArray.msg msg/RobotState.msg msg/TaskEvent.msg msg/TaskStatus.msg msg/TaskStatusArray.msg srv/CommandTask.srv srv/SubmitTask.srv action/ExecuteTask.action; do
   [ -e "$out/install/pons_msgs/share/pons_msgs/$name" ] || die "$name was not installed"
 done
 libraries=$(find "$out/install" -name '*.so' -printf '%h\n' | sort -u | paste -sd:)

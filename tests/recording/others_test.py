@@ -92,6 +92,22 @@ class Others(unittest.TestCase):
                 decoded += 1
         self.assertGreaterEqual(decoded, 190)
 
+    def test_a_run_is_read_and_its_messages_are_what_their_types_say(self):
+        path = self.root / "run.mcap"
+        run(PONS, "run", "small_cell", "--parcels", "1", "--quiet", "--record", path)
+        data, expected = path.read_bytes(), shown(path)
+        self.assertEqual(read(seeking(data)), expected)
+        self.assertEqual(read(NonSeekingReader(io.BytesIO(data), validate_crcs=True)), expected)
+        last = {channel.topic: value for _, channel, _, value in seeking(data).iter_decoded_messages()}
+        self.assertEqual({channel.topic for _, channel, _ in seeking(data).iter_messages()}, set(last))
+        self.assertEqual(len(last["/joint_states"].position), 7)
+        self.assertIn("<robot", last["/robot_description"].data)
+        self.assertEqual(last["/pons/beliefs"].header.frame_id, "world")
+        self.assertGreater(last["/pons/state"].tick, 1000)
+        notes = {each.name: each.metadata for each in seeking(data).iter_metadata()}
+        self.assertEqual(notes["pons.run"]["world"], "small_cell")
+        self.assertEqual(notes["pons.end"]["how"], "complete")
+
     def test_what_pons_mends_is_whole(self):
         whole = self.written("lz4").read_bytes()
         for part in (0.1, 0.35, 0.6, 0.8, 0.9):

@@ -12,7 +12,6 @@
 #include "pons/gate/ros/action.hpp"
 #include "pons/gate/ros/node.hpp"
 #include "pons/gate/ros/service.hpp"
-#include "pons/gate/ros/test_nodes.hpp"
 #include "pons/wire/types/pons_msgs/action/execute_task.hpp"
 #include "pons/wire/types/pons_msgs/srv/command_task.hpp"
 #include "pons/wire/types/pons_msgs/srv/submit_task.hpp"
@@ -22,6 +21,7 @@
 #include "pons/wire/types/tf2_msgs/msg/tf_message.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 #include "tests/ros/peer_process.hpp"
+#include "tests/ros/ros_run.hpp"
 
 namespace pons::gate::ros {
 namespace {
@@ -38,38 +38,6 @@ using wire::rosgraph_msgs::msg::Clock;
 using wire::sensor_msgs::msg::JointState;
 using wire::std_msgs::msg::String;
 using wire::tf2_msgs::msg::TFMessage;
-
-constexpr const char* kHome = R"({"id":"ID","priority":90,"steps":[{"skill":"move_to","arguments":{"place":"home"}}]})";
-
-constexpr const char* kWaits =
-    R"({"id":"watch","steps":[{"skill":"detect","arguments":{"object":"nobody","within_s":60}}]})";
-
-std::string home(const std::string& id) {
-  std::string task = kHome;
-  return task.replace(task.find("ID"), 2, id);
-}
-
-// By the clock, and longer than any test needs it: each ends it.
-class RosRun : public ::testing::Test {
- protected:
-  RosRun()
-      : run_(folder_.path(), "run",
-             {"run", "small_cell", "--parcels", "100", "--realtime", "--quiet", "--ros", "--ros-domain",
-              std::to_string(test_domain()), "--socket", folder_ / "s", "--journal", folder_ / "j.db"}) {}
-  // Ended as a person would.
-  void end_run() {
-    run_.signal(SIGINT);
-    (void)run_.wait();
-  }
-  [[nodiscard]] std::string story(const std::string& id) {
-    return tests::run_pons({"task", "history", id, "--journal", folder_ / "j.db"}).out;
-  }
-  [[nodiscard]] bool spun(const std::function<bool()>& done) { return spin_until({node_.get()}, done); }
-
-  tests::Folder folder_;
-  tests::Running run_;
-  std::unique_ptr<Node> node_ = test_node("test");
-};
 
 TEST_F(RosRun, ShowsItsRobot) {
   JointState joints;

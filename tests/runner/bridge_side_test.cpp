@@ -136,5 +136,33 @@ TEST_F(TakeOverTest, TheBeltWaitsForWhatWasPutBackUnseen) {
   EXPECT_EQ(belt_, link::Belt::kWaits);
 }
 
+TEST_F(TakeOverTest, AtRestNothingBeginsWhatRunsStandsAndTheBeltWaits) {
+  state_.safety = link::SafetyState::kOperational;
+  ASSERT_TRUE(bridge_.submit(R"({"id":"a","steps":[{"skill":"pick"}]})", now_));
+  ASSERT_TRUE(bridge_.submit(R"({"id":"b","steps":[{"skill":"pick"}]})", now_));
+  for (int i = 0; i < 3; ++i) tick();
+  ASSERT_EQ(bridge_.state("a"), "running");
+  EXPECT_FALSE(side_.rests());
+  side_.rest(now_);
+  for (int i = 0; i < 20; ++i) {  // and no longer than it may see nothing
+    tick();
+    side_.rest(now_);  // as whoever asks whether it rests does
+  }
+  EXPECT_TRUE(side_.rests());
+  EXPECT_EQ(bridge_.state("a"), "paused");
+  EXPECT_EQ(bridge_.state("b"), "waiting");
+  EXPECT_EQ(belt_, link::Belt::kWaits);
+  EXPECT_FALSE(side_.health().is_bad("brain")) << "it is not asked";
+  const auto refused = bridge_.submit(R"({"id":"c","steps":[{"skill":"pick"}]})", now_);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().line().find("the robot rests"), std::string::npos);
+  side_.go_on(now_);
+  tick();
+  EXPECT_FALSE(side_.rests());
+  EXPECT_EQ(bridge_.state("a"), "running");
+  EXPECT_EQ(belt_, link::Belt::kRuns);
+  EXPECT_TRUE(bridge_.submit(R"({"id":"c","steps":[{"skill":"pick"}]})", now_));
+}
+
 }  // namespace
 }  // namespace pons::runner

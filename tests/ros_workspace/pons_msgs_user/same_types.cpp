@@ -10,6 +10,10 @@
 #include <vector>
 
 #include <pons_msgs/action/execute_task.hpp>
+#include <pons_msgs/msg/link_command.hpp>
+#include <pons_msgs/msg/object_belief_array.hpp>
+#include <pons_msgs/msg/robot_state.hpp>
+#include <pons_msgs/msg/task_event.hpp>
 #include <pons_msgs/msg/task_status_array.hpp>
 #include <pons_msgs/srv/command_task.hpp>
 #include <pons_msgs/srv/submit_task.hpp>
@@ -18,6 +22,10 @@
 #include <rosidl_typesupport_introspection_cpp/message_type_support_decl.hpp>
 
 #include "pons/wire/types/pons_msgs/action/execute_task.hpp"
+#include "pons/wire/types/pons_msgs/msg/link_command.hpp"
+#include "pons/wire/types/pons_msgs/msg/object_belief_array.hpp"
+#include "pons/wire/types/pons_msgs/msg/robot_state.hpp"
+#include "pons/wire/types/pons_msgs/msg/task_event.hpp"
 #include "pons/wire/types/pons_msgs/msg/task_status_array.hpp"
 #include "pons/wire/types/pons_msgs/srv/command_task.hpp"
 #include "pons/wire/types/pons_msgs/srv/submit_task.hpp"
@@ -190,6 +198,10 @@ int main() {
   using namespace pons_msgs::srv;
   namespace ours = wire::pons_msgs;
   const std::array good{
+      same<pons_msgs::msg::LinkCommand, ours::msg::LinkCommand>(),
+      same<pons_msgs::msg::ObjectBeliefArray, ours::msg::ObjectBeliefArray>(),
+      same<pons_msgs::msg::RobotState, ours::msg::RobotState>(),
+      same<pons_msgs::msg::TaskEvent, ours::msg::TaskEvent>(),
       same<pons_msgs::msg::TaskStatus, ours::msg::TaskStatus>(),
       same<pons_msgs::msg::TaskStatusArray, ours::msg::TaskStatusArray>(),
       same<CommandTask::Request, ours::srv::CommandTask::Request>(),

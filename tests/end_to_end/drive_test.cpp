@@ -1,0 +1,190 @@
+// A base that somebody steers, in lockstep and by truth: limits, room, who goes first, each verb and each stop.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tests/end_to_end/rounds_kit.hpp"
+
+namespace pons::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+class SteeredTest : public RoundsTest {
+ protected:
+  // Until it is armed.
+  void arm() {
+    run_until([&] { return rounds_->chassis->wheels.operational() && rounds_->chassis->sure(); }, 3);
+  }
+  // Ten times a second, as a joystick does.
+  void steer_for(const model::Twist2& twist, double seconds) {
+    const Time end = now_ + from_s(seconds);
+    while (now_ < end && !HasFatalFailure()) {
+      if (now_.ns() % 100'000'000 == 0) (void)rounds_->steer(twist, now_);
+      step();
+      fastest_turn_ = std::max(fastest_turn_, std::abs(turns_rad_s()));
+    }
+  }
+  [[nodiscard]] std::string refused(const model::Twist2& twist) {
+    const auto steered = rounds_->steer(twist, now_);
+    return steered ? "" : steered.error().line();
+  }
+  [[nodiscard]] double turns_rad_s() const {
+    const auto& way = truth().way;
+    if (way.size() < 2) return 0;
+    return wrapped(way.back().map_from_base.yaw - way[way.size() - 2].map_from_base.yaw) / 0.01;
+  }
+
+  double fastest_turn_ = 0;
+};
+
+TEST_F(SteeredTest, KeepsItsLimitsHoweverHardItIsSteered) {
+  begin();
+  arm();
+  steer_for({100, 0}, 3);
+  EXPECT_GT(speed_m_s(), 0.4) << "it does as it is told, as far as it may";
+  steer_for({-100, 0}, 1);
+  steer_for({100, 100}, 3);
+  EXPECT_GT(fastest_turn_, 1.0);
+  EXPECT_LT(fastest_turn_, 1.2 * 1.03) << "its wheels are not as drawn";
+  steer_for({0, -100}, 2);
+  steer_for({0, 0}, 2);
+  EXPECT_LT(speed_m_s(), 0.01);
+  expect_good();  // the loop's own watch of speed, acceleration and jerk, too
+}
+
+TEST_F(SteeredTest, DoesWhatItIsTold) {
+  begin();
+  arm();
+  steer_for({0.2, 0}, 3);
+  EXPECT_NEAR(speed_m_s(), 0.2, 0.01);
+  EXPECT_NEAR(turns_rad_s(), 0, 0.03);
+  steer_for({0, 0.5}, 3);
+  EXPECT_NEAR(turns_rad_s(), 0.5, 0.02);
+  EXPECT_LT(speed_m_s(), 0.02);
+  expect_good();
+}
+
+TEST_F(SteeredTest, StopsSmoothlyWhenNobodySteersAnyMore) {
+  begin();
+  arm();
+  steer_for({0.4, 0}, 2);
+  ASSERT_GT(speed_m_s(), 0.3);
+  ASSERT_EQ(rounds_->bridge->state("drive-1"), "running");
+  run_for(0.3);
+  EXPECT_GT(speed_m_s(), 0.3) << "a message may be late";
+  run_for(2);
+  EXPECT_LT(speed_m_s(), 0.005);
+  await("drive-1", 3);
+  EXPECT_EQ(outcome("drive-1"), Outcome::kSucceeded) << reason("drive-1");
+  EXPECT_EQ(told("drive-1").at("why"), "nobody steers");
+  EXPECT_EQ(rounds_->bridge_side->stops(), 0) << "along its limits, by nobody's stop";
+  steer_for({0.2, 0}, 2);
+  EXPECT_GT(speed_m_s(), 0.1) << "and again";
+  EXPECT_EQ(rounds_->bridge->state("drive-2"), "running");
+  expect_good();
+}
+
+TEST_F(SteeredTest, GoesNoNearerToAWallThanItsRoom) {
+  begin();
+  arm();
+  steer_for({-0.5, 0}, 8);  // the wall is behind it, at x = -1
+  EXPECT_LT(place().x, -0.5);
+  EXPECT_GT(place().x, -1 + rounds_->world.base->radius_m);
+  EXPECT_LT(speed_m_s(), 0.01);
+  steer_for({0.3, 0}, 3);
+  EXPECT_GT(speed_m_s(), 0.2) << "away from it, it may";
+  expect_good();
+}
+
+TEST_F(SteeredTest, CreepsWhereItDoesNotKnowWhereItIs) {
+  change("world.yaml", "range_m: 8.0", "range_m: 0.06");
+  begin();
+  run_until([&] { return rounds_->chassis->wheels.operational(); }, 3);
+  for (int i = 0; i < 60 && rounds_->chassis->sure(); ++i) steer_for({0.1, 0.5}, 1);
+  ASSERT_FALSE(rounds_->chassis->sure());
+  steer_for({0.0, 0.0}, 1);
+  steer_for({0.5, 0}, 2);
+  EXPECT_GT(speed_m_s(), 0.05);
+  EXPECT_LT(speed_m_s(), 0.11);
+}
+
+TEST_F(SteeredTest, ATaskGoesFirst) {
+  begin();
+  arm();
+  steer_for({0.3, 0}, 2);
+  drive("home", R"({"place":"dock"})");
+  std::string why;
+  while (!ended("home") && !HasFatalFailure()) {
+    if (const std::string now = refused({0.3, 0.3}); !now.empty()) why = now;
+    steer_for({0.3, 0.3}, 0.1);
+  }
+  EXPECT_THAT(why, HasSubstr("a task has the base"));
+  EXPECT_EQ(outcome("home"), Outcome::kSucceeded) << reason("home");
+  EXPECT_EQ(outcome("drive-1"), Outcome::kSucceeded);
+  EXPECT_EQ(told("drive-1").at("why"), "a task waits for the base");
+  expect_good();
+}
+
+TEST_F(SteeredTest, AStandingWishBeginsNothingWhereTheRobotMayNotMove) {
+  begin();
+  EXPECT_THAT(refused({0.3, 0}), HasSubstr("not armed"));
+  arm();
+  steer_for({0.3, 0}, 2);
+  rounds_->bridge_side->arming().emergency_stop(now_);
+  run_for(2);
+  EXPECT_LT(speed_m_s(), 0.005);
+  const Pose2 stands = place();
+  EXPECT_THAT(refused({0.3, 0}), HasSubstr("not armed"));
+  ASSERT_TRUE(rounds_->bridge_side->arming().reset(now_));
+  run_for(0.1);
+  ASSERT_TRUE(rounds_->bridge_side->arming().arm(now_));
+  run_for(3);
+  EXPECT_LT((place().position() - stands.position()).norm(), 0.005) << "an old wish moves nothing";
+  await("drive-1", 3);
+  expect_good();
+}
+
+TEST_F(SteeredTest, PausedItStandsWhateverIsWished) {
+  begin();
+  arm();
+  steer_for({0.3, 0}, 2);
+  ASSERT_TRUE(rounds_->bridge->pause("drive-1", now_, "a person wants to pass"));
+  run_until([&] { return rounds_->bridge->state("drive-1") == "paused"; }, 3);
+  const Pose2 stands = place();
+  EXPECT_THAT(refused({0.3, 0}), HasSubstr("paused"));
+  steer_for({0.3, 0}, 2);
+  EXPECT_LT((place().position() - stands.position()).norm(), 0.005);
+  ASSERT_TRUE(rounds_->bridge->resume("drive-1", now_));
+  EXPECT_EQ(refused({0.3, 0}), "") << "else it would find that nobody steers, and end";
+  steer_for({0.3, 0}, 2);
+  EXPECT_GT(speed_m_s(), 0.2);
+  EXPECT_EQ(rounds_->bridge->state("drive-1"), "running");
+  expect_good();
+}
+
+TEST_F(SteeredTest, CancelledAndHaltedItStandsAndSaysSo) {
+  begin();
+  arm();
+  steer_for({0.3, 0}, 2);
+  ASSERT_TRUE(rounds_->bridge->cancel("drive-1", now_, "enough"));
+  await("drive-1", 5);
+  EXPECT_EQ(outcome("drive-1"), Outcome::kCancelled);
+  EXPECT_EQ(history("drive-1").record.outcome->detail.at("stop"), "CONFIRMED");
+  EXPECT_LT(speed_m_s(), 0.01);
+  steer_for({0.3, 0}, 2);
+  ASSERT_TRUE(rounds_->bridge->halt("drive-2", now_, "look out"));
+  step();
+  await("drive-2", 5);
+  EXPECT_EQ(outcome("drive-2"), Outcome::kCancelled);
+  EXPECT_EQ(history("drive-2").record.outcome->detail.at("stop"), "CONFIRMED");
+  EXPECT_GE(rounds_->bridge_side->stops(), 1);
+  expect_good();
+}
+
+}  // namespace
+}  // namespace pons::tests

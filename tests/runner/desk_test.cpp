@@ -1,0 +1,77 @@
+// In which order visitors are answered.
+#include "apps/desk.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pons/bridge/test_kit.hpp"
+
+namespace pons::apps {
+namespace {
+
+class Asks final : public gate::Visitors {
+ public:
+  explicit Asks(std::vector<std::string>& answered) : answered_(answered) {}
+  [[nodiscard]] std::vector<gate::Request> poll() override {
+    std::vector<gate::Request> requests;
+    for (const std::string& text : std::exchange(texts, {}))
+      requests.push_back({text, [this, text](const gate::Json& told) {
+                            answered_.push_back(told.value("ok", false) ? text : told.value("error", ""));
+                          }});
+    return requests;
+  }
+  std::vector<std::string> texts;
+
+ private:
+  std::vector<std::string>& answered_;
+};
+
+TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
+  const bridge::TemporaryFolder folder;
+  const auto journal = bridge::Journal::open(folder / "j.db").value();
+  world::World world;
+  world.resources = {{"arm"}};
+  bridge::Actor actor{"act", {{}}};
+  task::SkillRegistry skills;
+  skills.add(actor.type());
+  bridge::Bridge bridge(*journal, skills, world);
+  const link::State state;
+  std::vector<std::string> done;
+  const runner::SkillPort port{.state = [&]() -> const link::State& { return state; },
+                               .halt = [&] { done.emplace_back("halt"); },
+                               .raise_emergency = [&] { done.emplace_back("emergency"); }};
+  runner::Arming arming(bridge, port, world.zones, runner::Recovery::kRefused);
+  const runner::Health health{{}};
+  std::vector<std::string> answered;
+  auto asks = std::make_unique<Asks>(answered);
+  Asks& visitor = *asks;
+  Desk desk(std::move(asks), bridge, *journal, {&arming}, health, [] { return nullptr; });
+  const std::string stop = R"({"op":"stop"})", emergency = R"({"op":"emergency_stop"})", look = R"({"op":"health"})";
+  visitor.texts = {look, stop, look, emergency};
+  desk.attend(Time{});
+  EXPECT_EQ(answered, (std::vector{stop, emergency, look, look}));
+  EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
+}
+
+TEST(Desk, ARunThatIsNotServedIsNotToldToRest) {
+  const bridge::TemporaryFolder folder;
+  const auto journal = bridge::Journal::open(folder / "j.db").value();
+  const world::World world;
+  const task::SkillRegistry skills;
+  bridge::Bridge bridge(*journal, skills, world);
+  const runner::Health health{{}};
+  std::vector<std::string> answered;
+  auto asks = std::make_unique<Asks>(answered);
+  asks->texts = {R"({"op":"rest"})", R"({"op":"end"})"};
+  Desk desk(std::move(asks), bridge, *journal, {}, health, [] { return nullptr; });
+  desk.attend(Time{});
+  ASSERT_EQ(answered.size(), 2U);
+  for (const std::string& each : answered) EXPECT_NE(each.find("cannot be told to rest"), std::string::npos) << each;
+}
+
+}  // namespace
+}  // namespace pons::apps
