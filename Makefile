@@ -1,6 +1,8 @@
 # The face for people. Everything below is a line or two of CMake that you can also run yourself.
 .DEFAULT_GOAL := help
 JOBS ?= $(shell nproc)
+# One more than there are CPUs: many tests wait for a clock or for another process.
+TEST_JOBS ?= $(shell expr $$(nproc) + 1)
 WORLD ?= parcel_cell
 PARCELS ?= 200
 SEED ?= 1
@@ -12,7 +14,7 @@ TSAN_QUICK = rt_test link_test
 # What runs inside a tick, and what is exercised with it.
 LOOP = rt_test link_test motion_test cerebellum_test
 # What reads bytes that others wrote: fuzz/NAME.cpp.
-FUZZERS = cdr journal mcap task tree
+FUZZERS = cdr foxglove journal mcap ros task tree
 FUZZ_S ?= 30
 
 .PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers clean
@@ -38,7 +40,7 @@ demo: setup ## set up, build, and sort 200 parcels; report and picture land in b
 	  --report build/demo.json --picture build/demo.png
 
 test: build ## set up, build, and run all tests
-	ctest --preset release --parallel 2 --no-tests=error
+	ctest --preset release --parallel $(TEST_JOBS) --no-tests=error
 
 check: ## format, clang-tidy, layers, style, then all tests
 	@tools/setup --check
@@ -48,7 +50,7 @@ check: ## format, clang-tidy, layers, style, then all tests
 	tools/check_style
 	cmake --build --preset release --parallel $(JOBS)
 	tools/tidy build/release
-	ctest --preset release --parallel 2 --no-tests=error
+	ctest --preset release --parallel $(TEST_JOBS) --no-tests=error
 
 format: ## rewrite the sources as .clang-format says
 	@tools/setup --check
@@ -91,11 +93,9 @@ fuzz: ## every fuzzer for FUZZ_S seconds
 	@tools/setup --check
 	cmake --preset fuzz
 	cmake --build --preset fuzz --parallel $(JOBS) --target $(addprefix fuzz_,$(FUZZERS))
-	for name in $(FUZZERS); do \
-	  mkdir -p build/fuzz/corpus/$$name; \
-	  build/fuzz/fuzz/fuzz_$$name -max_total_time=$(FUZZ_S) -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
-	    -artifact_prefix=build/fuzz/$$name- build/fuzz/corpus/$$name fuzz/corpus/$$name || exit 1; \
-	done
+	mkdir -p $(addprefix build/fuzz/corpus/,$(FUZZERS))
+	printf '%s\n' $(FUZZERS) | xargs -P $(JOBS) -I NAME build/fuzz/fuzz/fuzz_NAME -max_total_time=$(FUZZ_S) -timeout=10 \
+	  -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix=build/fuzz/NAME- build/fuzz/corpus/NAME fuzz/corpus/NAME
 
 # Outside CMake: a peer is compiled from Debian's Eigen, of which nothing may enter our build.
 bench-peers: ## build what the benchmarks compare against
@@ -105,13 +105,14 @@ bench-peers: ## build what the benchmarks compare against
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
 
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
-	for program in cdr control_step inverse_kinematics journal recording scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
+	for program in cdr control_step inverse_kinematics journal recording ros_images ros_round_trip scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
 	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
+	bench/ros_flood.py --gate
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \
 	  [ -n "$$programs" ] || { echo "bench: build/release/bench holds no benchmark"; exit 1; }; \
-	  for program in $$programs; do echo "== $$program"; "$$program" || exit 1; done
+	  for program in $$programs bench/ros_flood.py; do echo "== $$program"; "$$program" || exit 1; done
 
 clean: ## remove what was built (keeps .venv)
 	rm -rf build install log
