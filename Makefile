@@ -94,8 +94,8 @@ fuzz: ## every fuzzer for FUZZ_S seconds
 	cmake --preset fuzz
 	cmake --build --preset fuzz --parallel $(JOBS) --target $(addprefix fuzz_,$(FUZZERS))
 	mkdir -p $(addprefix build/fuzz/corpus/,$(FUZZERS))
-	printf '%s\n' $(FUZZERS) | xargs -P $(JOBS) -I NAME build/fuzz/fuzz/fuzz_NAME -max_total_time=$(FUZZ_S) -timeout=10 \
-	  -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix=build/fuzz/NAME- build/fuzz/corpus/NAME fuzz/corpus/NAME
+	printf '%s\n' $(FUZZERS) | xargs -P $(JOBS) -I NAME sh -c 'exec build/fuzz/fuzz/fuzz_NAME -max_total_time=$(FUZZ_S) \
+	  -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix=build/fuzz/NAME- build/fuzz/corpus/NAME fuzz/corpus/NAME'
 
 # Outside CMake: a peer is compiled from Debian's Eigen, of which nothing may enter our build.
 bench-peers: ## build what the benchmarks compare against
