@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "pons/gate/request.hpp"
+#include "apps/task_requests.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::apps {
@@ -32,16 +32,6 @@ std::int8_t status_of(const TaskEnd& end, std::int8_t status) {
   return by_client ? GoalStatus::STATUS_CANCELED : GoalStatus::STATUS_ABORTED;
 }
 
-// What is no JSON goes to the desk as it is, which refuses it and writes that down. What is goes as a task, whatever
-// its members are called.
-void submit_text(gate::ros::Gate& gate, const std::string& text, std::function<void(const Json&)> answered) {
-  const auto task = task::parse_json(text);
-  if (!task) return gate.ask(text, std::move(answered));
-  if (task->is_object() && task->contains("tasks"))
-    return answered(gate::refusal({"several tasks where one is asked for", "tasks", "send each by itself"}));
-  gate.ask(Json{{"op", "submit"}, {"task", *task}}, std::move(answered));
-}
-
 FollowedTasks::FollowedTasks(gate::ros::Gate& gate, std::size_t most) : gate_(gate), most_(most) {
   auto later = std::make_unique<Later>();
   later_ = later.get();
@@ -52,8 +42,10 @@ void FollowedTasks::begin(const GoalId& goal, const std::string& text, Hears hea
   if (followed_.size() >= most_)
     return hears.refused(fmt::format(
         "{} goals go on already; wait for one of them, or submit the task by the service ~/submit_task", most_));
+  auto request = request_for(text);
+  if (!request) return hears.refused(request.error().line());
   followed_[goal].hears = std::move(hears);
-  submit_text(gate_, text, [this, goal, text](const Json& told) {
+  gate_.ask(*std::move(request), [this, goal, text](const Json& told) {
     if (!told.value("ok", false)) return refuse(goal, told.value("error", "no answer"));
     Followed& followed = followed_.at(goal);
     followed.task = told.value("id", "");

@@ -76,7 +76,4 @@ class FollowedTasks {
   std::map<GoalId, Followed> followed_;
 };
 
-// Asks the desk for a task by its JSON text.
-void submit_text(gate::ros::Gate& gate, const std::string& text, std::function<void(const gate::Json&)> answered);
-
 }  // namespace pons::apps

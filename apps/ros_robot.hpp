@@ -30,7 +30,7 @@ class RosRobot {
   // Whoever asks the same while it is being answered gets that answer: what he asked for had not been done before.
   struct Verb {
     std::string_view name;  // of the service and the request
-    gate::ros::Gate::Urgency urgency;
+    gate::Urgency urgency;
     bool asked = false;
     std::vector<gate::ros::Answer<Trigger>> waiting = {};
   };
@@ -43,9 +43,9 @@ class RosRobot {
   void pressed(Clock::time_point now);
 
   gate::ros::Gate& gate_;
-  Verb emergency_stop_{"emergency_stop", gate::ros::Gate::Urgency::kUrgent};
-  Verb stop_{"stop", gate::ros::Gate::Urgency::kUrgent};
-  Verb reset_{"reset", gate::ros::Gate::Urgency::kAny}, arm_{"arm", gate::ros::Gate::Urgency::kAny};
+  Verb emergency_stop_{"emergency_stop", gate::Urgency::kUrgent};
+  Verb stop_{"stop", gate::Urgency::kUrgent};
+  Verb reset_{"reset", gate::Urgency::kAny}, arm_{"arm", gate::Urgency::kAny};
   bool is_pressed_ = false;
   Clock::time_point pressed_at_;
 };

@@ -1,17 +1,13 @@
 #include "apps/ros_tasks.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
 #include "apps/story_text.hpp"
-#include "pons/gate/request.hpp"
+#include "apps/task_requests.hpp"
 #include "pons/gate/ros/service.hpp"
-#include "pons/wire/types/pons_msgs/srv/command_task.hpp"
-#include "pons/wire/types/pons_msgs/srv/submit_task.hpp"
 
 namespace pons::apps {
 namespace {
@@ -25,21 +21,16 @@ using wire::pons_msgs::srv::SubmitTask;
 using Result = wire::pons_msgs::action::ExecuteTask::Result;
 using Feedback = wire::pons_msgs::action::ExecuteTask::Feedback;
 
-constexpr std::array kVerbs{
-    std::pair{CommandTask::Request::PAUSE, "pause"}, std::pair{CommandTask::Request::RESUME, "resume"},
-    std::pair{CommandTask::Request::CANCEL, "cancel"}, std::pair{CommandTask::Request::HALT, "halt"}};
 constexpr std::array<std::pair<std::string_view, std::uint8_t>, 4> kOutcomes{{{"SUCCEEDED", Result::SUCCEEDED},
                                                                               {"FAILED", Result::FAILED},
                                                                               {"CANCELLED", Result::CANCELLED},
                                                                               {"EXCEPTION", Result::EXCEPTION}}};
 
-// What the desk answered, as a service's answer begins.
-template <typename Response>
-Response response_of(const Json& told) {
-  Response response;
-  response.ok = told.value("ok", false);
-  if (!response.ok) response.error = told.value("error", "no answer");
-  return response;
+// `question` may be an error: then that is the answer.
+template <typename S>
+void ask(gate::ros::Gate& gate, Expected<std::string> question, const Answer<S>& answer) {
+  if (!question) return answer({.error = question.error().line()});
+  gate.ask(*std::move(question), [answer](const Json& told) { answer(response_of<typename S::Response>(told)); });
 }
 
 Feedback feedback_of(const Json& event) {
@@ -67,21 +58,12 @@ Result result_of(const TaskEnd& end) {
 Expected<void> RosTasks::serve() {
   auto served = gate::ros::serve<SubmitTask>(
       gate_.node(), "~/submit_task", [this](const SubmitTask::Request& request, const Answer<SubmitTask>& answer) {
-        submit_text(gate_, request.task, [answer](const Json& told) {
-          auto response = response_of<SubmitTask::Response>(told);
-          response.id = told.value("id", "");
-          answer(response);
-        });
+        ask<SubmitTask>(gate_, request_for(request.task), answer);
       });
   if (!served) return served;
   served = gate::ros::serve<CommandTask>(
       gate_.node(), "~/command_task", [this](const CommandTask::Request& request, const Answer<CommandTask>& answer) {
-        const auto* const verb = std::ranges::find(kVerbs, request.verb, &decltype(kVerbs)::value_type::first);
-        if (verb == kVerbs.end())
-          return answer({.error = fmt::format("{} is no verb; 1 pauses, 2 resumes, 3 cancels, 4 halts", request.verb)});
-        Json asked{{"op", verb->second}, {"id", request.id}};
-        if (!request.reason.empty()) asked["reason"] = request.reason;
-        gate_.ask(asked, [answer](const Json& told) { answer(response_of<CommandTask::Response>(told)); });
+        ask<CommandTask>(gate_, request_for(request), answer);
       });
   if (!served) return served;
   auto goals = gate::ros::serve_action<ExecuteTask>(

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "apps/dialects/dialect.hpp"
+#include "apps/dialects/commanded.hpp"
 #include "pons/task/json_text.hpp"
 #include "pons/wire/json.hpp"
 #include "pons/wire/types/universal_robot_core/msg/task_command.hpp"
@@ -40,35 +40,15 @@ Expected<Json> asked_by(const TaskCommand& command, const Phrasebook& phrases) {
   return Json{{"priority", priority_of(command.priority)}, {"steps", *std::move(steps)}};
 }
 
-class Universal final : public Dialect {
- public:
-  Universal(world::Dialect spec, Phrasebook phrases) : spec_(std::move(spec)), phrases_(std::move(phrases)) {}
-
-  [[nodiscard]] Expected<void> open(gate::ros::Node& node, Hears hears) override {
-    auto feedback = speak_at<TaskFeedback>(node, spec_.feedback);
-    if (!feedback) return std::unexpected(feedback.error());
-    feedback_.emplace(std::move(*feedback));
-    return listen<TaskCommand>(node, spec_.topic, [this, hears = std::move(hears)](const TaskCommand& command) {
-      hears({.id = command.task_id, .asked = asked_by(command, phrases_), .heard = wire::to_json(command)});
-    });
-  }
-
-  void tell(const Saying& saying) override {
-    if (!is_course(saying)) return;
-    (void)feedback_->publish(
-        {.task_id = saying.id, .status = std::string(three_words(saying.state)), .message = saying.detail});
-  }
-
- private:
-  world::Dialect spec_;
-  Phrasebook phrases_;
-  std::optional<gate::ros::Publisher<TaskFeedback>> feedback_;
-};
+TaskFeedback told(const Saying& saying) {
+  return {.task_id = saying.id, .status = std::string(three_words(saying.state)), .message = saying.detail};
+}
 
 }  // namespace
 
 std::unique_ptr<Dialect> universal(const world::Dialect& spec, Phrasebook phrases) {
-  return std::make_unique<Universal>(spec, std::move(phrases));
+  using Made = Commanded<TaskCommand, TaskFeedback>;
+  return std::make_unique<Made>(spec, std::move(phrases), Made::Words{asked_by, told});
 }
 
 }  // namespace pons::apps

@@ -165,21 +165,8 @@ Json schema() {
 }  // namespace
 
 task::SkillType follow_trajectory(Cell& cell) {
-  return {.name = "follow_trajectory",
-          .summary = "Move the joints through given positions at given times",
-          .schema = schema(),
-          .resources = {cell.world.arm},
-          .timeout = from_s(2 * kLongestWay_s),
-          .attempts = 1,
-          .outputs = {"took_s", "worst_rad"},
-          .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
-          .feasible = [&cell](const Json& arguments, task::Moment) -> Expected<void> {
-            auto points = read(cell, arguments);
-            if (!points) return std::unexpected(points.error());
-            return {};
-          },
-          .start = [&cell](const Json& arguments,
-                           Time) { return conduct(cell, follow_timed(cell, way_of(cell, arguments))); }};
+  return timed_skill(cell,
+                     {"follow_trajectory", "Move the joints through given positions at given times", schema(), way_of});
 }
 
 }  // namespace pons::skills

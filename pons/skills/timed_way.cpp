@@ -5,13 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
+
+#include "pons/skills/conduct.hpp"
 
 namespace pons::skills {
 namespace {
 
 using motion::TimedPoint;
+using task::Json;
 using task::Progress;
 using task::Status;
 
@@ -284,8 +288,23 @@ class FollowTimed final : public ArmSkill {
 
 }  // namespace
 
-std::unique_ptr<ArmSkill> follow_timed(Cell& cell, Expected<TimedWay> asked) {
-  return std::make_unique<FollowTimed>(cell, std::move(asked));
+task::SkillType timed_skill(Cell& cell, TimedSkill skill) {
+  return {.name = std::move(skill.name),
+          .summary = std::move(skill.summary),
+          .schema = std::move(skill.schema),
+          .resources = {cell.world.arm},
+          .timeout = from_s(2 * kLongestWay_s),
+          .attempts = 1,
+          .outputs = {"took_s", "worst_rad"},
+          .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
+          .feasible = [&cell, read = skill.read](const Json& arguments, task::Moment) -> Expected<void> {
+            const auto way = read(cell, arguments);
+            if (!way) return std::unexpected(way.error());
+            return {};
+          },
+          .start = [&cell, read = skill.read](
+                       const Json& arguments,
+                       Time) { return conduct(cell, std::make_unique<FollowTimed>(cell, read(cell, arguments))); }};
 }
 
 Expected<void> check_times(std::span<const TimedPoint> points) {

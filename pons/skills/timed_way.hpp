@@ -2,14 +2,14 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "pons/core/error.hpp"
 #include "pons/motion/timed.hpp"
-#include "pons/skills/conduct.hpp"
+#include "pons/skills/cell.hpp"
+#include "pons/task/skill.hpp"
 
 namespace pons::skills {
 
@@ -24,12 +24,17 @@ struct TimedWay {
   std::function<Expected<void>(const AxisVector& measured, const AxisVector& planned)> arrived;
 };
 
-// Waits for rest; plans; looks at all of the way, some of it a tick, and at what is ahead of it while it goes
-// (Router::judge()); sees that the arm has arrived. A way that cannot be gone in its times, or is not clear, is refused
-// before anything moves: by point and axis, with the least time. Paused or stopped, it goes on from where the arm then
-// stands along the rest, with what longer times that takes; where somebody else has had it, from where it had left off.
-// `asked` may be an error: then it fails with that.
-[[nodiscard]] std::unique_ptr<ArmSkill> follow_timed(Cell& cell, Expected<TimedWay> asked);
+// A skill of that kind, of whose arguments `read` makes the way, or says what is wrong with them. It waits for rest;
+// plans; looks at all of the way, some of it a tick, and at what is ahead of it while it goes (Router::judge()); sees
+// that the arm has arrived. A way that cannot be gone in its times, or is not clear, is refused before anything moves:
+// by point and axis, with the least time. Paused or stopped, it goes on from where the arm then stands along the rest,
+// with what longer times that takes; where somebody else has had it, from where it had left off.
+struct TimedSkill {
+  std::string name, summary;
+  task::Json schema;
+  Expected<TimedWay> (*read)(Cell& cell, const task::Json& arguments);
+};
+[[nodiscard]] task::SkillType timed_skill(Cell& cell, TimedSkill skill);
 
 // Whether times make sense by themselves: they grow, by a tick of the loop at least, and do not end too late.
 [[nodiscard]] Expected<void> check_times(std::span<const motion::TimedPoint> points);

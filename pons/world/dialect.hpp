@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pons/world/outside.hpp"
+#include "pons/world/filling.hpp"
 
 namespace pons::world {
 

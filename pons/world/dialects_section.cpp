@@ -13,9 +13,8 @@ namespace {
 
 using Kind = Dialect::Kind;
 
-constexpr std::size_t kMostDialects = 8, kMostPhrases = 128, kMostSteps = 32, kMostMembers = 64, kMostParameters = 32;
+constexpr std::size_t kMostDialects = 8, kMostPhrases = 128, kMostSteps = 32, kMostParameters = 32;
 constexpr std::size_t kLongestText = 200, kLongestWord = 64;
-constexpr int kDeepest = 8;
 constexpr std::array<std::string_view, 4> kVerbs{"pause", "resume", "cancel", "halt"};
 
 // What is the same for all of a kind: its name in the file, where it is heard and answered unless the world says
@@ -53,7 +52,9 @@ class Steps {
       step.arguments.where = one.place();
       if (map.has("arguments")) {
         if (!map["arguments"].node().IsMap()) map["arguments"].refuse("is not a mapping", "write NAME: VALUE for each");
-        step.arguments = filling(map["arguments"], 1);
+        step.arguments = read_filling(map["arguments"], [this](const YamlValue& text, std::string_view name) {
+          return Piece{Piece::Kind::kArgument, parameter(text, name)};
+        });
       }
       steps.push_back(std::move(step));
     }
@@ -72,56 +73,6 @@ class Steps {
   }
 
  private:
-  Filling filling(const YamlValue& value, int depth) {
-    Filling read{.where = value.place()};
-    if (depth > kDeepest) value.refuse("is too deep", fmt::format("at most {} inside one another", kDeepest));
-    if (value.node().IsSequence()) {
-      read.kind = Filling::Kind::kElements;
-      for (const YamlValue& element : value.list(0, kMostMembers)) read.parts.push_back(filling(element, depth + 1));
-      return read;
-    }
-    if (value.node().IsMap()) {
-      for (const auto& [name, member] : value.members(kMostMembers)) {
-        if (member.node().IsMap() && member.node().size() == 1 && member.node().begin()->second.IsNull())
-          member.refuse("is a mapping", "write a parameter in quotes, as \"{0}\"");
-        read.parts.push_back(filling(member, depth + 1));
-        read.parts.back().name = name;
-      }
-      return read;
-    }
-    const bool quoted = value.node().IsScalar() && value.node().Tag() == "!";
-    const std::string text = quoted ? value.node().Scalar() : value.text();
-    if (text.size() > kLongestText)
-      value.refuse(fmt::format("has {} characters", text.size()), fmt::format("write at most {}", kLongestText));
-    read.kind = quoted || text.find_first_of("{}") != text.npos ? Filling::Kind::kText : Filling::Kind::kWord;
-    if (read.kind == Filling::Kind::kWord) {
-      read.word = text;
-    } else {
-      read.pieces = pieces(value, text);
-    }
-    return read;
-  }
-  std::vector<Piece> pieces(const YamlValue& value, std::string_view text) {
-    std::vector<Piece> found;
-    std::string plain;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      const bool brace = text[i] == '{' || text[i] == '}';
-      if (brace && i + 1 < text.size() && text[i + 1] == text[i]) {
-        plain += text[i++];
-      } else if (!brace) {
-        plain += text[i];
-      } else {
-        const std::size_t close = text.find('}', i);
-        if (text[i] == '}' || close == text.npos)
-          value.refuse("has a brace without its other", "write {{ and }} for braces that stand for themselves");
-        if (!plain.empty()) found.push_back({Piece::Kind::kText, std::exchange(plain, {})});
-        found.push_back({Piece::Kind::kArgument, parameter(value, text.substr(i + 1, close - i - 1))});
-        i = close;
-      }
-    }
-    if (!plain.empty() || found.empty()) found.push_back({Piece::Kind::kText, std::move(plain)});
-    return found;
-  }
   std::string parameter(const YamlValue& value, std::string_view name) {
     if (make_.kind == Kind::kBrain && !counts(name))
       value.refuse(fmt::format("there is no parameter '{}'", name), "a brain's have places: {0}, {1}, …");

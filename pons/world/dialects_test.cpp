@@ -1,12 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
-
 #include "pons/world/dialect.hpp"
-#include "pons/world/test_folder.hpp"
-#include "pons/world/world.hpp"
+#include "pons/world/test_cell.hpp"
 
 namespace pons::world {
 namespace {
@@ -36,33 +32,12 @@ constexpr const char* kDialects = R"(
     steps: [{skill: place, arguments: {place: "{destination}"}}]
 )";
 
-class DialectsSection : public ::testing::Test {
+class DialectsSection : public CellTest {
  protected:
-  void SetUp() override {
-    folder_.write("cell/scene.xml", "<mujoco/>");
-    folder_.write("robots/ur5e/ur5e.urdf", "<robot/>");
-    folder_.write("robots/suction4/gripper.xml", "<mujoco/>");
-    std::ifstream stream("worlds/parcel_cell/world.yaml", std::ios::binary);
-    text_.assign(std::istreambuf_iterator<char>(stream), {});
-    const std::size_t from = text_.find("\ndialects:"), to = text_.find("\n\n", from);
-    ASSERT_LT(from, to) << "the cell has no dialects";
-    text_.erase(from, to - from);
+  DialectsSection() : CellTest("dialects") {}
+  [[nodiscard]] std::string changed(std::string_view from, std::string_view to) const {
+    return CellTest::changed(kDialects, from, to);
   }
-  Expected<World> with(const std::string& dialects) {
-    folder_.write("cell/world.yaml", text_ + "\ndialects:" + dialects);
-    return load(folder_.path(), "cell");
-  }
-  // The error after the first `from` has become `to`.
-  std::string changed(std::string_view from, std::string_view to) {
-    std::string text = kDialects;
-    const std::size_t at = text.find(from);
-    if (at == std::string::npos) return "the text to change is not there";
-    const auto world = with(text.replace(at, from.size(), to));
-    return world ? "no error" : world.error().line();
-  }
-
-  TestFolder folder_;
-  std::string text_;
 };
 
 TEST_F(DialectsSection, SaysWhatIsHeardWhereAndWhatItMeans) {
@@ -138,7 +113,7 @@ TEST_F(DialectsSection, EachMistakeIsNamed) {
   EXPECT_THAT(changed("{destination}", "{target}"),
               AllOf(HasSubstr("dialects[4].steps[0].arguments.place: there is no parameter 'target'"),
                     HasSubstr("task_id, object_id, destination, priority")));
-  EXPECT_THAT(changed("\"{destination}\"", "{destination}"), HasSubstr("write a parameter in quotes"));
+  EXPECT_THAT(changed("\"{destination}\"", "{destination}"), HasSubstr("write \"{destination}\", in quotes"));
   EXPECT_THAT(changed("\"{x}\"", "\"{}\""), HasSubstr("a parameter without a name"));
   EXPECT_THAT(changed("skill: press", "skill: Press"), HasSubstr("'Press' is not a name"));
   EXPECT_THAT(changed("{skill: press, arguments:", "{skill: press, params:"), HasSubstr("unknown key"));

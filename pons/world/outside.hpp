@@ -9,13 +9,9 @@
 #include <vector>
 
 #include "pons/core/time.hpp"
+#include "pons/world/filling.hpp"
 
 namespace pons::world {
-
-// A text of the file, and where it stands: file, line and key.
-struct Placed {
-  std::string text, where;
-};
 
 // What a task gives with a use of such a skill.
 struct OutsideArgument {
@@ -25,33 +21,6 @@ struct OutsideArgument {
   double minimum = -1e9, maximum = 1e9;                                // of numbers
   std::vector<std::string> choices = {};                               // of a text; none: any
   std::optional<std::variant<bool, double, std::string>> preset = {};  // where a task leaves it out
-};
-
-// Text and arguments in turn.
-struct Piece {
-  enum class Kind : std::uint8_t {
-    kText,
-    kArgument,
-    kQuaternion,  // the turn by that argument, rad, about z; as a geometry_msgs/Quaternion
-  };
-  Kind kind = Kind::kText;
-  std::string text;  // or the argument's name
-};
-
-// A value of a message, into which arguments are filled.
-struct Filling {
-  enum class Kind : std::uint8_t {
-    kWord,      // without quotes: a number, yes, no, or a text
-    kText,      // its pieces; one argument alone keeps its type
-    kMembers,   // of a message
-    kElements,  // of a list
-  };
-  Kind kind = Kind::kMembers;
-  std::string where;
-  std::string name;  // of a member
-  std::string word;
-  std::vector<Piece> pieces;
-  std::vector<Filling> parts;  // members, or elements
 };
 
 struct OutsideSkill {

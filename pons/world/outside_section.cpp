@@ -12,8 +12,7 @@
 namespace pons::world {
 namespace {
 
-constexpr std::size_t kMostSkills = 64, kMostArguments = 32, kMostMembers = 256, kMostTold = 16;
-constexpr int kDeepest = 16;
+constexpr std::size_t kMostSkills = 64, kMostArguments = 32, kMostTold = 16;
 constexpr std::size_t kLongestText = 200, kLongestName = 64;
 constexpr double kLongest_s = 86'400, kServerWait_s = 5, kSoonest_s = 0.5, kLargest = 1e9;
 constexpr std::string_view kTurn = "quaternion(";
@@ -90,66 +89,12 @@ class Fillings {
  public:
   explicit Fillings(const std::vector<OutsideArgument>& arguments) : arguments_(arguments) {}
 
-  Filling read(const YamlValue& value, int depth = 1) {
-    Filling filling{.where = value.place()};
-    if (depth > kDeepest) value.refuse("is too deep", fmt::format("at most {} inside one another", kDeepest));
-    if (value.node().IsSequence()) {
-      filling.kind = Filling::Kind::kElements;
-      for (const YamlValue& element : value.list(0, kMostMembers)) filling.parts.push_back(read(element, depth + 1));
-      return filling;
-    }
-    if (value.node().IsMap()) {
-      for (const auto& [name, member] : value.members(kMostMembers)) {
-        if (member.node().IsNull())
-          member.refuse("is empty", fmt::format("an argument is written \"{{{}}}\", in quotes", name));
-        filling.parts.push_back(read(member, depth + 1));
-        filling.parts.back().name = name;
-      }
-      return filling;
-    }
-    const bool quoted = value.node().IsScalar() && value.node().Tag() == "!";
-    const std::string text = quoted ? value.node().Scalar() : value.text();
-    if (quoted || text.find_first_of("{}") != text.npos) {
-      filling.kind = Filling::Kind::kText;
-      filling.pieces = pieces(value, text);
-    } else {
-      filling.kind = Filling::Kind::kWord;
-      filling.word = text;
-    }
-    return filling;
+  Filling read(const YamlValue& value) {
+    return read_filling(value, [this](const YamlValue& text, std::string_view name) { return argument(text, name); });
   }
   [[nodiscard]] bool uses(const std::string& argument) const { return used_.contains(argument); }
 
  private:
-  std::vector<Piece> pieces(const YamlValue& value, std::string_view text) {
-    std::vector<Piece> found;
-    std::string plain;
-    const auto end_plain = [&] {
-      if (!plain.empty()) found.push_back({Piece::Kind::kText, std::exchange(plain, {})});
-    };
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      const bool brace = text[i] == '{' || text[i] == '}';
-      if (brace && i + 1 < text.size() && text[i + 1] == text[i]) {
-        plain += text[i++];
-        continue;
-      }
-      if (!brace) {
-        plain += text[i];
-        continue;
-      }
-      const std::size_t close = text.find('}', i);
-      if (text[i] == '}' || close == text.npos)
-        value.refuse("has a brace without its other", "write {{ and }} for braces that stand for themselves");
-      end_plain();
-      found.push_back(argument(value, text.substr(i + 1, close - i - 1)));
-      i = close;
-    }
-    end_plain();
-    if (found.empty()) found.push_back({});
-    if (found.size() > 1 && std::ranges::find(found, Piece::Kind::kQuaternion, &Piece::kind) != found.end())
-      value.refuse("has more beside a quaternion", "it is a value of its own");
-    return found;
-  }
   Piece argument(const YamlValue& value, std::string_view name) {
     const bool turns = name.starts_with(kTurn) && name.ends_with(')');
     if (turns) name = name.substr(kTurn.size(), name.size() - kTurn.size() - 1);

@@ -3,11 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
-
-#include "pons/world/test_folder.hpp"
-#include "pons/world/world.hpp"
+#include "pons/world/test_cell.hpp"
 
 namespace pons::world {
 namespace {
@@ -36,30 +32,12 @@ constexpr const char* kNavigate = R"(
     reason: error_msg
 )";
 
-class OutsideSection : public ::testing::Test {
+class OutsideSection : public CellTest {
  protected:
-  void SetUp() override {
-    folder_.write("cell/scene.xml", "<mujoco/>");
-    folder_.write("robots/ur5e/ur5e.urdf", "<robot/>");
-    folder_.write("robots/suction4/gripper.xml", "<mujoco/>");
-    std::ifstream stream("worlds/parcel_cell/world.yaml", std::ios::binary);
-    text_.assign(std::istreambuf_iterator<char>(stream), {});
+  OutsideSection() : CellTest("skills") {}
+  [[nodiscard]] std::string changed(std::string_view from, std::string_view to) const {
+    return CellTest::changed(kNavigate, from, to);
   }
-  Expected<World> with(const std::string& skills) {
-    folder_.write("cell/world.yaml", text_ + "\nskills:" + skills);
-    return load(folder_.path(), "cell");
-  }
-  // The error after the first `from` has become `to`.
-  std::string changed(std::string_view from, std::string_view to) {
-    std::string text = kNavigate;
-    const std::size_t at = text.find(from);
-    if (at == std::string::npos) return "the text to change is not there";
-    const auto world = with(text.replace(at, from.size(), to));
-    return world ? "no error" : world.error().line();
-  }
-
-  TestFolder folder_;
-  std::string text_;
 };
 
 TEST_F(OutsideSection, SaysWhoServesASkillAndHowItIsAsked) {
@@ -113,7 +91,7 @@ TEST_F(OutsideSection, EachMistakeIsNamed) {
   EXPECT_THAT(
       changed("x: \"{x}\"", "x: \"{z}\""),
       AllOf(HasSubstr("skills[0].goal.pose.pose.position.x: there is no argument 'z'"), HasSubstr("x, y, yaw")));
-  EXPECT_THAT(changed("x: \"{x}\"", "x: {x}"), HasSubstr("an argument is written \"{x}\", in quotes"));
+  EXPECT_THAT(changed("x: \"{x}\"", "x: {x}"), HasSubstr("write \"{x}\", in quotes"));
   EXPECT_THAT(changed("x: \"{x}\"", "x: \"{x\""), HasSubstr("a brace without its other"));
   EXPECT_THAT(changed("quaternion(yaw)", "quaternion(map)"), HasSubstr("'map' is no number"));
   EXPECT_THAT(changed("\"{quaternion(yaw)}\"", "\"{quaternion(yaw)}!\""), HasSubstr("more beside a quaternion"));

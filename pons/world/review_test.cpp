@@ -3,11 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
-
-#include "pons/world/test_folder.hpp"
-#include "pons/world/world.hpp"
+#include "pons/world/test_cell.hpp"
 
 namespace pons::world {
 namespace {
@@ -16,29 +12,9 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 // A world that is whole, with other rules.
-class ReviewSection : public ::testing::Test {
+class ReviewSection : public CellTest {
  protected:
-  void SetUp() override {
-    folder_.write("cell/scene.xml", "<mujoco/>");
-    folder_.write("robots/ur5e/ur5e.urdf", "<robot/>");
-    folder_.write("robots/suction4/gripper.xml", "<mujoco/>");
-    std::ifstream stream("worlds/parcel_cell/world.yaml", std::ios::binary);
-    text_.assign(std::istreambuf_iterator<char>(stream), {});
-    const std::size_t from = text_.find("\nreview:"), to = text_.find("\n\n", from);
-    ASSERT_LT(from, to);
-    text_.erase(from, to - from);
-  }
-  Expected<World> with(const std::string& review) {
-    folder_.write("cell/world.yaml", text_ + "\nreview:\n" + review);
-    return load(folder_.path(), "cell");
-  }
-  std::string error(const std::string& review) {
-    const auto world = with(review);
-    return world ? "no error" : world.error().line();
-  }
-
-  TestFolder folder_;
-  std::string text_;
+  ReviewSection() : CellTest("review") {}
 };
 
 TEST_F(ReviewSection, SaysWhatMayBeDone) {

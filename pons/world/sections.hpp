@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pons/world/world.hpp"
@@ -27,6 +29,10 @@ void read_pick_zone(const YamlMap& map, Belt& belt);
 void read_arms(const YamlValue& value, World& world);
 
 [[nodiscard]] Review read_review(const YamlValue& value);
+
+// What stands between two braces of a text there; it throws where that means nothing.
+using BetweenBraces = std::function<Piece(const YamlValue& text, std::string_view between)>;
+[[nodiscard]] Filling read_filling(const YamlValue& value, const BetweenBraces& between);
 
 // Skills that others serve; what they hold must be among the world's resources.
 [[nodiscard]] std::vector<OutsideSkill> read_outside(const YamlValue& value, const std::vector<Resource>& resources);

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "pons/gate/foxglove/connection.hpp"
-#include "pons/gate/request.hpp"
+#include "pons/gate/questions.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::gate::foxglove {
@@ -24,13 +24,6 @@ constexpr std::chrono::milliseconds kAcceptPause{100};  // when the process has 
 constexpr std::chrono::milliseconds kGoodbye{300};
 constexpr std::string_view kFull =
     "HTTP/1.1 503 Service Unavailable\r\nConnection: close\r\nContent-Type: text/plain\r\n\r\ntoo many connections\n";
-
-// What the server's thread and whoever answers share; it may outlive the server.
-struct Answers {
-  std::mutex mutex;
-  std::vector<std::pair<std::uint64_t, Json>> came;  // under mutex, as is:
-  std::function<void()> wake;                        // empty once the server has gone
-};
 
 // What the server knows of a channel outside of its thread.
 struct Known {
@@ -73,16 +66,12 @@ class Server::Work final : public Host {
   }
 
   void start() {
-    answers_->wake = [this] { asio::post(io_, [this] { take_answers(); }); };
     accept();
     thread_ = std::thread([this] { io_.run(); });
   }
 
   void stop() {
-    {
-      const std::scoped_lock lock(answers_->mutex);
-      answers_->wake = nullptr;
-    }
+    questions_.close();
     if (!thread_.joinable()) return;
     asio::post(io_, [this] { say_goodbye(); });
     thread_.join();
@@ -124,35 +113,7 @@ class Server::Work final : public Host {
     return known_[channel].keeps == Keeps::kLast || *known_[channel].subscribers > 0;
   }
 
-  void ask(std::string request, std::function<void(const Json&)> answered) {
-    {
-      const std::scoped_lock lock(mutex_);
-      if (asked_.size() < settings_.limits.asked) {
-        asked_.emplace_back(std::move(request), ++numbers_);
-        open_.emplace(numbers_, std::move(answered));
-        return;
-      }
-    }
-    answered(refusal({fmt::format("{} requests wait already", settings_.limits.asked), "Foxglove", "ask again later"}));
-  }
-
-  std::vector<Request> poll() {
-    std::vector<std::pair<std::string, std::uint64_t>> asked;
-    {
-      const std::scoped_lock lock(mutex_);
-      asked.swap(asked_);
-    }
-    std::vector<Request> requests;
-    for (auto& [text, number] : asked) {
-      requests.push_back({std::move(text), [answers = answers_, number = number](const Json& answer) {
-                            const std::scoped_lock lock(answers->mutex);
-                            if (!answers->wake) return;
-                            answers->came.emplace_back(number, answer);
-                            answers->wake();
-                          }});
-    }
-    return requests;
-  }
+  Questions& questions() { return questions_; }
 
   std::vector<std::string> take_warnings() {
     const std::scoped_lock lock(mutex_);
@@ -266,18 +227,6 @@ class Server::Work final : public Host {
     }
   }
 
-  void take_answers() {
-    decltype(answers_->came) came;
-    {
-      const std::scoped_lock lock(answers_->mutex);
-      came.swap(answers_->came);
-    }
-    for (const auto& [number, answer] : came) {
-      const auto open = open_.extract(number);
-      if (open) open.mapped()(answer);
-    }
-  }
-
   void say_goodbye() {
     spread();
     Failure ignored;
@@ -302,16 +251,15 @@ class Server::Work final : public Host {
   tcp::acceptor acceptor_{io_};
   asio::steady_timer pause_{io_}, last_{io_};
   std::map<std::uint64_t, std::shared_ptr<Connection>> connections_;  // of the thread, as are:
-  std::uint64_t next_connection_ = 0, numbers_ = 0;
-  std::map<std::uint64_t, std::function<void(const Json&)>> open_;
+  std::uint64_t next_connection_ = 0;
   Time told_time_;
   SteadyTime time_at_;
-  std::shared_ptr<Answers> answers_ = std::make_shared<Answers>();
+  Questions questions_{"Foxglove", settings_.limits.asked,
+                       [this] { asio::post(io_, [this] { questions_.take_answers(); }); }};
   std::mutex mutex_;
   std::deque<Put> queued_;  // under mutex_, as are:
   std::vector<std::pair<Channel, std::shared_ptr<std::atomic<int>>>> added_;
   std::size_t queued_bytes_ = 0;
-  std::vector<std::pair<std::string, std::uint64_t>> asked_;
   std::vector<std::string> warnings_;
   std::set<std::string> told_;
   std::atomic<std::int64_t> newest_ns_ = 0;
@@ -350,10 +298,10 @@ std::uint64_t Server::dropped() const { return work_->dropped(); }
 
 std::vector<std::string> Server::take_warnings() { return work_->take_warnings(); }
 
-std::vector<Request> Server::poll() { return work_->poll(); }
+std::vector<Request> Server::poll() { return work_->questions().poll(); }
 
 void Server::ask(std::string request, std::function<void(const Json&)> answered) {
-  work_->ask(std::move(request), std::move(answered));
+  work_->questions().ask(std::move(request), std::move(answered));
 }
 
 }  // namespace pons::gate::foxglove

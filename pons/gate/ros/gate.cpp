@@ -1,12 +1,8 @@
 #include "pons/gate/ros/gate.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-
-#include "pons/gate/request.hpp"
 
 namespace pons::gate::ros {
 namespace {
@@ -21,13 +17,10 @@ Expected<std::unique_ptr<Gate>> Gate::open(const NodeSettings& settings) {
   return std::unique_ptr<Gate>(new Gate(std::move(*node)));
 }
 
-Gate::Gate(std::unique_ptr<Node> node) : node_(std::move(node)) { answers_->node = node_.get(); }
+Gate::Gate(std::unique_ptr<Node> node)
+    : node_(std::move(node)), questions_("ROS 2", kAskedMost, [woken = node_.get()] { woken->wake(); }) {}
 
-Gate::~Gate() {
-  stop();
-  const std::scoped_lock lock(answers_->mutex);
-  answers_->node = nullptr;
-}
+Gate::~Gate() { stop(); }
 
 void Gate::start() {
   thread_ = std::thread([this] { run(); });
@@ -42,7 +35,7 @@ void Gate::stop() {
 void Gate::run() {
   while (!stop_) {
     node_->spin_for(kLooksAtLeast);
-    take_answers();
+    questions_.take_answers();
     look_who_hears();
     write_all();
     auto lines = node_->take_warnings();
@@ -87,54 +80,6 @@ void Gate::write_all() {
 
 void Gate::look_who_hears() {
   for (std::size_t topic = 0; topic < writers_.size(); ++topic) wanted_[topic] = !writers_[topic]->matched().empty();
-}
-
-void Gate::put_question(Asked asked, std::function<void(const Json&)> answered, Urgency urgency) {
-  {
-    const std::scoped_lock lock(mutex_);
-    if (asked_.size() < kAskedMost + (urgency == Urgency::kUrgent ? kUrgentMost : 0)) {
-      asked.number = ++numbers_;
-      asked_.push_back(std::move(asked));
-      open_.emplace_back(numbers_, std::move(answered));
-      return;
-    }
-  }
-  answered(refusal({fmt::format("{} requests wait already", kAskedMost), "ROS 2", "ask again later"}));
-}
-
-std::vector<Request> Gate::poll() {
-  std::vector<Asked> asked;
-  {
-    const std::scoped_lock lock(mutex_);
-    asked.swap(asked_);
-  }
-  std::vector<Request> requests;
-  for (Asked& each : asked) {
-    requests.push_back({std::move(each.text),
-                        [answers = answers_, number = each.number](const Json& answer) {
-                          const std::scoped_lock lock(answers->mutex);
-                          if (answers->node == nullptr) return;
-                          answers->came.emplace_back(number, answer);
-                          answers->node->wake();
-                        },
-                        std::move(each.refused)});
-  }
-  return requests;
-}
-
-void Gate::take_answers() {
-  decltype(answers_->came) came;
-  {
-    const std::scoped_lock lock(answers_->mutex);
-    came.swap(answers_->came);
-  }
-  for (const auto& [number, answer] : came) {
-    const auto open = std::ranges::find(open_, number, &decltype(open_)::value_type::first);
-    if (open == open_.end()) continue;
-    const auto answered = std::move(open->second);
-    open_.erase(open);
-    answered(answer);
-  }
 }
 
 std::vector<std::string> Gate::take_warnings() {

@@ -18,6 +18,7 @@
 
 #include "pons/core/error.hpp"
 #include "pons/gate/local_socket.hpp"
+#include "pons/gate/questions.hpp"
 #include "pons/gate/ros/node.hpp"
 
 namespace pons::gate::ros {
@@ -77,7 +78,7 @@ class Gate final : public Visitors {
   // ---- on the thread of whoever answers ----
 
   // At most all that were asked since the last call; answers may come from any thread, also when the gate has gone.
-  [[nodiscard]] std::vector<Request> poll() override;
+  [[nodiscard]] std::vector<Request> poll() override { return questions_.poll(); }
   // What people should know, a line each.
   [[nodiscard]] std::vector<std::string> take_warnings();
   // Messages that found no room.
@@ -85,52 +86,31 @@ class Gate final : public Visitors {
 
   // ---- on the node's thread ----
 
-  // What is urgent has room when nothing else has. Ask for so little of it that this is enough.
-  enum class Urgency : std::uint8_t { kAny, kUrgent };
-  static constexpr std::size_t kUrgentMost = 16;  // kAskedMost not counted
-
   // `answered` is called on the node's thread, once, unless whoever polls goes without answering.
   void ask(const Json& request, std::function<void(const Json&)> answered, Urgency urgency = Urgency::kAny) {
     ask(dump_line(request), std::move(answered), urgency);
   }
   void ask(std::string request, std::function<void(const Json&)> answered, Urgency urgency = Urgency::kAny) {
-    put_question({std::move(request), std::nullopt}, std::move(answered), urgency);
+    questions_.ask(std::move(request), std::move(answered), urgency);
   }
   // For what came and cannot be asked, so that whoever answers can write it down: its text, and why. Answered likewise.
   void refuse(std::string text, Error why, std::function<void(const Json&)> answered) {
-    put_question({std::move(text), std::move(why)}, std::move(answered), Urgency::kAny);
+    questions_.refuse(std::move(text), std::move(why), std::move(answered));
   }
 
  private:
-  struct Asked {
-    std::string text;
-    std::optional<Error> refused;
-    std::uint64_t number = 0;
-  };
-  // What the two sides share; the answers' part may outlive the gate.
-  struct Answers {
-    std::mutex mutex;
-    std::vector<std::pair<std::uint64_t, Json>> came;  // under mutex, as is:
-    Node* node = nullptr;                              // to wake; null once it has gone
-  };
-
   explicit Gate(std::unique_ptr<Node> node);
   void run();
   void write_all();
   void look_who_hears();
-  void take_answers();
-  void put_question(Asked asked, std::function<void(const Json&)> answered, Urgency urgency);
 
   std::unique_ptr<Node> node_;
   std::vector<std::unique_ptr<Writer>> writers_;
-  std::deque<std::atomic<bool>> wanted_;                                          // a writer; all may ask
-  std::vector<std::pair<std::uint64_t, std::function<void(const Json&)>>> open_;  // of the node's thread, as is:
-  std::uint64_t numbers_ = 0;
-  std::shared_ptr<Answers> answers_ = std::make_shared<Answers>();
+  std::deque<std::atomic<bool>> wanted_;  // a writer; all may ask
+  Questions questions_;
   std::mutex mutex_;
   std::deque<std::pair<std::size_t, std::vector<std::byte>>> queued_;  // under mutex_, as are:
   std::size_t queued_bytes_ = 0;
-  std::vector<Asked> asked_;
   std::vector<std::string> warnings_;
   std::atomic<std::uint64_t> dropped_ = 0;
   std::atomic<bool> stop_ = false;

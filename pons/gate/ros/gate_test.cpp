@@ -95,10 +95,10 @@ TEST(RosGate, WhatIsUrgentHasRoomWhenNothingElseHas) {
   int refused = 0;
   const auto count = [&](const Json&) { ++refused; };
   for (std::size_t i = 0; i < Gate::kAskedMost; ++i) gate->ask(Json{{"op", "robot"}}, count);
-  for (std::size_t i = 0; i < Gate::kUrgentMost; ++i) gate->ask(Json{{"op", "stop"}}, count, Gate::Urgency::kUrgent);
+  for (std::size_t i = 0; i < Questions::kUrgentMost; ++i) gate->ask(Json{{"op", "stop"}}, count, Urgency::kUrgent);
   EXPECT_EQ(refused, 0);
   gate->ask(Json{{"op", "robot"}}, count);
-  gate->ask(Json{{"op", "stop"}}, count, Gate::Urgency::kUrgent);
+  gate->ask(Json{{"op", "stop"}}, count, Urgency::kUrgent);
   EXPECT_EQ(refused, 2);
 }
 
