@@ -8,12 +8,6 @@
 #include "apps/outside.hpp"
 #include "apps/policies.hpp"
 #include "apps/resources.hpp"
-#include "apps/views/arms_view.hpp"
-#include "apps/views/beliefs_view.hpp"
-#include "apps/views/clock_view.hpp"
-#include "apps/views/frames.hpp"
-#include "apps/views/link_view.hpp"
-#include "apps/views/low_level_view.hpp"
 #include "apps/visitors.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/rt/clock.hpp"
@@ -105,6 +99,7 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   auto simulation = sim::Simulation::create(world, manifest, setup.seed, setup.faults);
   if (!simulation) return std::unexpected(simulation.error());
   self->faults = setup.faults;
+  self->stays = setup.stays;
   self->simulation = std::move(*simulation);
   self->simulation->lend(
       [half = self.get()](const auto& first, const auto& second) { half->helper.both(first, second); });
@@ -121,7 +116,7 @@ runner::BodyParts BodyHalf::parts() {
     robots.push_back({arms[i]->name, &simulation->body(i), &arms[i]->cerebellum, &arms[i]->end});
   return {.plant = {.cameras = simulation->cameras(),
                     .advance = [this](Time now) { simulation->advance_to(now); },
-                    .finished = [this] { return simulation->finished(); },
+                    .finished = [this] { return !stays && simulation->finished(); },
                     .health = [this] { return simulation->health(); }},
           .robots = std::move(robots),
           .photographer = photographer.get()};
@@ -148,16 +143,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
     if (!listening) return std::unexpected(listening.error());
     socket = std::move(*listening);
   }
-  if (options.ros) {
-    auto node = RosNode::open(*options.ros);
-    if (!node) return std::unexpected(node.error());
-    self->ros = std::move(*node);
-    if (auto served = self->ros->serve_parameters(world.name); !served) return std::unexpected(served.error());
-    if (auto connected = self->ros->connect(self->outside); !connected) return std::unexpected(connected.error());
-    if (auto speaks = self->ros->speak(world.dialects, registry); !speaks) return std::unexpected(speaks.error());
-    self->outlets.add(*self->ros);
-  }
-  for (Sink* const sink : options.sinks) self->outlets.add(*sink);
+  if (auto opened = self->open_sinks(world, options); !opened) return std::unexpected(opened.error());
   if (auto opened = self->open_journal(options); !opened) return std::unexpected(opened.error());
   if (realtime) self->journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   self->bridge = std::make_unique<bridge::Bridge>(*self->journal, registry, world);
@@ -193,6 +179,8 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
         std::make_unique<Desk>(std::move(asked), *self->bridge, *self->journal, self->bridge_side->armings(),
                                self->bridge_side->health(), [half = self.get()] { return half->cell().stream; });
     self->desk->serve(*self->bridge_side);
+    self->desk->serve(Desk::Axes{self->cell().model.axis_names(),
+                                 [&cell = self->cell()]() -> const link::State& { return cell.arm.state(); }});
   }
   return self;
 }
@@ -209,66 +197,6 @@ Expected<void> BridgeHalf::add_observer(const world::World& world, const Meeting
   observer =
       std::make_unique<runner::Observer>(world, *sight, meeting.frames, meeting.pages, meeting.pixels, meeting.pace);
   return {};
-}
-
-// What it shows, to all who are there by now.
-Expected<void> BridgeHalf::open_views(const world::World& world, const BridgeOptions& options) {
-  std::vector<ShownRobot> shown;
-  const auto stations = world.arms();
-  for (std::size_t i = 0; i < arms.size(); ++i)
-    shown.push_back({arms.size() > 1 ? stations[i].arm : std::string(), arms[i]->cell.model.copy(),
-                     [&cell = arms[i]->cell]() -> const link::State& { return cell.arm.state(); }});
-  auto robots = ArmsView::open(outlets, std::move(shown), {.transforms = cameras->frames()});
-  if (!robots) return std::unexpected(robots.error());
-  views.push_back(std::move(*robots));
-  auto clock = ClockView::open(outlets);
-  if (!clock) return std::unexpected(clock.error());
-  views.push_back(std::move(*clock));
-  if (auto seen = open_inner_views(); !seen) return seen;
-  const gate::ros::NodeName name = options.ros ? options.ros->name : gate::ros::NodeName{"/", "pons"};
-  auto run = RunViews::open(outlets, *bridge, name, health_sources(world, name));
-  if (!run) return std::unexpected(run.error());
-  run_views_ = run->get();
-  views.push_back(std::move(*run));
-  return {};
-}
-
-// What it believes, and what crosses the link.
-Expected<void> BridgeHalf::open_inner_views() {
-  auto beliefs =
-      BeliefsView::open(outlets, [side = bridge_side.get()]() -> const runner::Snapshot& { return side->seen(); });
-  if (!beliefs) return std::unexpected(beliefs.error());
-  views.push_back(std::move(*beliefs));
-  std::vector<LinkView::Robot> robots;
-  std::vector<LowLevelView::Robot> moved;
-  for (std::size_t robot = 0; robot < arms.size(); ++robot)
-    moved.push_back({arms.size() > 1 ? arms[robot]->cell.world.arm : std::string(), &arms[robot]->cell.arm,
-                     arms[robot]->cell.model.copy(), [half = bridge.get(), robot] { return half->mover(robot); }});
-  auto commands = LowLevelView::open(outlets, std::move(moved));
-  if (!commands) return std::unexpected(commands.error());
-  views.push_back(std::move(*commands));
-  for (const auto& arm : arms) {
-    const world::Robot& robot = arm->cell.world.robot;
-    robots.push_back({.name = arms.size() > 1 ? arm->cell.world.arm : std::string(),
-                      .hand = &arm->cell.arm,
-                      .frame = std::string(kWorldFrame),
-                      .axes = static_cast<std::size_t>(robot.home.size()),
-                      .cups = robot.tool.cups_m.size()});
-  }
-  auto links = LinkView::open(outlets, std::move(robots));
-  if (!links) return std::unexpected(links.error());
-  views.push_back(std::move(*links));
-  return {};
-}
-
-HealthView::Sources BridgeHalf::health_sources(const world::World& world, const gate::ros::NodeName& name) {
-  HealthView::Sources sources{
-      .node = name.name, .hardware = world.name, .health = &bridge_side->health(), .loops = {}, .dropped = {}};
-  for (const auto& arm : arms)
-    sources.loops.emplace_back(arms.size() > 1 ? arm->cell.world.arm : std::string(),
-                               [&cell = arm->cell]() -> const link::State& { return cell.arm.state(); });
-  if (ros) sources.dropped.emplace_back("ROS 2", [node = ros.get()] { return node->dropped(); });
-  return sources;
 }
 
 void BridgeHalf::show(Time now) {

@@ -61,6 +61,7 @@ struct BodySetup {
   std::vector<sim::Visit> visits;    // who comes into which zone
   std::optional<AxisVector> arm_at;  // where the arm is found; at home without it
   world::FaultPlan faults;           // what goes wrong
+  bool stays = false;                // it is never finished
 };
 
 // Members stand in the order in which they need each other.
@@ -74,6 +75,7 @@ class BodyHalf {
   [[nodiscard]] runner::BodyParts parts();
 
   world::FaultPlan faults;
+  bool stays = false;
   runner::Helper helper;  // the cameras'
   std::unique_ptr<sim::Simulation> simulation;
   // What is one an arm, below the link.
@@ -157,6 +159,7 @@ class BridgeHalf {
   [[nodiscard]] Expected<void> add_arms(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_journal(const BridgeOptions& options);
   [[nodiscard]] Expected<void> add_observer(const world::World& world, const Meeting& meeting);
+  [[nodiscard]] Expected<void> open_sinks(const world::World& world, const BridgeOptions& options);
   [[nodiscard]] Expected<void> open_views(const world::World& world, const BridgeOptions& options);
   [[nodiscard]] Expected<void> open_inner_views();
   [[nodiscard]] HealthView::Sources health_sources(const world::World& world, const gate::ros::NodeName& name);

@@ -154,6 +154,8 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
       return take(asked, now);
     case gate::Operation::kHealth:
       return {{"ok", true}, {"time_s", now.s()}, {"health", health_.describe()}};
+    case gate::Operation::kAxes:
+      return tell_axes();
     case gate::Operation::kBase:
     case gate::Operation::kDrive:
       return ask_base(asked, now);
@@ -264,6 +266,20 @@ Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {
     if (!told) return told;
   }
   return {};
+}
+
+Json Desk::tell_axes() const {
+  if (!axes_) return gate::refusal({"the robot is no arm", "axes", "ask in a world with one, as parcel_cell"});
+  const link::State& state = axes_->state();
+  if (state.position.size() == 0 || state.commanded.position.size() == 0)
+    return gate::refusal({"the loop has told nothing of its arm yet", "axes", "ask again"});
+  const auto values = [](const AxisVector& of) { return std::vector<double>(of.begin(), of.end()); };
+  return {{"ok", true},
+          {"time_s", state.stamp.s()},
+          {"names", axes_->names},
+          {"positions", values(state.position)},
+          {"speeds", values(state.speed)},
+          {"commanded", {{"positions", values(state.commanded.position)}, {"speeds", values(state.commanded.speed)}}}};
 }
 
 Json Desk::ask_base(const gate::Asked& asked, Time now) {

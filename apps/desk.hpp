@@ -12,6 +12,7 @@
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
+#include "pons/link/message.hpp"
 #include "pons/runner/arming.hpp"
 #include "pons/runner/bridge_side.hpp"
 #include "pons/runner/health.hpp"
@@ -36,6 +37,12 @@ class Desk {
     std::function<Expected<std::string>(double ahead_m_s, double turn_rad_s, Time)> drive;
   };
   void serve(Base base) { base_ = std::move(base); }
+  // The arm whose axes it may be asked for; without, it is refused.
+  struct Axes {
+    std::vector<std::string> names;
+    std::function<const link::State&()> state;
+  };
+  void serve(Axes axes) { axes_ = std::move(axes); }
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
@@ -55,6 +62,7 @@ class Desk {
   void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json describe() const;
+  [[nodiscard]] bridge::Json tell_axes() const;
   [[nodiscard]] bridge::Json ask_base(const gate::Asked& asked, Time now);
   [[nodiscard]] bridge::Json tell_run(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;
@@ -68,6 +76,7 @@ class Desk {
   Stream stream_;
   runner::BridgeSide* run_ = nullptr;
   std::optional<Base> base_;
+  std::optional<Axes> axes_;
   struct Watcher {
     gate::Request request;
     gate::Asked asked;

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string>
+
 namespace pons::apps {
 
 Expected<void> check_outside(const world::World& world, const RosOptions& ros, runner::Pace pace) {
@@ -14,6 +17,15 @@ Expected<void> check_outside(const world::World& world, const RosOptions& ros, r
   if (!ros.on) return refused(", and this run is none", "--ros");
   if (pace == runner::Pace::kLockstep) return refused(", which lives by the clock", "--realtime");
   return {};
+}
+
+bool is_served_by_another(const gate::ros::Node& node, std::string_view name,
+                          const std::vector<world::OutsideSkill>& skills) {
+  const auto wire_name = [&](std::string_view of) {
+    return node.wire_name(of, gate::ros::Use::kTopic).value_or(std::string());
+  };
+  return std::ranges::any_of(
+      skills, [&](const world::OutsideSkill& skill) { return wire_name(skill.server.text) == wire_name(name); });
 }
 
 std::optional<bridge::Resumption> outside_resumption(const gate::ros::OutsideSkills& skills, const task::Task& task,

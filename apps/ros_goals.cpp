@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "apps/outside.hpp"
 #include "apps/views/frames.hpp"
 #include "pons/task/json_text.hpp"
 
@@ -66,12 +67,7 @@ Expected<void> RosGoals::serve(const std::vector<world::OutsideSkill>& others) {
   auto heard = gate_.node().subscribe<PoseStamped>("goal_pose", gate::ros::kTopicQos,
                                                    [this](const PoseStamped& pose) { take_pose(pose); });
   if (!heard) return heard;
-  const auto wire_name = [this](std::string_view name) {
-    return gate_.node().wire_name(name, gate::ros::Use::kTopic).value_or(std::string());
-  };
-  const bool taken_by_another = std::ranges::any_of(
-      others, [&](const world::OutsideSkill& other) { return wire_name(other.server.text) == wire_name(kAction); });
-  if (taken_by_another) return {};
+  if (is_served_by_another(gate_.node(), kAction, others)) return {};
   auto goals = gate::ros::serve_action<NavigateToPose>(
       gate_.node(), kAction, [this](const GoalId& goal, const NavigateToPose::Goal& asked) { begin(goal, asked); },
       [this](const GoalId& goal) { return followed_.cancel(goal, "its client cancelled it"); });

@@ -27,8 +27,8 @@ class RosGoals {
 
   // `gate` outlives it, and has not been started.
   explicit RosGoals(gate::ros::Gate& gate) : gate_(gate), followed_(gate, kGoalsMost) {}
-  // An action that one of `others` is served by is left to that: of two servers each would take every goal. Errors:
-  // those of serve_action() and Node::subscribe().
+  // An action that one of `others` is served by is left to that. Errors: those of serve_action() and
+  // Node::subscribe().
   [[nodiscard]] Expected<void> serve(const std::vector<world::OutsideSkill>& others);
 
  private:

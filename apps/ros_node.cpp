@@ -53,6 +53,11 @@ Expected<void> RosNode::serve_base(const std::vector<world::OutsideSkill>& other
   return drive_->serve();
 }
 
+Expected<void> RosNode::serve_arm(std::vector<std::string> joints, const std::vector<world::OutsideSkill>& others) {
+  trajectories_ = std::make_unique<RosTrajectories>(*gate_, std::move(joints));
+  return trajectories_->serve(others);
+}
+
 Expected<void> RosNode::speak(const std::vector<world::Dialect>& dialects, const task::SkillRegistry& skills) {
   auto interpreter = std::make_unique<Interpreter>(*gate_);
   Interpreter& speaks = *interpreter;

@@ -16,6 +16,7 @@
 #include "apps/ros_parameters.hpp"
 #include "apps/ros_robot.hpp"
 #include "apps/ros_tasks.hpp"
+#include "apps/ros_trajectories.hpp"
 #include "apps/views/outlets.hpp"
 #include "pons/core/error.hpp"
 #include "pons/core/time.hpp"
@@ -40,6 +41,9 @@ class RosNode final : public Sink {
   [[nodiscard]] Expected<std::size_t> add(const ShownTopic& topic) override;
   // Likewise: what Nav2's users ask of a base. Errors: those of RosGoals::serve() and RosDrive::serve().
   [[nodiscard]] Expected<void> serve_base(const std::vector<world::OutsideSkill>& others);
+  // Likewise: what MoveIt's users ask of an arm, of such joints. Errors: those of RosTrajectories::serve().
+  [[nodiscard]] Expected<void> serve_arm(std::vector<std::string> joints,
+                                         const std::vector<world::OutsideSkill>& others);
   // Likewise: what is asked for in the words of others. Errors: those of Interpreter::speak().
   [[nodiscard]] Expected<void> speak(const std::vector<world::Dialect>& dialects, const task::SkillRegistry& skills);
   // Likewise: skills of its world that others serve. Errors: as of Node::add_writer().
@@ -74,6 +78,7 @@ class RosNode final : public Sink {
   std::unique_ptr<RosRobot> robot_;
   std::unique_ptr<RosGoals> goals_;
   std::unique_ptr<RosDrive> drive_;
+  std::unique_ptr<RosTrajectories> trajectories_;
   std::unique_ptr<RosParameters> parameters_;
   std::unique_ptr<RosLifecycle> lifecycle_;
   const std::atomic<double>* states_hz_ = nullptr;

@@ -85,7 +85,7 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, const RunAlong& a
                 progress.put(degraded_line(what));
                 cell.above->say(LogView::Log::WARN, Time{}, degraded_line(what));
               },
-          .limit = Time(slowest(static_cast<std::size_t>(total))),
+          .limit = options.stay ? Time{} : Time(slowest(static_cast<std::size_t>(total))),
           .attended = cell.above->desk != nullptr};
 }
 
@@ -130,6 +130,11 @@ int run_cell(const RunOptions& options, Assembly& cell, const RunAlong& along, s
   return result->complete && reckoning->good() ? kExitGood : kExitBadRun;
 }
 
+// Who stays has what comes to do, and brings parcels along only where he says so.
+bool has_parcels(const RunOptions& options) {
+  return !options.stay || options.parcels.parcels_given || !options.parcels.manifest.empty();
+}
+
 // But for what a base is asked for. Error: a file that holds some of it cannot be read; of a base there is none.
 Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world) {
   RunFacts facts{.world = options.world};
@@ -140,7 +145,7 @@ Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world
   facts.seed = options.parcels.seed;
   facts.keep_free_mib = options.keep_free_mib;
   const bool whole = !options.parcels.manifest.empty() && !options.parcels.parcels_given;
-  if (!whole) facts.parcels = options.parcels.parcels;
+  if (!whole) facts.parcels = has_parcels(options) ? options.parcels.parcels : 0;
   facts.faults = options.body.faults;
   facts.visits = options.body.visits;
   facts.arm_at = options.body.arm_at;
@@ -199,8 +204,6 @@ struct CellInputs {
 };
 
 Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& world) {
-  if (options.stay)
-    return fail(world.name + " has an arm, which is done when its parcels are", "--stay", "leave it out");
   if (!options.tasks.empty() || !options.speech.empty()) {
     return fail("a cell with an arm gets its tasks from its dispatcher", options.tasks.empty() ? "--speech" : "--task",
                 "leave it out; pons task submit sends others to a run");
@@ -209,10 +212,11 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
     return fail(fmt::format("{} has {} arms, which run in virtual time", world.name, world.arms().size()), "--realtime",
                 "leave it out");
   }
-  auto manifest = manifest_of(options.parcels, world, "pons run");
+  auto manifest = has_parcels(options) ? manifest_of(options.parcels, world, "pons run") : world::Manifest{};
   if (!manifest) return std::unexpected(manifest.error());
   auto setup = body_setup(options.body, options.parcels.seed, world);
   if (!setup) return std::unexpected(setup.error());
+  setup->stays = options.stay;
   return CellInputs{std::move(*manifest), std::move(*setup)};
 }
 
@@ -235,7 +239,8 @@ void add_options(CLI::App& command, RunOptions& options) {
   command.add_option("--task", options.tasks,
                      "FILE or FILE@SECONDS: what a base is asked for, and when (what its world has)");
   command.add_flag("--stay", options.stay,
-                   "Of a base: go on until Ctrl-C, and do what is asked for meanwhile; without --task nothing else");
+                   "Go on until Ctrl-C, and do what is asked for meanwhile; besides nothing but what --task, --parcels "
+                   "or --manifest say");
   command.add_option("--speech", options.speech, "Folder for what a base says, a WAV file each (a temporary one)");
   add_body_setup_options(command, options.body);
   add_keep_free(command, options.keep_free_mib);

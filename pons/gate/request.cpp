@@ -24,7 +24,7 @@ constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
     "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "approve",
-                    "observe", "chunk", "health", "base", "drive", "robot", "stop", "emergency_stop", "reset", "arm", "rest",
+                    "observe", "chunk", "health", "axes", "base", "drive", "robot", "stop", "emergency_stop", "reset", "arm", "rest",
                     "go_on", "end"]},
     "task": {"type": "object"},
     "tasks": {"type": "array", "items": {"type": "object"}},
@@ -50,7 +50,7 @@ const std::map<std::string, Operation, std::less<>> kBare = {
     {"observe", Operation::kObserve}, {"health", Operation::kHealth}, {"robot", Operation::kRobot},
     {"stop", Operation::kStop},       {"reset", Operation::kReset},   {"emergency_stop", Operation::kEmergencyStop},
     {"arm", Operation::kArm},         {"rest", Operation::kRest},     {"go_on", Operation::kGoOn},
-    {"end", Operation::kEnd},         {"base", Operation::kBase},
+    {"end", Operation::kEnd},         {"base", Operation::kBase},     {"axes", Operation::kAxes},
 };
 
 const Schema& schema() {

@@ -25,6 +25,9 @@
 //                                → {"ok":true,"executed":…}
 //   {"op":"health"}              → {"ok":true,"time_s":…,"health":{"alerts":…,"parts":[{"part":…,"condition":…,"why":…,
 //                                   "since_s":…,"alerts":…},…]}}
+//   {"op":"axes"}                → {"ok":true,"time_s":…,"names":[…],"positions":[…],"speeds":[…],"commanded":
+//                                   {"positions":[…],"speeds":[…]}}: of an arm, the first, in rad and rad/s: what is
+//                                   measured of its axes then, and what was asked of them
 //   {"op":"base"}                → {"ok":true,"time_s":…,"pose":{"x":…,"y":…,"yaw":…},"sure":…,"ahead_m_s":…,
 //                                   "turn_rad_s":…,"heading":{"x":…,"y":…,"yaw":…,"left_m":…,"detours":…}}: of a base,
 //                                   where it is on its map, how it moves, and where it is driving to, or null
@@ -69,6 +72,7 @@ enum class Operation : std::uint8_t {
   kObserve,
   kChunk,
   kHealth,
+  kAxes,
   kBase,
   kDrive,
   kRobot,

@@ -42,6 +42,7 @@ TEST(AskedFrom, ReadsEachQuestion) {
   EXPECT_EQ(asked_from(R"({"op":"halt","id":"a","reason":""})")->operation, Operation::kHalt);
   EXPECT_EQ(asked_from(R"({"op":"robot"})")->operation, Operation::kRobot);
   EXPECT_EQ(asked_from(R"({"op":"health"})")->operation, Operation::kHealth);
+  EXPECT_EQ(asked_from(R"({"op":"axes"})")->operation, Operation::kAxes);
   EXPECT_EQ(asked_from(R"({"op":"base"})")->operation, Operation::kBase);
   EXPECT_EQ(asked_from(R"({"op":"stop"})")->operation, Operation::kStop);
   EXPECT_EQ(asked_from(R"({"op":"emergency_stop"})")->operation, Operation::kEmergencyStop);

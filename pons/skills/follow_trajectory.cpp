@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@ using motion::TimedPoint;
 using task::Json;
 
 constexpr double kTolerance_rad = 0.01;
+constexpr double kStays_s = 0.5;         // who asks for no more than where it is has it stay there for so long
 constexpr double kLimitRounding = 1e-9;  // relative, of a speed that was computed from the limit
 
 std::string number(std::size_t point) { return fmt::format("point {}", point + 1); }
@@ -88,6 +90,8 @@ Expected<void> check_limits(const std::vector<TimedPoint>& points, const std::ve
                     {}, "pass it more slowly");
     }
   }
+  if (points.front().time_s == 0 && points.front().speed && !points.front().speed->isZero(0))
+    return fail("point 1 is where it begins, and has a speed", {}, "begin at rest");
   if (points.back().speed && !points.back().speed->isZero(0))
     return fail(fmt::format("{} is the last, and has a speed", number(points.size() - 1)), {}, "end at rest");
   return {};
@@ -114,7 +118,9 @@ Expected<std::vector<TimedPoint>> read(Cell& cell, const Json& arguments) {
   const std::vector<std::string> names = cell.model.axis_names();
   auto points = points_of(arguments, names);
   if (!points) return points;
-  Expected<void> good = check_times(*points);
+  const bool begins = points->front().time_s == 0;
+  if (begins && points->size() == 1) points->push_back({kStays_s, points->front().position, std::nullopt});
+  Expected<void> good = check_times(*points, begins ? 1 : 0);
   if (good) good = check_limits(*points, names, cell.limits_planned());
   if (good) good = check_legs(*points, names, cell.limits_planned());
   for (std::size_t k = 0; good && k < points->size(); ++k)
@@ -127,8 +133,15 @@ Expected<TimedWay> way_of(Cell& cell, const Json& arguments) {
   auto points = read(cell, arguments);
   if (!points) return std::unexpected(points.error());
   const double tolerance_rad = arguments.value("goal_tolerance", kTolerance_rad);
+  std::optional<AxisVector> begins;
+  if (points->front().time_s == 0) {
+    begins = points->front().position;
+    points->erase(points->begin());
+  }
   return TimedWay{
       .points = *std::move(points),
+      .begins = std::move(begins),
+      .path_tolerance_rad = arguments.value("path_tolerance", std::numeric_limits<double>::infinity()),
       .make =
           [](const AxisVector& start, std::span<const TimedPoint> through) {
             return motion::move_in_time(start, Time{}, through, motion::Shape::kBetween);
@@ -144,6 +157,7 @@ Expected<TimedWay> way_of(Cell& cell, const Json& arguments) {
 
 Json schema() {
   const auto numbers = [] { return Json{{"type", "array"}, {"items", {{"type", "number"}}}, {"maxItems", kMaxAxes}}; };
+  const Json tolerance{{"type", "number"}, {"minimum", 0.0001}, {"maximum", 0.5}};
   const Json point{
       {"type", "object"},
       {"properties", {{"positions", numbers()}, {"velocities", numbers()}, {"time_s", {{"type", "number"}}}}},
@@ -157,7 +171,8 @@ Json schema() {
               {"minItems", 1},
               {"maxItems", kMaxAxes}}},
             {"points", {{"type", "array"}, {"items", point}, {"minItems", 1}, {"maxItems", kMostTrajectoryPoints}}},
-            {"goal_tolerance", {{"type", "number"}, {"minimum", 0.0001}, {"maximum", 0.5}}}}},
+            {"goal_tolerance", tolerance},
+            {"path_tolerance", tolerance}}},
           {"required", {"joints", "points"}},
           {"additionalProperties", false}};
 }

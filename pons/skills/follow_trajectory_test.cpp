@@ -166,6 +166,35 @@ TEST_F(FollowTest, PassesPointsWithTheSpeedsThatAreGiven) {
   EXPECT_NEAR(speed, 0.45, 0.01);
 }
 
+TEST_F(FollowTest, APointAtTimeZeroIsWhereItHasToRest) {
+  EXPECT_EQ(run(kTrajectory, trajectory({{0, home({{2, 0.009}})}, {1.0, home({{0, 0.3}})}})).status,
+            Status::kSucceeded);
+  EXPECT_LT(off(home({{0, 0.3}})), 1e-6);
+  EXPECT_EQ(run(kTrajectory, trajectory({{0, home({{0, 0.3}})}})).status, Status::kSucceeded) << "it is there";
+  const Time moved = cell_.arm.motion_end();
+  const std::string name = cell_.model.axis_names()[2];
+  const Progress elsewhere = run(kTrajectory, trajectory({{0, home({{0, 0.3}, {2, 0.2}})}, {1.0, home()}}));
+  EXPECT_EQ(elsewhere.status, Status::kFailed);
+  EXPECT_THAT(elsewhere.reason, AllOf(HasSubstr(name + " rests at "), HasSubstr("0.2000 rad off point 1"),
+                                      HasSubstr("plan from where the arm is")));
+  EXPECT_EQ(cell_.arm.motion_end(), moved) << "nothing moved";
+  const Progress quick = run(kTrajectory, trajectory({{0, home({{0, 0.3}})}, {0.3, home({{0, -0.5}})}}));
+  EXPECT_THAT(quick.reason, HasSubstr("point 2: ")) << "it counts as one";
+}
+
+TEST_F(FollowTest, OffItsWayByMoreThanItsToleranceItStops) {
+  Json arguments = trajectory({{2.0, home({{0, 0.6}})}});
+  arguments["path_tolerance"] = 0.02;
+  EXPECT_EQ(run(kTrajectory, arguments).status, Status::kSucceeded);
+  arguments["points"] = trajectory({{2.0, home()}})["points"];
+  const Progress end = run(kTrajectory, arguments, [&](double t) { off_rad_ = t > 1 ? 0.03 : 0; });
+  EXPECT_EQ(end.status, Status::kFailed);
+  EXPECT_THAT(end.reason, HasSubstr("path_tolerance_violated: " + cell_.model.axis_names()[1] +
+                                    " is 0.0300 rad off its way, of which 0.0200 are allowed"));
+  EXPECT_GT(off(home()), 0.05) << "it has stopped on its way";
+  EXPECT_GE(now_, cell_.arm.motion_end()) << "and rests";
+}
+
 TEST_F(FollowTest, RefusesByNameWhatMakesNoSense) {
   const Json good = trajectory({{1.0, home({{0, 0.3}})}, {2.0, home()}});
   EXPECT_EQ(refusal(kTrajectory, good), "");
@@ -182,8 +211,13 @@ TEST_F(FollowTest, RefusesByNameWhatMakesNoSense) {
               HasSubstr("point 2 has 5 positions for 6 joints"));
   EXPECT_THAT(says([](Json& a) { a["points"][0]["velocities"] = {0.1}; }),
               HasSubstr("point 1 has 1 velocities for 6 joints"));
-  EXPECT_THAT(says([](Json& a) { a["points"][0]["time_s"] = 0; }),
-              HasSubstr("point 1: 0 s is not at least 0.001 s after the begin; leave out where the arm already is"));
+  EXPECT_THAT(says([](Json& a) { a["points"][0]["time_s"] = -1; }),
+              HasSubstr("point 1: -1 s is not at least 0.001 s after the begin; leave out where the arm already is"));
+  EXPECT_THAT(says([](Json& a) {
+                a["points"][0]["time_s"] = 0;
+                a["points"][0]["velocities"] = {0, 0, 0, 0, 0, 0.1};
+              }),
+              HasSubstr("point 1 is where it begins, and has a speed"));
   EXPECT_THAT(says([](Json& a) { a["points"][1]["time_s"] = 1.0; }),
               HasSubstr("point 2: 1 s is not at least 0.001 s after point 1, at 1 s"));
   EXPECT_THAT(says([](Json& a) { a["points"][1]["time_s"] = 301; }), HasSubstr("due after 301 s, which is too long"));

@@ -31,7 +31,8 @@ constexpr double kFirstLeg_s = 0.02;                              // of a way th
 // What a load needs longer is felt for, in ever longer steps: to ten times as long.
 constexpr int kLoadRounds = 12;
 constexpr double kLeastMore = 0.02, kMostLonger = 1.5;
-constexpr int kTold = 10;  // notes of how far it has got
+constexpr int kTold = 10;             // notes of how far it has got
+constexpr double kBegins_rad = 0.01;  // off where it has to rest, at most: MoveIt's own bound
 
 // As a person is told it: not less than it takes.
 double up_to_hundredths(double seconds) { return std::ceil(100 * seconds - 1e-9) / 100; }
@@ -81,6 +82,9 @@ class FollowTimed final : public ArmSkill {
  private:
   enum class Phase : std::uint8_t { kPlan, kLook, kMove, kSettle, kStop };
 
+  [[nodiscard]] std::string axis_name(Eigen::Index axis) const {
+    return cell_.model.axis_names()[static_cast<std::size_t>(axis)];
+  }
   [[nodiscard]] const Load* load() const { return cell_.held ? &cell_.held->load : nullptr; }
   [[nodiscard]] double whole_s() const { return to_s(way_.back().end() - Time{}); }
   [[nodiscard]] double progress() const {
@@ -99,6 +103,9 @@ class FollowTimed final : public ArmSkill {
     if (now < cell_.arm.motion_end()) return {};
     const AxisVector start = cell_.arm.planned(cell_.arm.splice_time(now)).position;
     if (began_ && off_way(start) > kOnTheWay_rad) return go_back(now);
+    if (!began_ && asked_->begins) {
+      if (auto there = check_begin(start); !there) return {Status::kFailed, there.error().line(), detail(now)};
+    }
     const motion::InTime make = [&](std::span<const TimedPoint> points) { return asked_->make(start, points); };
     std::vector<TimedPoint> points = rest_from(start);
     auto way = make(points);
@@ -116,6 +123,15 @@ class FollowTimed final : public ArmSkill {
     looked_ = Time{};
     phase_ = Phase::kLook;
     return look(now);
+  }
+
+  [[nodiscard]] Expected<void> check_begin(const AxisVector& start) const {
+    Eigen::Index axis = 0;
+    const double off = (start - *asked_->begins).cwiseAbs().maxCoeff(&axis);
+    if (off <= kBegins_rad) return {};
+    return fail(fmt::format("{} rests at {:.4f} rad, {:.4f} rad off point 1, of which {:.2f} are allowed",
+                            axis_name(axis), start[axis], off, kBegins_rad),
+                {}, "plan from where the arm is");
   }
 
   // Somebody else has had the arm: to where the way was left, as fast as can be.
@@ -162,8 +178,17 @@ class FollowTimed final : public ArmSkill {
   Progress move(Time now) {
     const link::State& state = cell_.arm.state();
     done_s_ = std::clamp(to_s(now - begins_), 0.0, whole_s());
-    worst_rad_ = std::max(worst_rad_, (cell_.arm.planned(state.stamp).position - state.position).cwiseAbs().maxCoeff());
+    Eigen::Index axis = 0;
+    const double off_rad = (cell_.arm.planned(state.stamp).position - state.position).cwiseAbs().maxCoeff(&axis);
+    worst_rad_ = std::max(worst_rad_, off_rad);
     tell();
+    if (off_rad > asked_->path_tolerance_rad) {
+      stop(now, {Status::kFailed,
+                 fmt::format("path_tolerance_violated: {} is {:.4f} rad off its way, of which {:.4f} are allowed",
+                             axis_name(axis), off_rad, asked_->path_tolerance_rad),
+                 detail(now)});
+      return {};
+    }
     if (now >= sent_.back().end()) {
       phase_ = Phase::kSettle;
       return settle(now);
@@ -264,8 +289,8 @@ class FollowTimed final : public ArmSkill {
     return fmt::format(
         "point {}: {} would need {:.2f} times its {} limit; reach it after {:.2f} s at the soonest, "
         "not {:.2f} s",
-        first.point + 1, cell_.model.axis_names()[static_cast<std::size_t>(first.axis)], first.use,
-        motion::name(first.of), up_to_hundredths(possible[first.point].time_s), points[first.point].time_s);
+        first.point + (asked_->begins ? 2 : 1), axis_name(first.axis), first.use, motion::name(first.of),
+        up_to_hundredths(possible[first.point].time_s), points[first.point].time_s);
   }
 
   Cell& cell_;
@@ -307,14 +332,14 @@ task::SkillType timed_skill(Cell& cell, TimedSkill skill) {
                        Time) { return conduct(cell, std::make_unique<FollowTimed>(cell, read(cell, arguments))); }};
 }
 
-Expected<void> check_times(std::span<const TimedPoint> points) {
+Expected<void> check_times(std::span<const TimedPoint> points, std::size_t first) {
   double before_s = 0;
-  for (std::size_t k = 0; k < points.size(); ++k) {
+  for (std::size_t k = first; k < points.size(); ++k) {
     const double time_s = points[k].time_s;
     if (!(time_s >= before_s + motion::kShortestLeg_s * (1 - 1e-6)))
       return fail(fmt::format("point {}: {} s is not at least {} s after {}", k + 1, time_s, motion::kShortestLeg_s,
-                              k == 0 ? "the begin" : fmt::format("point {}, at {} s", k, before_s)),
-                  {}, k == 0 ? "leave out where the arm already is" : "give times that grow");
+                              k == first ? "the begin" : fmt::format("point {}, at {} s", k, before_s)),
+                  {}, k == first ? "leave out where the arm already is" : "give times that grow");
     before_s = time_s;
   }
   if (!(before_s <= kLongestWay_s))

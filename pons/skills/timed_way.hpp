@@ -1,7 +1,10 @@
 // What follow_trajectory and follow_path share: the arm goes through points at times that somebody else has chosen.
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +21,9 @@ inline constexpr double kLongestWay_s = 300;
 // What differs between them.
 struct TimedWay {
   std::vector<motion::TimedPoint> points;  // times count from when the arm sets out
+  // Where the arm has to rest when it sets out, rad; then that is point 1 in what is said, and `points` come after it.
+  std::optional<AxisVector> begins;
+  double path_tolerance_rad = std::numeric_limits<double>::infinity();  // of each axis, on the way
   // A motion of the joints through such points, from rest at `start` (rad). Begins at Time{}.
   std::function<Expected<motion::Trajectory>(const AxisVector& start, std::span<const motion::TimedPoint> points)> make;
   // Whether the arm, measured there (rad), is where it was to end. Error: how far off it is.
@@ -36,7 +42,8 @@ struct TimedSkill {
 };
 [[nodiscard]] task::SkillType timed_skill(Cell& cell, TimedSkill skill);
 
-// Whether times make sense by themselves: they grow, by a tick of the loop at least, and do not end too late.
-[[nodiscard]] Expected<void> check_times(std::span<const motion::TimedPoint> points);
+// Whether times make sense by themselves: they grow, by a tick of the loop at least, and do not end too late. The
+// points before `first` are where the arm begins.
+[[nodiscard]] Expected<void> check_times(std::span<const motion::TimedPoint> points, std::size_t first = 0);
 
 }  // namespace pons::skills

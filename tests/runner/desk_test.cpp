@@ -19,12 +19,14 @@ class Asks final : public gate::Visitors {
   [[nodiscard]] std::vector<gate::Request> poll() override {
     std::vector<gate::Request> requests;
     for (const std::string& text : std::exchange(texts, {}))
-      requests.push_back({text, [this, text](const gate::Json& told) {
+      requests.push_back({text, [this, text](const gate::Json& answer) {
+                            told = answer;
                             answered_.push_back(told.value("ok", false) ? text : told.value("error", ""));
                           }});
     return requests;
   }
   std::vector<std::string> texts;
+  gate::Json told;  // the last answer
 
  private:
   std::vector<std::string>& answered_;
@@ -55,6 +57,35 @@ TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
   desk.attend(Time{});
   EXPECT_EQ(answered, (std::vector{stop, emergency, look, look}));
   EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
+}
+
+TEST(Desk, TellsOfAnArmsAxesOnceItsLoopHas) {
+  const bridge::TemporaryFolder folder;
+  const auto journal = bridge::Journal::open(folder / "j.db").value();
+  const world::World world;
+  const task::SkillRegistry skills;
+  bridge::Bridge bridge(*journal, skills, world);
+  const runner::Health health{{}};
+  std::vector<std::string> answered;
+  auto asks = std::make_unique<Asks>(answered);
+  Asks& visitor = *asks;
+  Desk desk(std::move(asks), bridge, *journal, {}, health, [] { return nullptr; });
+  const auto ask = [&] {
+    visitor.texts = {R"({"op":"axes"})"};
+    desk.attend(Time{});
+    return answered.back();
+  };
+  EXPECT_NE(ask().find("the robot is no arm"), std::string::npos);
+  link::State state;
+  desk.serve(Desk::Axes{{"j1", "j2"}, [&]() -> const link::State& { return state; }});
+  EXPECT_NE(ask().find("has told nothing of its arm yet"), std::string::npos);
+  state.position = state.speed = AxisVector::Constant(2, 0.5);
+  state.commanded = at_rest(AxisVector::Constant(2, 0.25));
+  ask();
+  EXPECT_EQ(visitor.told.at("names"), (std::vector<std::string>{"j1", "j2"}));
+  EXPECT_EQ(visitor.told.at("positions"), (std::vector{0.5, 0.5}));
+  EXPECT_EQ(visitor.told.at("commanded").at("positions"), (std::vector{0.25, 0.25}));
+  EXPECT_EQ(visitor.told.at("commanded").at("speeds"), (std::vector{0.0, 0.0}));
 }
 
 TEST(Desk, ARunThatIsNotServedIsNotToldToRest) {

@@ -1,0 +1,211 @@
+#include "apps/ros_trajectories.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "apps/outside.hpp"
+#include "pons/task/json_text.hpp"
+
+namespace pons::apps {
+namespace {
+
+using gate::Json;
+using gate::ros::GoalStatus;
+using Goal = RosTrajectories::FollowJointTrajectory::Goal;
+using Feedback = RosTrajectories::FollowJointTrajectory::Feedback;
+using Result = RosTrajectories::FollowJointTrajectory::Result;
+using Point = wire::trajectory_msgs::msg::JointTrajectoryPoint;
+using Tolerance = wire::control_msgs::msg::JointTolerance;
+
+constexpr std::string_view kAction = "joint_trajectory_controller/follow_joint_trajectory";
+constexpr std::chrono::milliseconds kLooksEach{50};  // ros2_control's action_monitor_rate
+// What is left of a value's digits: a task's JSON has room for so many points then.
+constexpr double kFinest = 1e-9;
+// As the skill begins what it says of these.
+constexpr std::string_view kPathViolated = "path_tolerance_violated", kGoalViolated = "goal_tolerance_violated";
+
+Expected<Json> numbers(const std::vector<double>& values, const std::string& where) {
+  Json list = Json::array();
+  for (const double value : values) {
+    if (!std::isfinite(value)) return fail("is not finite", where, "give numbers");
+    list.push_back(std::round(value / kFinest) * kFinest);
+  }
+  return list;
+}
+
+Expected<Json> point_from(const Point& point, std::size_t number) {
+  const std::string where = fmt::format("points[{}]", number);
+  if (point.positions.empty()) return fail("has no positions", where, "give each joint's, in rad");
+  if (std::ranges::any_of(point.effort, [](double effort) { return effort != 0; }))
+    return fail("has efforts", where, "leave them out: motion is commanded by position");
+  auto positions = numbers(point.positions, where + ".positions");
+  if (!positions) return std::unexpected(positions.error());
+  Json json{{"positions", *std::move(positions)},
+            {"time_s", point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec}};
+  if (point.velocities.empty()) return json;
+  auto velocities = numbers(point.velocities, where + ".velocities");
+  if (!velocities) return std::unexpected(velocities.error());
+  json["velocities"] = *std::move(velocities);
+  return json;
+}
+
+// The smallest that is given, for the skill has one for all joints: nothing passes that a client would not have passed.
+Expected<std::optional<double>> tolerance_from(const std::vector<Tolerance>& tolerances, const std::string& where,
+                                               const std::vector<std::string>& joints) {
+  std::optional<double> least;
+  for (const Tolerance& each : tolerances) {
+    if (std::ranges::find(joints, each.name) == joints.end())
+      return fail(fmt::format("the arm has no joint '{}'", task::excerpt(each.name)), where,
+                  fmt::format("name some of {}", fmt::join(joints, ", ")));
+    if (!std::isfinite(each.position)) return fail("is not finite", where, "give numbers");
+    if (each.position > 0) least = std::min(each.position, least.value_or(each.position));
+  }
+  return least;
+}
+
+// Members that mean something which nothing here does.
+Expected<void> check_known(const Goal& goal) {
+  const auto& stamp = goal.trajectory.header.stamp;
+  if (stamp.sec != 0 || stamp.nanosec != 0)
+    return fail("a time to begin at is not kept", "header.stamp", "leave it 0: goals begin at once");
+  if (!goal.multi_dof_trajectory.points.empty() || !goal.multi_dof_trajectory.joint_names.empty())
+    return fail("joints of several axes are not known here", "multi_dof_trajectory", "leave it empty");
+  if (!goal.component_path_tolerance.empty() || !goal.component_goal_tolerance.empty())
+    return fail("joints of several axes are not known here", "component tolerances", "leave them empty");
+  const auto has_more = [](const Tolerance& each) { return each.velocity > 0 || each.acceleration > 0; };
+  if (std::ranges::any_of(goal.path_tolerance, has_more))
+    return fail("only positions have tolerances", "path_tolerance", "leave velocity and acceleration 0");
+  return {};
+}
+
+std::string task_of(const gate::ros::GoalId& goal, Json arguments) {
+  std::string id = "trajectory-";
+  for (const std::uint8_t byte : goal) id += fmt::format("{:02x}", byte);
+  return Json{{"id", std::move(id)}, {"steps", {{{"skill", "follow_trajectory"}, {"arguments", std::move(arguments)}}}}}
+      .dump();
+}
+
+std::int32_t code_of(std::string_view reason) {
+  if (reason.contains(kPathViolated)) return Result::PATH_TOLERANCE_VIOLATED;
+  if (reason.contains(kGoalViolated)) return Result::GOAL_TOLERANCE_VIOLATED;
+  return Result::INVALID_GOAL;
+}
+
+// Values of the arm's joints, in the goal's order.
+std::vector<double> ordered(const Json& values, const std::vector<std::string>& names,
+                            const std::vector<std::string>& joints) {
+  std::vector<double> in_order;
+  for (const std::string& joint : joints)
+    in_order.push_back(values.at(static_cast<std::size_t>(std::ranges::find(names, joint) - names.begin())));
+  return in_order;
+}
+
+std::vector<double> less(std::vector<double> from, const std::vector<double>& taken) {
+  std::ranges::transform(from, taken, from.begin(), std::minus{});
+  return from;
+}
+
+}  // namespace
+
+Expected<Json> arguments_from(const Goal& goal, const std::vector<std::string>& joints) {
+  std::vector<std::string> named = goal.trajectory.joint_names, sorted = joints;
+  std::ranges::sort(named);
+  std::ranges::sort(sorted);
+  if (named != sorted)
+    return fail("these are not the arm's joints", "joint_names",
+                fmt::format("name each of {} once", fmt::join(joints, ", ")));
+  if (auto known = check_known(goal); !known) return std::unexpected(known.error());
+  if (goal.trajectory.points.empty())
+    return fail("a goal without points moves nothing", "points", "cancel a goal to stop it");
+  Json arguments{{"joints", goal.trajectory.joint_names}, {"points", Json::array()}};
+  for (const Point& point : goal.trajectory.points) {
+    auto read = point_from(point, arguments["points"].size());
+    if (!read) return read;
+    arguments["points"].push_back(*std::move(read));
+  }
+  const auto on_path = tolerance_from(goal.path_tolerance, "path_tolerance", joints);
+  if (!on_path) return std::unexpected(on_path.error());
+  const auto at_goal = tolerance_from(goal.goal_tolerance, "goal_tolerance", joints);
+  if (!at_goal) return std::unexpected(at_goal.error());
+  if (*on_path) arguments["path_tolerance"] = **on_path;
+  if (*at_goal) arguments["goal_tolerance"] = **at_goal;
+  return arguments;
+}
+
+Expected<void> RosTrajectories::serve(const std::vector<world::OutsideSkill>& others) {
+  if (is_served_by_another(gate_.node(), kAction, others)) return {};
+  auto goals = gate::ros::serve_action<FollowJointTrajectory>(
+      gate_.node(), kAction, [this](const GoalId& goal, const Goal& asked) { begin(goal, asked); },
+      [this](const GoalId& goal) { return followed_.cancel(goal, "its client cancelled it"); });
+  if (!goals) return std::unexpected(goals.error());
+  goals_ = *goals;
+  return {};
+}
+
+void RosTrajectories::begin(const GoalId& id, const Goal& asked) {
+  auto arguments = arguments_from(asked, joints_);
+  if (!arguments) {
+    const bool other_joints = arguments.error().where == "joint_names";
+    return refuse(id, other_joints ? Result::INVALID_JOINTS : Result::INVALID_GOAL, arguments.error().line());
+  }
+  followed_.begin(id, task_of(id, *std::move(arguments)),
+                  {.accepted =
+                       [this, id, joints = asked.trajectory.joint_names](const std::string&) {
+                         goals_->accept(id);
+                         taken(id, joints);
+                       },
+                   .refused = [this, id](const std::string& why) { refuse(id, Result::INVALID_GOAL, why); },
+                   .happened = {},
+                   .ended = [this, id](const TaskEnd& end) { ended(id, end); }});
+}
+
+void RosTrajectories::ended(const GoalId& id, const TaskEnd& end) {
+  std::erase_if(going_, [&](const Going& each) { return each.id == id; });
+  const std::int8_t status = status_of(end, goals_->status(id));
+  const bool failed = status == GoalStatus::STATUS_ABORTED;
+  goals_->end(id, status, {failed ? code_of(end.reason) : Result::SUCCESSFUL, end.reason});
+}
+
+// A goal that is rejected hears no reason.
+void RosTrajectories::refuse(const GoalId& id, std::int32_t code, const std::string& why) {
+  goals_->accept(id);
+  goals_->end(id, GoalStatus::STATUS_ABORTED, {code, why});
+}
+
+void RosTrajectories::taken(const GoalId& id, const std::vector<std::string>& joints) {
+  for (const Going& before : going_) (void)followed_.cancel(before.id, "another goal came");
+  going_.emplace_back(id, joints);
+  if (!std::exchange(looks_, true)) look();
+}
+
+void RosTrajectories::look() {
+  looks_ = !going_.empty();
+  if (looks_) gate_.ask(Json{{"op", "axes"}}, [this](const Json& told) { hear(told); });
+}
+
+void RosTrajectories::hear(const Json& told) {
+  followed_.later().put(kLooksEach, [this] { look(); });
+  if (!told.value("ok", false)) return;
+  const Json& commanded = told.at("commanded");
+  for (const Going& going : going_) {
+    const auto values = [&](const Json& of) { return ordered(of, joints_, going.joints); };
+    Feedback feedback;
+    feedback.header.stamp = gate::ros::ros_stamp(std::llround(told.at("time_s").get<double>() * 1e9));
+    feedback.joint_names = going.joints;
+    feedback.desired.positions = values(commanded.at("positions"));
+    feedback.desired.velocities = values(commanded.at("speeds"));
+    feedback.actual.positions = values(told.at("positions"));
+    feedback.actual.velocities = values(told.at("speeds"));
+    feedback.error.positions = less(feedback.desired.positions, feedback.actual.positions);
+    feedback.error.velocities = less(feedback.desired.velocities, feedback.actual.velocities);
+    goals_->tell(going.id, feedback);
+  }
+}
+
+}  // namespace pons::apps

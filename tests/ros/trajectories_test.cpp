@@ -1,0 +1,196 @@
+// What MoveIt's users send an arm: motions planned elsewhere, as goals of FollowJointTrajectory.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pons/gate/ros/action.hpp"
+#include "pons/gate/ros/node.hpp"
+#include "pons/gate/ros/test_nodes.hpp"
+#include "pons/wire/types/control_msgs/action/follow_joint_trajectory.hpp"
+#include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
+#include "tests/end_to_end/run_pons.hpp"
+
+namespace pons::gate::ros {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using wire::control_msgs::action::FollowJointTrajectory;
+using wire::sensor_msgs::msg::JointState;
+using Goal = FollowJointTrajectory::Goal;
+using Result = FollowJointTrajectory::Result;
+using Ended = ActionClient<FollowJointTrajectory>::Ended;
+
+constexpr const char* kAction = "/joint_trajectory_controller/follow_joint_trajectory";
+
+// An arm without parcels, by the clock, until the test ends it.
+class RosArm : public ::testing::Test {
+ protected:
+  RosArm()
+      : run_(folder_.path(), "run",
+             {"run", "small_cell", "--stay", "--realtime", "--quiet", "--ros", "--ros-domain",
+              std::to_string(test_domain()), "--socket", folder_ / "s", "--journal", folder_ / "j.db"}) {}
+  void SetUp() override {
+    ASSERT_TRUE(node_->subscribe<JointState>("joint_states", kTopicQos, [&](const JointState& state) {
+      state_ = state;
+      if (state.position.size() == 7) turned_.push_back(state.position[0]);
+    }));
+    asks_ = action_client<FollowJointTrajectory>(*node_, kAction).value_or(nullptr);
+    ASSERT_NE(asks_, nullptr);
+    ASSERT_TRUE(spun([&] { return asks_->available() && !turned_.empty(); }));
+  }
+  void end_run() {
+    run_.signal(SIGINT);
+    EXPECT_EQ(run_.wait().code, 130);
+  }
+  [[nodiscard]] std::string stories() {
+    return tests::run_pons({"task", "list", "--journal", folder_ / "j.db"}).out;
+  }
+  [[nodiscard]] bool spun(const std::function<bool()>& done) { return spin_until({node_.get()}, done); }
+
+  // From where the arm is, joints named backwards: the first of them turned by so much at each time.
+  [[nodiscard]] Goal turn(const std::vector<std::pair<double, double>>& steps) const {
+    Goal goal;
+    goal.trajectory.joint_names = {state_.name.rbegin(), state_.name.rend()};
+    for (const auto& [time_s, by] : steps) {
+      auto& point = goal.trajectory.points.emplace_back();
+      point.positions = {state_.position.rbegin(), state_.position.rend()};
+      point.positions.back() += by;
+      point.time_from_start.sec = static_cast<std::int32_t>(time_s);
+      point.time_from_start.nanosec = static_cast<std::uint32_t>((time_s - std::floor(time_s)) * 1e9);
+    }
+    return goal;
+  }
+  // What becomes of the goals sent, in the order of sending.
+  struct Sent {
+    GoalId id{};
+    std::vector<FollowJointTrajectory::Feedback> feedback;
+    std::optional<Expected<Ended>> end;
+  };
+  Sent& send(const Goal& goal) {
+    Sent& sent = sent_.emplace_back();
+    const auto id = asks_->send(goal, 30s,
+                                {.accepted = {},
+                                 .feedback = [&sent](const auto& told) { sent.feedback.push_back(told); },
+                                 .ended = [&sent](auto told) { sent.end = std::move(told); }});
+    EXPECT_TRUE(id) << id.error().line();
+    sent.id = id.value_or(GoalId{});
+    return sent;
+  }
+  [[nodiscard]] Ended end_of(const Sent& sent) {
+    EXPECT_TRUE(spun([&] { return sent.end.has_value(); }));
+    if (!sent.end || !*sent.end) return {};
+    return **sent.end;
+  }
+
+  tests::Folder folder_;
+  tests::Running run_;
+  std::unique_ptr<Node> node_ = test_node("test");
+  ActionClient<FollowJointTrajectory>* asks_ = nullptr;
+  JointState state_;
+  std::vector<double> turned_;  // of the first joint, each time
+  std::deque<Sent> sent_;
+};
+
+TEST_F(RosArm, FollowsWhatMoveItSends) {
+  const double before = turned_.back();
+  // As MoveIt has it, the first point is where the arm is.
+  Goal goal = turn({{0, 0}, {1.0, 0.2}, {2.0, 0.4}});
+  for (auto& point : goal.trajectory.points) point.velocities.assign(7, 0.0);
+  goal.trajectory.points[1].velocities.back() = 0.25;
+  for (const std::string& joint : state_.name) {
+    goal.goal_tolerance.push_back({.name = joint, .position = 0.02});
+    goal.path_tolerance.push_back({.name = joint, .position = 0.05});
+  }
+  const Sent& sent = send(goal);
+  const Ended end = end_of(sent);
+  EXPECT_EQ(end.status, GoalStatus::STATUS_SUCCEEDED) << end.result.error_string;
+  EXPECT_EQ(end.result.error_code, Result::SUCCESSFUL);
+  ASSERT_TRUE(spun([&] { return std::abs(turned_.back() - before - 0.4) < 0.005; })) << turned_.back() - before;
+  // Twenty a second in two seconds; a machine that does other things tells of fewer.
+  ASSERT_GT(sent.feedback.size(), 5U);
+  const auto& told = sent.feedback[sent.feedback.size() / 2];
+  EXPECT_EQ(told.joint_names, goal.trajectory.joint_names);
+  ASSERT_EQ(told.actual.positions.size(), 7U);
+  for (std::size_t joint = 0; joint < 7; ++joint) {
+    EXPECT_NEAR(told.actual.positions[joint], told.desired.positions[joint], 0.02);
+    EXPECT_NEAR(told.error.positions[joint], told.desired.positions[joint] - told.actual.positions[joint], 1e-12);
+  }
+  EXPECT_GT(told.actual.positions.back(), before + 0.01) << "the joint that turns was named last";
+  EXPECT_LT(told.actual.positions.back(), before + 0.39);
+  end_run();
+}
+
+TEST_F(RosArm, WhatCannotBeIsAbortedByName) {
+  struct Wrong {
+    std::function<void(Goal&)> make;
+    std::int32_t code;
+    std::string said;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Wrong> all{
+      {[](Goal& g) { g.trajectory.joint_names[0] = "elbow"; }, Result::INVALID_JOINTS, "name each of joint1, "},
+      {[](Goal& g) { g.trajectory.joint_names.pop_back(); }, Result::INVALID_JOINTS, "not the arm's joints"},
+      {[](Goal& g) { g.trajectory.points.clear(); }, Result::INVALID_GOAL, "without points"},
+      {[&](Goal& g) { g.trajectory.points[1].positions[3] = nan; }, Result::INVALID_GOAL, "points[1].positions"},
+      {[](Goal& g) { g.trajectory.points[0].positions.clear(); }, Result::INVALID_GOAL, "points[0]: has no positions"},
+      {[](Goal& g) { g.trajectory.points[0].positions.pop_back(); }, Result::INVALID_GOAL, "6 positions for 7 joints"},
+      {[](Goal& g) { g.trajectory.points[0].effort.assign(7, 1.0); }, Result::INVALID_GOAL, "has efforts"},
+      {[](Goal& g) { g.trajectory.header.stamp.sec = 5; }, Result::INVALID_GOAL, "header.stamp"},
+      {[](Goal& g) { g.multi_dof_trajectory.joint_names = {"x"}; }, Result::INVALID_GOAL, "multi_dof_trajectory"},
+      {[](Goal& g) { g.goal_tolerance = {{.name = "wrist"}}; }, Result::INVALID_GOAL, "no joint 'wrist'"},
+      {[](Goal& g) { g.path_tolerance = {{.name = "joint1", .velocity = 1}}; }, Result::INVALID_GOAL, "only positions"},
+      {[](Goal& g) { g.trajectory.points[1].time_from_start = {0, 1'000'000}; }, Result::INVALID_GOAL, "point 2: "},
+      {[](Goal& g) { g.trajectory.points[1].positions.back() = 9; }, Result::INVALID_GOAL, "outside its limits"},
+      {[](Goal& g) {
+         g.trajectory.points[0].time_from_start = {};
+         g.trajectory.points[0].positions[2] += 0.3;
+       },
+       Result::INVALID_GOAL, "plan from where the arm is"}};
+  for (const Wrong& wrong : all) {
+    Goal goal = turn({{1.0, 0.1}, {2.0, 0.2}});
+    wrong.make(goal);
+    const Ended end = end_of(send(goal));
+    EXPECT_EQ(end.status, GoalStatus::STATUS_ABORTED) << wrong.said;
+    EXPECT_EQ(end.result.error_code, wrong.code) << wrong.said;
+    EXPECT_THAT(end.result.error_string, HasSubstr(wrong.said));
+  }
+  const auto [least, most] = std::ranges::minmax(turned_);
+  EXPECT_LT(most - least, 0.005) << "nothing moved";
+  end_run();
+}
+
+TEST_F(RosArm, ACancelledGoalStopsTheArmAndANewOneReplacesTheOld) {
+  const double before = turned_.back();
+  const Sent& first = send(turn({{6.0, 0.6}}));
+  ASSERT_TRUE(spun([&] { return turned_.back() > before + 0.05; }));
+  const Sent& second = send(turn({{4.0, -0.1}}));
+  const Ended replaced = end_of(first);
+  EXPECT_EQ(replaced.status, GoalStatus::STATUS_ABORTED);
+  EXPECT_THAT(replaced.result.error_string, HasSubstr("another goal came"));
+  const double there = turned_.back();
+  ASSERT_TRUE(spun([&] { return turned_.back() < there - 0.02; }));
+  ASSERT_TRUE(asks_->cancel(second.id));
+  const Ended cancelled = end_of(second);
+  EXPECT_EQ(cancelled.status, GoalStatus::STATUS_CANCELED) << cancelled.result.error_string;
+  const double rests = turned_.back();
+  turned_.clear();
+  ASSERT_TRUE(spun([&] { return turned_.size() > 30; }));
+  for (const double q : turned_) EXPECT_NEAR(q, rests, 0.005);
+  EXPECT_GT(rests, before - 0.09) << "on its way";
+  end_run();
+  EXPECT_THAT(stories(), AllOf(HasSubstr("trajectory-"), HasSubstr("CANCELLED")));
+}
+
+}  // namespace
+}  // namespace pons::gate::ros
