@@ -44,6 +44,9 @@ struct Held {
   bool alone = true;                   // nobody was near, or the lift has shown that nobody came along
   std::optional<Vector3> from_m = {};  // where the tip was when it was lifted, world frame less the belt's travel
   Falls falls = {};                    // when it was lifted
+  // Put back before, unseen since, and lifted from among others: until it is weighed in that lift, it may be one of
+  // these.
+  bool doubtful = false;
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.
@@ -65,6 +68,15 @@ struct Hooked {
   double mass_kg = 0, most_kg = 0;
   int times = 1;
   std::string whose = {};  // by code, the last time; empty: nobody's that is known
+};
+
+// Where set-points for the arm go, one after the other.
+class Servo {
+ public:
+  virtual ~Servo() = default;
+  // Errors: those of check_set_point() (servo.hpp); the arm takes none now, or would touch something; the link is full.
+  // The motion is then as it was.
+  [[nodiscard]] virtual Expected<void> take(const AxisVector& position, Time now) = 0;
 };
 
 class Cell {
@@ -247,6 +259,8 @@ class Cell {
   bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked
   task::ChunkStream* stream = nullptr;  // of the skill that follows a policy, as long as it does
   std::uint64_t streams = 0;            // there were so far
+  Servo* servo = nullptr;               // of the skill that goes after set-points, as long as it does
+  std::function<bool()> is_waited_for;  // whether a task waits for this arm; empty: nobody knows
 
  private:
   [[nodiscard]] Expected<motion::Trajectory> carry_on(Time now, const Goal& goal, Search& search);

@@ -183,6 +183,18 @@ std::optional<task::Progress> better_left(const Cell& cell, const ObjectBelief& 
   return task::Progress{task::Status::kFailed, "the belt waits for " + other->code, {}};
 }
 
+task::Progress overweight(double mass_kg) {
+  return {task::Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
+}
+
+std::optional<task::Progress> not_as_it_hangs(const world::World& world, const Held& held) {
+  using task::Progress, task::Status;
+  if (held.doubtful) return Progress{Status::kException, "it may be another: nobody has seen it", {}};
+  if (!held.alone) return Progress{Status::kRetry, "another may hang on it", {}};
+  if (held.mass_kg > world.rules.max_mass_kg) return overweight(held.mass_kg);
+  return std::nullopt;
+}
+
 task::Progress not_there(const Cell& cell, const std::string& code) {
   using task::Progress, task::Status;
   if (cell.disputed(code)) return {Status::kFailed, "it shows two codes", {}};

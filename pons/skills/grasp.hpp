@@ -60,6 +60,12 @@ struct GraspSearch {
 // How the pick of one ends that this arm can take no more, or never could; nothing if it can.
 [[nodiscard]] std::optional<task::Progress> never_taken(const world::World& world, const ObjectBelief& object);
 
+// How the pick of one ends that is heavier than the rules allow.
+[[nodiscard]] task::Progress overweight(double mass_kg);
+// How the pick ends, or goes on, of one that is held after a stop has broken off its lift, and was weighed then;
+// nothing if it is taken as it hangs.
+[[nodiscard]] std::optional<task::Progress> not_as_it_hangs(const world::World& world, const Held& held);
+
 // How a pick ends whose parcel is not where it should be, or nowhere.
 [[nodiscard]] task::Progress not_there(const Cell& cell, const std::string& code);
 // What would come along with that object, and why; nothing if it lies by itself.

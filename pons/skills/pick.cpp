@@ -44,10 +44,6 @@ constexpr Duration kUntangles = std::chrono::milliseconds(2000);
 constexpr Duration kLookAgain = std::chrono::milliseconds(1500);
 constexpr double kStops_m = 0.02;  // before where the belt waits, and so far before that it begins to stop
 
-Progress overweight(double mass_kg) {
-  return {Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
-}
-
 class Pick final : public ArmSkill {
  public:
   Pick(Cell& cell, std::string code, Time now)
@@ -125,11 +121,10 @@ class Pick final : public ArmSkill {
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;
-      const double mass = cell_.held->mass_kg;
-      const bool wanted = cell_.held->code == code_, alone = cell_.held->alone;
-      if (wanted && alone && mass <= cell_.world.rules.max_mass_kg) return success(now);
-      const Progress verdict = alone ? overweight(mass) : Progress{Status::kRetry, "another may hang on it", {}};
-      const Progress begun = begin_set_down(now, wanted ? verdict : Progress{});
+      const bool wanted = cell_.held->code == code_;
+      const auto put_down = not_as_it_hangs(cell_.world, *cell_.held);
+      if (wanted && !put_down) return success(now);
+      const Progress begun = begin_set_down(now, wanted ? *put_down : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
     if (!cell_.lifts) return {Status::kException, "the vacuum is too weak", {}};
@@ -373,6 +368,7 @@ class Pick final : public ArmSkill {
     expected_kg_ = std::min(cell_.world.rules.max_mass_kg, kDensity_kg_m3 * cell_.held->load.size_m.prod());
     cell_.bears(expected_kg_);
     unseen_ = std::ranges::count(cell_.left(), code_, &ObjectBelief::code) > 0;
+    cell_.held->doubtful = unseen_ && !cell_.held->alone;
     cell_.lifted(seen != nullptr ? *seen : target_);
     phase_ = Phase::kLift;
     return {};
@@ -451,7 +447,7 @@ class Pick final : public ArmSkill {
   }
 
   Progress success(Time now) {
-    cell_.held->alone = true;
+    cell_.held->alone = true, cell_.held->doubtful = false;
     const task::Json mass_kg = cell_.held->mass_kg, sealed = cell_.arm.cups().sealed_cups;
     return {Status::kSucceeded, {}, {{"mass_kg", mass_kg}, {"sealed", sealed}, {"seconds", to_s(now - started_)}}};
   }

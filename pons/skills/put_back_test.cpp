@@ -154,6 +154,28 @@ TEST_F(PickTest, WhatDoesNotHangAloneIsLaidDown) {
   EXPECT_TRUE(cell_.left().empty()) << "a light curtain tells where it went";
 }
 
+// Put back out of view, taken again from among others, and the lift broken off: however it hangs, it may be another.
+TEST_F(PickTest, WhatNobodyHasSeenSinceItWasPutBackMayBeAnother) {
+  for (const bool doubtful : {false, true}) {
+    const Vector3 from_m(0.1, -0.05, world_.belt.surface_z_m + 0.1);
+    cell_.held = Held{
+        .code = "P1", .load = {.size_m = {0.2, 0.15, 0.1}}, .alone = false, .from_m = from_m, .doubtful = doubtful};
+    grips_kg_ = 1, hangs_in_tip_m_ = Vector3(0, 0, 0.05);
+    tick_with({});
+    const auto skill = start("P1");
+    Progress progress;
+    for (int i = 0; i < 1500 && progress.status == Status::kRunning; ++i) {
+      progress = skill->tick(now_);
+      if (!cell_.held) grips_kg_.reset();
+      tick_with({});
+    }
+    EXPECT_EQ(progress.status, doubtful ? Status::kException : Status::kSucceeded) << progress.reason;
+    EXPECT_EQ(cell_.held.has_value(), !doubtful);
+    EXPECT_EQ(progress.reason, doubtful ? "it may be another: nobody has seen it" : "");
+    cell_.held.reset();
+  }
+}
+
 // What stands beside its place is no lower than the load was lifted. The belt has come to rest just now.
 TEST_F(PickTest, WhatGoesBackComesDownStraight) {
   for (int i = 20; i >= 0; --i) belt_m_s_ = 0.01 * i, tick_with({});

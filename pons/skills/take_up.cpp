@@ -42,6 +42,7 @@ Json TakeUp::carries() const {
                   {"yaw_rad", held.load.yaw_in_tip_rad},
                   {"offset_m", of(held.load.offset_in_tip_m)},
                   {"alone", held.alone},
+                  {"doubtful", held.doubtful},
                   {"falls", std::span(held.falls).first(cell_.world.places.size())}};
   if (held.from_m) carried["from_m"] = of(*held.from_m);
   return carried;
@@ -58,7 +59,8 @@ void TakeUp::restore(const Json& carried) {
                   .mass_kg = carried.value("mass_kg", 0.0),
                   .alone = carried.value("alone", true),
                   .from_m = carried.contains("from_m") ? std::optional(vector_from(carried, "from_m")) : std::nullopt,
-                  .falls = falls_from(carried)};
+                  .falls = falls_from(carried),
+                  .doubtful = carried.value("doubtful", false)};
   if (!cell_.arm.cups().open) {
     cell_.held = held;
     return;

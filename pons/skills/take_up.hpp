@@ -16,7 +16,7 @@ class TakeUp {
   explicit TakeUp(Cell& cell) : cell_(cell) {}
 
   // What is on the cups, to be written down whenever it changes: {"code":…,"mass_kg":…,"size_m":[…],"yaw_rad":…,
-  // "offset_m":[…],"alone":…,"falls":[…],"from_m":[…]}, as in Held; null when nothing is.
+  // "offset_m":[…],"alone":…,"doubtful":…,"falls":[…],"from_m":[…]}, as in Held; null when nothing is.
   [[nodiscard]] task::Json carries() const;
 
   // After refresh(): believes what was written last, as far as the cups still hold something. What only the bridge that
