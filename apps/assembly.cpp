@@ -150,6 +150,11 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   for (std::size_t i = 1; i < self->arms.size(); ++i) self->bridge->add_robot(self->arms[i]->registry);
   self->bridge->use_trees(std::move(trees));
   self->bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
+  if (self->arms.size() == 1) {
+    skills::Cell& cell = self->cell();
+    self->servoed_.emplace(*self->bridge, "servo", cell.world.arm);
+    cell.is_waited_for = [half = self->bridge.get(), arm = cell.world.arm] { return half->is_waited_for(arm); };
+  }
   brain::Brain& brain = self->add_brain(world, manifest, options);
 
   if (auto added = self->add_observer(world, meeting); !added) return std::unexpected(added.error());
@@ -179,8 +184,9 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
         std::make_unique<Desk>(std::move(asked), *self->bridge, *self->journal, self->bridge_side->armings(),
                                self->bridge_side->health(), [half = self.get()] { return half->cell().stream; });
     self->desk->serve(*self->bridge_side);
-    self->desk->serve(Desk::Axes{self->cell().model.axis_names(),
-                                 [&cell = self->cell()]() -> const link::State& { return cell.arm.state(); }});
+    self->desk->serve(Desk::Axes{
+        self->cell().model.axis_names(), [&cell = self->cell()]() -> const link::State& { return cell.arm.state(); },
+        [half = self.get()](const AxisVector& position, Time now) { return half->servo(position, now); }});
   }
   return self;
 }
@@ -275,6 +281,18 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   if (!options.body) return {};
   if (auto noted = journal->note(Time{}, kAttached, {{"body", body}}); !noted) return noted;
   return journal->commit();
+}
+
+Expected<std::string> BridgeHalf::servo(const AxisVector& position, Time now) {
+  if (!servoed_) return fail("no set-point says which arm it means", "servo", "ask in a world with one arm");
+  if (!cell().arm.operational())
+    return fail("the robot is not armed", "servo", "wait, or `pons robot` says what it needs");
+  auto taken = servoed_->take({{"positions", std::vector<double>(position.begin(), position.end())}}, now);
+  if (!taken) return std::unexpected(taken.error());
+  if (!taken->begun && cell().servo != nullptr) {
+    if (auto going = cell().servo->take(position, now); !going) return std::unexpected(going.error());
+  }
+  return std::move(taken->id);
 }
 
 void BridgeHalf::kill(std::unique_ptr<BridgeHalf> half) { half->journal->abandon(); }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/by_hand.hpp"
 #include "apps/desk.hpp"
 #include "apps/ros_node.hpp"
 #include "apps/views/cameras_view.hpp"
@@ -161,14 +162,19 @@ class BridgeHalf {
   [[nodiscard]] Expected<void> add_observer(const world::World& world, const Meeting& meeting);
   [[nodiscard]] Expected<void> open_sinks(const world::World& world, const BridgeOptions& options);
   [[nodiscard]] Expected<void> open_views(const world::World& world, const BridgeOptions& options);
-  [[nodiscard]] Expected<void> open_inner_views();
+  [[nodiscard]] Expected<void> open_inner_views(const world::World& world);
   [[nodiscard]] HealthView::Sources health_sources(const world::World& world, const gate::ros::NodeName& name);
   [[nodiscard]] std::vector<runner::SkillPort> skill_ports();
   // As the bridge hears it.
   [[nodiscard]] brain::Brain& add_brain(const world::World& world, const world::Manifest& manifest,
                                         const BridgeOptions& options);
 
+  // The arm goes to that set-point, by a task of the id that is given back. Errors: of several arms; the arm is not
+  // armed; those of ByHand::take() and Servo::take().
+  [[nodiscard]] Expected<std::string> servo(const AxisVector& position, Time now);
+
   RunViews* run_views_ = nullptr;  // one of the views
+  std::optional<ByHand> servoed_;  // of one arm
 };
 
 struct AssemblyOptions {

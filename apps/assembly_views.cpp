@@ -1,4 +1,5 @@
 // What a cell shows, and to whom: the views of its bridge's half.
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "apps/views/frames.hpp"
 #include "apps/views/link_view.hpp"
 #include "apps/views/low_level_view.hpp"
+#include "apps/views/set_points_view.hpp"
 
 namespace pons::apps {
 
@@ -45,7 +47,7 @@ Expected<void> BridgeHalf::open_views(const world::World& world, const BridgeOpt
   auto clock = ClockView::open(outlets);
   if (!clock) return std::unexpected(clock.error());
   views.push_back(std::move(*clock));
-  if (auto seen = open_inner_views(); !seen) return seen;
+  if (auto seen = open_inner_views(world); !seen) return seen;
   const gate::ros::NodeName name = options.ros ? options.ros->name : gate::ros::NodeName{"/", "pons"};
   auto run = RunViews::open(outlets, *bridge, name, health_sources(world, name));
   if (!run) return std::unexpected(run.error());
@@ -55,7 +57,7 @@ Expected<void> BridgeHalf::open_views(const world::World& world, const BridgeOpt
 }
 
 // What it believes, and what crosses the link.
-Expected<void> BridgeHalf::open_inner_views() {
+Expected<void> BridgeHalf::open_inner_views(const world::World& world) {
   auto beliefs =
       BeliefsView::open(outlets, [side = bridge_side.get()]() -> const runner::Snapshot& { return side->seen(); });
   if (!beliefs) return std::unexpected(beliefs.error());
@@ -68,6 +70,12 @@ Expected<void> BridgeHalf::open_inner_views() {
   auto commands = LowLevelView::open(outlets, std::move(moved));
   if (!commands) return std::unexpected(commands.error());
   views.push_back(std::move(*commands));
+  const auto set_points = std::ranges::find(world.dialects, world::Dialect::Kind::kSetPoints, &world::Dialect::kind);
+  if (set_points != world.dialects.end()) {
+    auto asked = SetPointsView::open(outlets, set_points->feedback.text, cell());
+    if (!asked) return std::unexpected(asked.error());
+    views.push_back(std::move(*asked));
+  }
   for (const auto& arm : arms) {
     const world::Robot& robot = arm->cell.world.robot;
     robots.push_back({.name = arms.size() > 1 ? arm->cell.world.arm : std::string(),
@@ -88,7 +96,7 @@ HealthView::Sources BridgeHalf::health_sources(const world::World& world, const 
   for (const auto& arm : arms)
     sources.loops.emplace_back(arms.size() > 1 ? arm->cell.world.arm : std::string(),
                                [&cell = arm->cell]() -> const link::State& { return cell.arm.state(); });
-  if (ros) sources.dropped.emplace_back("ROS 2", [node = ros.get()] { return node->dropped(); });
+  sources.dropped = outlets.ways_out();
   return sources;
 }
 

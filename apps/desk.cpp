@@ -155,7 +155,8 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kHealth:
       return {{"ok", true}, {"time_s", now.s()}, {"health", health_.describe()}};
     case gate::Operation::kAxes:
-      return tell_axes();
+    case gate::Operation::kServo:
+      return ask_axes(asked, now);
     case gate::Operation::kBase:
     case gate::Operation::kDrive:
       return ask_base(asked, now);
@@ -268,8 +269,12 @@ Expected<void> Desk::tell_arm(gate::Operation operation, Time now) {
   return {};
 }
 
-Json Desk::tell_axes() const {
+Json Desk::ask_axes(const gate::Asked& asked, Time now) {
   if (!axes_) return gate::refusal({"the robot is no arm", "axes", "ask in a world with one, as parcel_cell"});
+  if (asked.operation == gate::Operation::kServo) {
+    const auto going = axes_->servo(asked.positions, now);
+    return going ? Json{{"ok", true}, {"id", *going}} : gate::refusal(going.error());
+  }
   const link::State& state = axes_->state();
   if (state.position.size() == 0 || state.commanded.position.size() == 0)
     return gate::refusal({"the loop has told nothing of its arm yet", "axes", "ask again"});

@@ -37,10 +37,12 @@ class Desk {
     std::function<Expected<std::string>(double ahead_m_s, double turn_rad_s, Time)> drive;
   };
   void serve(Base base) { base_ = std::move(base); }
-  // The arm whose axes it may be asked for; without, it is refused.
+  // What may be asked of an arm; without, it is refused.
   struct Axes {
     std::vector<std::string> names;
     std::function<const link::State&()> state;
+    // The id of the task that goes there. Error: why nothing comes of it.
+    std::function<Expected<std::string>(const AxisVector& position, Time)> servo;
   };
   void serve(Axes axes) { axes_ = std::move(axes); }
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
@@ -62,7 +64,7 @@ class Desk {
   void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json describe() const;
-  [[nodiscard]] bridge::Json tell_axes() const;
+  [[nodiscard]] bridge::Json ask_axes(const gate::Asked& asked, Time now);
   [[nodiscard]] bridge::Json ask_base(const gate::Asked& asked, Time now);
   [[nodiscard]] bridge::Json tell_run(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json observe(Time now) const;

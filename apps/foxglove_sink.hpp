@@ -37,6 +37,8 @@ class FoxgloveSink final : public Sink {
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override {
     server_->put(topic, now, message);
   }
+  [[nodiscard]] std::string_view name() const override { return {}; }
+  [[nodiscard]] std::uint64_t dropped() const override { return server_->dropped(); }
   // What is asked for; null where nothing may be. Gone with this.
   [[nodiscard]] gate::Visitors* visitors() { return tasks_ ? server_.get() : nullptr; }
   // What people should know, a line each: at first where it listens, then who was refused.

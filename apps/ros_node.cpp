@@ -59,10 +59,19 @@ Expected<void> RosNode::serve_arm(std::vector<std::string> joints, const std::ve
 }
 
 Expected<void> RosNode::speak(const std::vector<world::Dialect>& dialects, const task::SkillRegistry& skills) {
+  std::vector<world::Dialect> of_tasks = dialects;
+  const auto set_points = std::ranges::find(of_tasks, world::Dialect::Kind::kSetPoints, &world::Dialect::kind);
+  if (set_points != of_tasks.end()) {
+    if (skills.find("servo") == nullptr)
+      return fail("needs the skill servo", set_points->where, "leave it out: this robot has no arm");
+    set_points_ = std::make_unique<RosSetPoints>(*gate_);
+    if (auto served = set_points_->serve(*set_points); !served) return served;
+    of_tasks.erase(set_points);
+  }
   auto interpreter = std::make_unique<Interpreter>(*gate_);
   Interpreter& speaks = *interpreter;
   gate_->node().add_part(std::move(interpreter));
-  return speaks.speak(dialects, skills);
+  return speaks.speak(of_tasks, skills);
 }
 
 Expected<void> RosNode::serve_parameters(std::string_view world) {
@@ -81,7 +90,7 @@ Expected<void> RosNode::serve_parameters(std::string_view world) {
 }
 
 Expected<std::size_t> RosNode::add(const ShownTopic& topic) {
-  auto number = gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos);
+  auto number = gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos, topic.apart);
   if (!number) return number;
   paced_.resize(*number + 1);
   const bool latched = topic.qos.durability == gate::ros::Qos::Durability::kTransientLocal;

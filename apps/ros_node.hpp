@@ -15,6 +15,7 @@
 #include "apps/ros_lifecycle.hpp"
 #include "apps/ros_parameters.hpp"
 #include "apps/ros_robot.hpp"
+#include "apps/ros_set_points.hpp"
 #include "apps/ros_tasks.hpp"
 #include "apps/ros_trajectories.hpp"
 #include "apps/views/outlets.hpp"
@@ -58,8 +59,8 @@ class RosNode final : public Sink {
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
   // What people should know, a line each.
   [[nodiscard]] std::vector<std::string> take_warnings() { return gate_->take_warnings(); }
-  // Messages that found no room.
-  [[nodiscard]] std::uint64_t dropped() const { return gate_->dropped(); }
+  [[nodiscard]] std::string_view name() const override { return "ROS 2"; }
+  [[nodiscard]] std::uint64_t dropped() const override { return gate_->dropped(); }
   // What is asked for over ROS 2, and over what else there is (may be null). Ends before this.
   [[nodiscard]] std::unique_ptr<gate::Visitors> visitors(std::unique_ptr<gate::Visitors> others);
 
@@ -79,6 +80,7 @@ class RosNode final : public Sink {
   std::unique_ptr<RosGoals> goals_;
   std::unique_ptr<RosDrive> drive_;
   std::unique_ptr<RosTrajectories> trajectories_;
+  std::unique_ptr<RosSetPoints> set_points_;
   std::unique_ptr<RosParameters> parameters_;
   std::unique_ptr<RosLifecycle> lifecycle_;
   const std::atomic<double>* states_hz_ = nullptr;

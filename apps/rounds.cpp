@@ -90,6 +90,7 @@ Expected<void> Rounds::build_bridge(const RoundsSetup& setup) {
   journal = std::move(*opened);
   if (realtime) journal->time_commits([clock = std::make_shared<rt::MonotonicClock>()] { return clock->now(); });
   bridge = std::make_unique<bridge::Bridge>(*journal, registry, world);
+  steered_.emplace(*bridge, "drive", std::string(kBase));
   bridge->use_trees(std::move(trees));
   bridge->use_rules(*std::move(rules), bridge::Contradictions(world.review.contradictions));
   observer = std::make_unique<runner::Observer>(world, localiser, darkroom.frames, darkroom.pages, darkroom.memory(),
@@ -148,7 +149,7 @@ Expected<void> Rounds::open_views(const RoundsSetup& setup) {
                              .health = &bridge_side->health(),
                              .loops = {{"", [this]() -> const link::State& { return chassis->wheels.state(); }}},
                              .dropped = {}};
-  if (ros) health.dropped.emplace_back("ROS 2", [node = ros.get()] { return node->dropped(); });
+  health.dropped = outlets.ways_out();
   auto run = RunViews::open(outlets, *bridge, name, std::move(health));
   if (!run) return std::unexpected(run.error());
   run_views_ = run->get();
@@ -172,21 +173,10 @@ void Rounds::open_desk(std::unique_ptr<gate::Visitors> visitors) {
 Expected<std::string> Rounds::steer(const model::Twist2& twist, Time now) {
   if (!chassis->wheels.operational())
     return fail("the robot is not armed", "drive", "wait, or `pons robot` says what it needs");
-  const std::string_view state = bridge->state(steers_);
-  if (state.empty()) {
-    if (bridge->has_holder(kBase) || bridge->is_waited_for(kBase))
-      return fail("a task has the base", "drive", "wait for its end, or cancel it");
-    std::string id = fmt::format("drive-{}", ++steered_);
-    // Whoever comes later goes before it.
-    const auto admitted =
-        bridge->submit(bridge::Json{{"id", id}, {"priority", 0}, {"steps", {{{"skill", "drive"}}}}}.dump(), now);
-    if (!admitted) return std::unexpected(admitted.error());
-    steers_ = std::move(id);
-  } else if (state != "waiting" && state != "running") {
-    return fail(fmt::format("who steered is {}", state), "drive", "wait for another task's end");
-  }
+  auto taken = steered_->take(bridge::Json::object(), now);
+  if (!taken) return std::unexpected(taken.error());
   chassis->wish(twist, now);
-  return steers_;
+  return std::move(taken->id);
 }
 
 void Rounds::show(Time now) {

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "apps/by_hand.hpp"
 #include "apps/desk.hpp"
 #include "apps/ros_node.hpp"
 #include "apps/views/outlets.hpp"
@@ -100,8 +101,7 @@ class Rounds {
 
   RoundsSetup::Ends ends_ = RoundsSetup::Ends::kWithItsTasks;
   RunViews* run_views_ = nullptr;  // one of the views
-  std::string steers_;             // the id of the last task that did
-  int steered_ = 0;                // so many did
+  std::optional<ByHand> steered_;
 };
 
 // How the loop watches the wheels of a base.

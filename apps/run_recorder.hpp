@@ -54,6 +54,9 @@ class RunRecorder final : public Sink {
   // that one's; its own is its publish time.
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
 
+  [[nodiscard]] std::string_view name() const override { return "recording"; }
+  [[nodiscard]] std::uint64_t dropped() const override;
+
   // A person breaks the run off; the first time counts.
   void interrupt();
   // The run is over: nothing more is put. `how`: "complete", or why not.

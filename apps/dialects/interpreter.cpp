@@ -42,6 +42,7 @@ std::unique_ptr<Dialect> dialect_of(const world::Dialect& spec, Phrasebook phras
     case world::Dialect::Kind::kMotion:
       return motion(spec);
     case world::Dialect::Kind::kHighLevel:
+    case world::Dialect::Kind::kSetPoints:  // of no tasks: ros_set_points.hpp
       break;
   }
   return high_level(spec, std::move(phrases));

@@ -5,6 +5,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -28,6 +30,7 @@ struct ShownTopic {
   std::string_view hash;  // RIHS01
   gate::ros::Qos qos;     // transient local: who comes later is shown the last one, too
   Audience audience = Audience::kAll;
+  Duration apart = {};  // made some ahead of their time: who hears at once is sent them so far apart
 };
 
 class Sink {
@@ -40,6 +43,10 @@ class Sink {
   [[nodiscard]] virtual bool wants(std::size_t topic) const = 0;
   // CDR with its encapsulation, of run time `now`. What finds no room is dropped and counted.
   virtual void put(std::size_t topic, Time now, std::span<const std::byte> message) = 0;
+  // What it is called where /diagnostics tells how many messages found no room there; empty: it does not, for a run
+  // that is run again must tell the same, whoever looks on.
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  [[nodiscard]] virtual std::uint64_t dropped() const = 0;
 };
 
 class Outlets;
@@ -64,11 +71,13 @@ class Outlets {
   void add(Sink& sink) { sinks_.push_back(&sink); }
   // Whether there is any.
   [[nodiscard]] bool needed() const { return !sinks_.empty(); }
+  // The named ones, of one name the first, and what they have dropped so far. The sinks outlive it.
+  [[nodiscard]] std::vector<std::pair<std::string, std::function<std::uint64_t()>>> ways_out() const;
   // After the sinks. Errors: those of Sink::add().
   template <wire::Message T>
   [[nodiscard]] Expected<Outlet<T>> outlet(std::string name, const gate::ros::Qos& qos = gate::ros::kTopicQos,
-                                           Audience audience = Audience::kAll) {
-    const auto topic = add(ShownTopic{std::move(name), T::kName, T::kHash, qos, audience});
+                                           Audience audience = Audience::kAll, Duration apart = {}) {
+    const auto topic = add(ShownTopic{std::move(name), T::kName, T::kHash, qos, audience, apart});
     return topic ? Expected<Outlet<T>>(Outlet<T>(*this, *topic)) : std::unexpected(topic.error());
   }
 

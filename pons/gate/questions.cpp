@@ -21,9 +21,10 @@ void Questions::close() {
 void Questions::put(Asked asked, Answered answered, Urgency urgency) {
   {
     const std::scoped_lock lock(mutex_);
-    if (asked_.size() < most_ + (urgency == Urgency::kUrgent ? kUrgentMost : 0)) {
+    const bool urgent = urgency == Urgency::kUrgent;
+    if (asked_.size() + urgent_.size() < most_ + (urgent ? kUrgentMost : 0)) {
       asked.number = ++numbers_;
-      asked_.push_back(std::move(asked));
+      (urgent ? urgent_ : asked_).push_back(std::move(asked));
       open_.emplace(numbers_, std::move(answered));
       return;
     }
@@ -32,10 +33,14 @@ void Questions::put(Asked asked, Answered answered, Urgency urgency) {
 }
 
 std::vector<Request> Questions::poll() {
-  std::vector<Asked> asked;
+  std::deque<Asked> asked;
   {
     const std::scoped_lock lock(mutex_);
-    asked.swap(asked_);
+    asked.swap(urgent_);
+    for (std::size_t i = 0; i < kPolledAtOnce && !asked_.empty(); ++i) {
+      asked.push_back(std::move(asked_.front()));
+      asked_.pop_front();
+    }
   }
   std::vector<Request> requests;
   for (Asked& each : asked) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -22,6 +23,7 @@ enum class Urgency : std::uint8_t { kAny, kUrgent };
 class Questions {
  public:
   static constexpr std::size_t kUrgentMost = 16;  // besides
+  static constexpr std::size_t kPolledAtOnce = 32;  // besides: a period of the bridge is short
   using Answered = std::function<void(const Json&)>;
 
   // At most `most` wait to be polled; more are refused at once, in the name of `where`. `wake` is called, by any
@@ -47,7 +49,7 @@ class Questions {
 
   // ---- on the thread of whoever answers ----
 
-  // All that were asked since the last call; answers may come from any thread.
+  // What is urgent, and of the others those that wait longest; answers may come from any thread.
   [[nodiscard]] std::vector<Request> poll();
 
  private:
@@ -70,7 +72,7 @@ class Questions {
   std::uint64_t numbers_ = 0;
   std::shared_ptr<Answers> answers_ = std::make_shared<Answers>();
   std::mutex mutex_;
-  std::vector<Asked> asked_;  // under mutex_
+  std::deque<Asked> asked_, urgent_;  // under mutex_
 };
 
 }  // namespace pons::gate

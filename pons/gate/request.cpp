@@ -24,7 +24,7 @@ constexpr std::string_view kSchema = R"({
   "type": "object", "required": ["op"], "additionalProperties": false,
   "properties": {
     "op": {"enum": ["submit", "list", "show", "history", "watch", "pause", "resume", "cancel", "halt", "approve",
-                    "observe", "chunk", "health", "axes", "base", "drive", "robot", "stop", "emergency_stop", "reset", "arm", "rest",
+                    "observe", "chunk", "health", "axes", "servo", "base", "drive", "robot", "stop", "emergency_stop", "reset", "arm", "rest",
                     "go_on", "end"]},
     "task": {"type": "object"},
     "tasks": {"type": "array", "items": {"type": "object"}},
@@ -40,6 +40,7 @@ constexpr std::string_view kSchema = R"({
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
     "actions": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
     "last": {"type": "boolean"},
+    "positions": {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": 16},
     "ahead_m_s": {"type": "number", "minimum": -100, "maximum": 100},
     "turn_rad_s": {"type": "number", "minimum": -100, "maximum": 100}
   }
@@ -80,6 +81,7 @@ const std::map<std::string_view, std::vector<std::string_view>> kMembers = {
     {"period_ms", {"chunk"}},
     {"actions", {"chunk"}},
     {"last", {"chunk"}},
+    {"positions", {"servo"}},
     {"ahead_m_s", {"drive"}},
     {"turn_rad_s", {"drive"}}};
 constexpr std::array<std::string_view, 7> kOptional = {"task", "tasks", "after", "which", "limit", "reason", "last"};
@@ -144,6 +146,12 @@ Expected<Asked> asked_from(std::string_view text) {
                  .limit = json->value("limit", kListed)};
   }
   if (operation == "chunk") return chunk_from(*json);
+  if (operation == "servo") {
+    Asked asked{.operation = Operation::kServo};
+    const auto positions = json->at("positions").get<std::vector<double>>();
+    asked.positions = AxisVector::Map(positions.data(), static_cast<Eigen::Index>(positions.size()));
+    return asked;
+  }
   if (operation == "drive") {
     return Asked{.operation = Operation::kDrive,
                  .ahead_m_s = json->at("ahead_m_s").get<double>(),

@@ -28,6 +28,9 @@
 //   {"op":"axes"}                → {"ok":true,"time_s":…,"names":[…],"positions":[…],"speeds":[…],"commanded":
 //                                   {"positions":[…],"speeds":[…]}}: of an arm, the first, in rad and rad/s: what is
 //                                   measured of its axes then, and what was asked of them
+//   {"op":"servo","positions":[…]}
+//                                → {"ok":true,"id":…}: the arm goes to that set-point, and after the next, by a task of
+//                                   that id, unless another one has the arm or waits for it
 //   {"op":"base"}                → {"ok":true,"time_s":…,"pose":{"x":…,"y":…,"yaw":…},"sure":…,"ahead_m_s":…,
 //                                   "turn_rad_s":…,"heading":{"x":…,"y":…,"yaw":…,"left_m":…,"detours":…}}: of a base,
 //                                   where it is on its map, how it moves, and where it is driving to, or null
@@ -73,6 +76,7 @@ enum class Operation : std::uint8_t {
   kChunk,
   kHealth,
   kAxes,
+  kServo,
   kBase,
   kDrive,
   kRobot,
@@ -100,6 +104,7 @@ struct Asked {
   std::uint64_t stream = 0;      // kChunk
   double ahead_m_s = 0;          // kDrive
   double turn_rad_s = 0;         // likewise
+  AxisVector positions;          // kServo; finite
   Chunk chunk;                   // kChunk; finite, and otherwise as it came
 };
 

@@ -54,6 +54,18 @@ TEST(AskedFrom, ReadsEachQuestion) {
   EXPECT_EQ(asked_from(R"({"op":"observe"})")->operation, Operation::kObserve);
 }
 
+TEST(AskedFrom, ReadsWhereTheArmShallBe) {
+  const auto asked = asked_from(R"({"op":"servo","positions":[0.5,-1]})");
+  ASSERT_TRUE(asked) << asked.error().line();
+  EXPECT_EQ(asked->operation, Operation::kServo);
+  ASSERT_EQ(asked->positions.size(), 2);
+  EXPECT_EQ(asked->positions[1], -1);
+  EXPECT_FALSE(asked_from(R"({"op":"servo"})"));
+  EXPECT_FALSE(asked_from(R"({"op":"servo","positions":[]})"));
+  EXPECT_FALSE(asked_from(R"({"op":"servo","positions":["a"]})"));
+  EXPECT_FALSE(asked_from(R"({"op":"axes","positions":[1]})"));
+}
+
 TEST(AskedFrom, ReadsHowToDrive) {
   const auto asked = asked_from(R"({"op":"drive","ahead_m_s":0.25,"turn_rad_s":-1})");
   ASSERT_TRUE(asked) << asked.error().line();

@@ -15,7 +15,7 @@ static_assert(kMaxAxes <= kMostTasks);
 namespace {
 
 Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits,
-                          Synchronization synchronization) {
+                          Synchronization synchronization, Duration at_least) {
   if (auto ok = check_start(start, limits); !ok) return std::unexpected(ok.error());
   if (auto ok = check_waypoint(end, "end", limits); !ok) return std::unexpected(ok.error());
   const auto axes = static_cast<std::size_t>(start.position.size());
@@ -30,7 +30,7 @@ Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, 
   }
   std::array<AxisProfile, kMaxAxes> profiles;
   const std::span<AxisProfile> used(profiles.data(), axes);
-  const auto duration_s = plan_positions(std::span(tasks).first(axes), {synchronization, 0, 1e-9}, used);
+  const auto duration_s = plan_positions(std::span(tasks).first(axes), {synchronization, to_s(at_least), 1e-9}, used);
   if (!duration_s) return fail(text(duration_s.error()), "motion", "choose another start or end");
   if (auto ok = check_way(used, limits); !ok) return std::unexpected(ok.error());
   Trajectory trajectory;
@@ -40,8 +40,9 @@ Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, 
 
 }  // namespace
 
-Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits) {
-  return move(start, at, end, limits, Synchronization::kTime);
+Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits,
+                          Duration at_least) {
+  return move(start, at, end, limits, Synchronization::kTime, at_least);
 }
 
 Expected<Trajectory> move_straight(const AxisVector& start, Time at, std::span<const AxisVector> points,
@@ -52,7 +53,7 @@ Expected<Trajectory> move_straight(const AxisVector& start, Time at, std::span<c
   for (const AxisVector& to : points) {
     const AxisVector still = AxisVector::Zero(from.size());
     const auto line =
-        move({from, still, still}, at, {to, AxisVector::Zero(to.size())}, limits, Synchronization::kPhase);
+        move({from, still, still}, at, {to, AxisVector::Zero(to.size())}, limits, Synchronization::kPhase, {});
     if (!line) return line;
     whole.insert(whole.end(), line->begin(), line->end());
     at = whole.back().end();

@@ -22,8 +22,9 @@ struct Waypoint {
 };
 
 // Point to point, all axes arriving together, each within `limits`. Any start inside the limits. Time-optimal for the
-// slowest axis. Errors: start or end outside the limits, not finite, no profile.
-[[nodiscard]] Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits);
+// slowest axis, or in `at_least` where that is longer. Errors: start or end outside the limits, not finite, no profile.
+[[nodiscard]] Expected<Trajectory> move(const AxisState& start, Time at, const Waypoint& end, const AxisLimits& limits,
+                                        Duration at_least = {});
 
 // Spent on the speeds at via points. Rough is for choosing among many ways; the fine motion is never longer.
 enum class Effort : std::uint8_t { kRough, kFine };

@@ -8,6 +8,7 @@
 #include "pons/skills/pick.hpp"
 #include "pons/skills/place.hpp"
 #include "pons/skills/press.hpp"
+#include "pons/skills/servo.hpp"
 #include "pons/skills/yield.hpp"
 
 namespace pons::skills {
@@ -21,6 +22,7 @@ void add_skills(task::SkillRegistry& registry, Cell& cell, const std::vector<std
   registry.add(pick(cell));
   registry.add(place(cell));
   registry.add(press(cell));
+  registry.add(servo(cell));
   registry.add(yield(cell));
 }
 

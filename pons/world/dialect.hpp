@@ -28,11 +28,11 @@ struct Phrase {
 };
 
 struct Dialect {
-  enum class Kind : std::uint8_t { kAgent, kBrain, kUniversal, kHighLevel, kMotion };
+  enum class Kind : std::uint8_t { kAgent, kBrain, kUniversal, kHighLevel, kMotion, kSetPoints };
   Kind kind = Kind::kAgent;
   Placed topic, feedback;
   std::optional<Placed> status;  // kAgent
-  std::vector<Phrase> phrases;   // of kHighLevel one; of kAgent and kMotion none
+  std::vector<Phrase> phrases;   // of kHighLevel one; of kAgent, kMotion and kSetPoints none
   std::string where;
 };
 

@@ -23,12 +23,13 @@ struct Make {
   Kind kind;
   std::string_view name, topic, feedback, status, phrases;
 };
-constexpr std::array<Make, 5> kMakes{
+constexpr std::array<Make, 6> kMakes{
     {{Kind::kAgent, "agent", "/agent/task", "/bridge/feedback", "/bridge/task_status", ""},
      {Kind::kBrain, "brain", "/brain/task_command", "/brain/task_feedback", "", "commands"},
      {Kind::kUniversal, "universal", "/universal/task_command", "/universal/task_feedback", "", "skills"},
      {Kind::kHighLevel, "high_level", "/high_level_tasks", "/execution_status", "", "steps"},
-     {Kind::kMotion, "motion", "/cerebellum/motion_trajectory", "/cerebellum/motion_status", "", ""}}};
+     {Kind::kMotion, "motion", "/cerebellum/motion_trajectory", "/cerebellum/motion_status", "", ""},
+     {Kind::kSetPoints, "set_points", "/brain/high_level_cmd", "/cerebellum/low_level_cmd", "", ""}}};
 // What a message of its has.
 constexpr std::array<std::string_view, 4> kOfHighLevel{"task_id", "object_id", "destination", "priority"};
 

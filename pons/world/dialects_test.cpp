@@ -85,7 +85,8 @@ TEST_F(DialectsSection, AreInTheWorldsThatComeAlong) {
     std::vector<std::string_view> names;
     for (const Dialect& each : loaded->dialects) names.push_back(name(each.kind));
     const bool has_arm = !loaded->base;
-    EXPECT_EQ(std::erase(names, "motion"), has_arm ? 1U : 0U) << world;
+    for (const char* const of_arms : {"motion", "set_points"})
+      EXPECT_EQ(std::erase(names, of_arms), has_arm ? 1U : 0U) << world << " " << of_arms;
     EXPECT_THAT(names, UnorderedElementsAre("agent", "brain", "universal", "high_level")) << world;
   }
 }
@@ -94,7 +95,7 @@ TEST_F(DialectsSection, EachMistakeIsNamed) {
   EXPECT_EQ(changed("HOME", "PARK"), "no error");
   EXPECT_THAT(changed("dialect: agent", "dialect: argot"),
               AllOf(HasSubstr("dialects[0].dialect: there is no dialect 'argot'"),
-                    HasSubstr("agent, brain, universal, high_level, motion")));
+                    HasSubstr("agent, brain, universal, high_level, motion, set_points")));
   EXPECT_THAT(changed("dialect: agent\n    status: /agent/state", "dialect: brain\n    commands: {A: cancel}"),
               HasSubstr("dialects[1]: 'brain' is there twice"));
   EXPECT_THAT(changed("    status: /agent/state", "    steps: []"),

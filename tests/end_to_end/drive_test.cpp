@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "tests/end_to_end/rounds_kit.hpp"
 
@@ -24,7 +25,9 @@ class SteeredTest : public RoundsTest {
   void steer_for(const model::Twist2& twist, double seconds) {
     const Time end = now_ + from_s(seconds);
     while (now_ < end && !HasFatalFailure()) {
-      if (now_.ns() % 100'000'000 == 0) (void)rounds_->steer(twist, now_);
+      if (now_.ns() % 100'000'000 == 0) {
+        if (const auto steered = rounds_->steer(twist, now_)) ids_.push_back(*steered);
+      }
       step();
       fastest_turn_ = std::max(fastest_turn_, std::abs(turns_rad_s()));
     }
@@ -40,6 +43,7 @@ class SteeredTest : public RoundsTest {
   }
 
   double fastest_turn_ = 0;
+  std::vector<std::string> ids_;  // of who steered, each time
 };
 
 TEST_F(SteeredTest, KeepsItsLimitsHoweverHardItIsSteered) {
@@ -74,18 +78,19 @@ TEST_F(SteeredTest, StopsSmoothlyWhenNobodySteersAnyMore) {
   arm();
   steer_for({0.4, 0}, 2);
   ASSERT_GT(speed_m_s(), 0.3);
-  ASSERT_EQ(rounds_->bridge->state("drive-1"), "running");
+  ASSERT_EQ(rounds_->bridge->state(ids_.front()), "running");
   run_for(0.3);
   EXPECT_GT(speed_m_s(), 0.3) << "a message may be late";
   run_for(2);
   EXPECT_LT(speed_m_s(), 0.005);
-  await("drive-1", 3);
-  EXPECT_EQ(outcome("drive-1"), Outcome::kSucceeded) << reason("drive-1");
-  EXPECT_EQ(told("drive-1").at("why"), "nobody steers");
+  await(ids_.front(), 3);
+  EXPECT_EQ(outcome(ids_.front()), Outcome::kSucceeded) << reason(ids_.front());
+  EXPECT_EQ(told(ids_.front()).at("why"), "nobody steers");
   EXPECT_EQ(rounds_->bridge_side->stops(), 0) << "along its limits, by nobody's stop";
   steer_for({0.2, 0}, 2);
   EXPECT_GT(speed_m_s(), 0.1) << "and again";
-  EXPECT_EQ(rounds_->bridge->state("drive-2"), "running");
+  EXPECT_NE(ids_.back(), ids_.front());
+  EXPECT_EQ(rounds_->bridge->state(ids_.back()), "running");
   expect_good();
 }
 
@@ -125,8 +130,8 @@ TEST_F(SteeredTest, ATaskGoesFirst) {
   }
   EXPECT_THAT(why, HasSubstr("a task has the base"));
   EXPECT_EQ(outcome("home"), Outcome::kSucceeded) << reason("home");
-  EXPECT_EQ(outcome("drive-1"), Outcome::kSucceeded);
-  EXPECT_EQ(told("drive-1").at("why"), "a task waits for the base");
+  EXPECT_EQ(outcome(ids_.front()), Outcome::kSucceeded);
+  EXPECT_EQ(told(ids_.front()).at("why"), "a task waits for the base");
   expect_good();
 }
 
@@ -145,7 +150,7 @@ TEST_F(SteeredTest, AStandingWishBeginsNothingWhereTheRobotMayNotMove) {
   ASSERT_TRUE(rounds_->bridge_side->arming().arm(now_));
   run_for(3);
   EXPECT_LT((place().position() - stands.position()).norm(), 0.005) << "an old wish moves nothing";
-  await("drive-1", 3);
+  await(ids_.front(), 3);
   expect_good();
 }
 
@@ -153,17 +158,17 @@ TEST_F(SteeredTest, PausedItStandsWhateverIsWished) {
   begin();
   arm();
   steer_for({0.3, 0}, 2);
-  ASSERT_TRUE(rounds_->bridge->pause("drive-1", now_, "a person wants to pass"));
-  run_until([&] { return rounds_->bridge->state("drive-1") == "paused"; }, 3);
+  ASSERT_TRUE(rounds_->bridge->pause(ids_.front(), now_, "a person wants to pass"));
+  run_until([&] { return rounds_->bridge->state(ids_.front()) == "paused"; }, 3);
   const Pose2 stands = place();
   EXPECT_THAT(refused({0.3, 0}), HasSubstr("paused"));
   steer_for({0.3, 0}, 2);
   EXPECT_LT((place().position() - stands.position()).norm(), 0.005);
-  ASSERT_TRUE(rounds_->bridge->resume("drive-1", now_));
+  ASSERT_TRUE(rounds_->bridge->resume(ids_.front(), now_));
   EXPECT_EQ(refused({0.3, 0}), "") << "else it would find that nobody steers, and end";
   steer_for({0.3, 0}, 2);
   EXPECT_GT(speed_m_s(), 0.2);
-  EXPECT_EQ(rounds_->bridge->state("drive-1"), "running");
+  EXPECT_EQ(rounds_->bridge->state(ids_.front()), "running");
   expect_good();
 }
 
@@ -171,17 +176,17 @@ TEST_F(SteeredTest, CancelledAndHaltedItStandsAndSaysSo) {
   begin();
   arm();
   steer_for({0.3, 0}, 2);
-  ASSERT_TRUE(rounds_->bridge->cancel("drive-1", now_, "enough"));
-  await("drive-1", 5);
-  EXPECT_EQ(outcome("drive-1"), Outcome::kCancelled);
-  EXPECT_EQ(history("drive-1").record.outcome->detail.at("stop"), "CONFIRMED");
+  ASSERT_TRUE(rounds_->bridge->cancel(ids_.front(), now_, "enough"));
+  await(ids_.front(), 5);
+  EXPECT_EQ(outcome(ids_.front()), Outcome::kCancelled);
+  EXPECT_EQ(history(ids_.front()).record.outcome->detail.at("stop"), "CONFIRMED");
   EXPECT_LT(speed_m_s(), 0.01);
   steer_for({0.3, 0}, 2);
-  ASSERT_TRUE(rounds_->bridge->halt("drive-2", now_, "look out"));
+  ASSERT_TRUE(rounds_->bridge->halt(ids_.back(), now_, "look out"));
   step();
-  await("drive-2", 5);
-  EXPECT_EQ(outcome("drive-2"), Outcome::kCancelled);
-  EXPECT_EQ(history("drive-2").record.outcome->detail.at("stop"), "CONFIRMED");
+  await(ids_.back(), 5);
+  EXPECT_EQ(outcome(ids_.back()), Outcome::kCancelled);
+  EXPECT_EQ(history(ids_.back()).record.outcome->detail.at("stop"), "CONFIRMED");
   EXPECT_GE(rounds_->bridge_side->stops(), 1);
   expect_good();
 }

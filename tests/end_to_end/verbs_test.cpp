@@ -46,6 +46,7 @@ constexpr Use kUses[] = {
      R"([{"skill":"move_to","arguments":{"place":"north"}},{"skill":"move_to","arguments":{"place":"home"}}])"},
     {"pick_and_place", ""},
     {"press", R"([{"skill":"press","arguments":{"place":"block","force_n":20,"seconds":1}}])"},
+    {"servo", R"([{"skill":"servo","arguments":{"positions":[0.5,-0.2067,0,-2.3596,0,2.1529,0.3]}}])"},
     {"yield", R"([{"skill":"yield","arguments":{"seconds":3}}])"},
 };
 

@@ -217,6 +217,40 @@ TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
   (void)run.wait();
 }
 
+TEST(RosOptions, OfTwoRunsOnOneDomainEachIsWholeAndWhoHasTheNameOfTheOtherSaysSo) {
+  const tests::Folder folder;
+  const auto run = [&](const std::string& name, const std::string& node) {
+    return std::make_unique<tests::Running>(
+        folder.path(), name,
+        std::vector<std::string>{"run", "small_cell", "--stay", "--realtime", "--quiet", "--socket",
+                                 folder / (name + "_s"), "--journal", folder / (name + ".db"), "--ros", "--ros-domain",
+                                 std::to_string(test_domain()), "--ros-node", node});
+  };
+  const auto left = run("left", "pons"), right = run("right", "pons"), third = run("third", "other");
+  const auto said = [](const auto& of) {
+    return of->err().find("/pons: another node of that name") != std::string::npos;
+  };
+  const auto node = test_node("test");
+  EXPECT_TRUE(spin_until({node.get()}, [&] { return said(left) && said(right); })) << left->err() << right->err();
+  EXPECT_FALSE(said(third)) << third->err();
+  // Each has its arm, its journal and its services; who asks a name that two have asks both.
+  const auto asks = client<SubmitTask>(*node, "/other/submit_task");
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return (*asks)->available(); }));
+  std::optional<Expected<SubmitTask::Response>> got;
+  ASSERT_TRUE((*asks)->call({.task = home("one")}, 20s, [&](auto reply) { got = std::move(reply); }));
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return got.has_value(); }));
+  EXPECT_TRUE(*got && (*got)->ok);
+  for (const auto* const each : {&left, &right, &third}) {
+    (*each)->signal(SIGINT);
+    EXPECT_EQ((*each)->wait().code, 130) << (*each)->err();
+  }
+  const auto story = [&](const char* journal) {
+    return tests::run_pons({"task", "list", "--journal", folder / journal}).out;
+  };
+  EXPECT_THAT(story("third.db"), HasSubstr("one"));
+  EXPECT_EQ(story("left.db"), "");
+}
+
 TEST(RosOptions, WhatCannotBeIsRefused) {
   const auto refused = [](const std::vector<std::string>& more) {
     std::vector<std::string> line{"run", "small_cell", "--parcels", "1", "--quiet"};

@@ -1,4 +1,4 @@
-// What MoveIt's users send an arm: motions planned elsewhere, as goals of FollowJointTrajectory.
+// What others send an arm: motions planned elsewhere, as goals of FollowJointTrajectory; and set-points.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -17,6 +17,7 @@
 #include "pons/gate/ros/test_nodes.hpp"
 #include "pons/wire/types/control_msgs/action/follow_joint_trajectory.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
+#include "pons/wire/types/std_msgs/msg/float64_multi_array.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::gate::ros {
@@ -27,6 +28,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using wire::control_msgs::action::FollowJointTrajectory;
 using wire::sensor_msgs::msg::JointState;
+using wire::std_msgs::msg::Float64MultiArray;
 using Goal = FollowJointTrajectory::Goal;
 using Result = FollowJointTrajectory::Result;
 using Ended = ActionClient<FollowJointTrajectory>::Ended;
@@ -53,8 +55,9 @@ class RosArm : public ::testing::Test {
     run_.signal(SIGINT);
     EXPECT_EQ(run_.wait().code, 130);
   }
-  [[nodiscard]] std::string stories() {
-    return tests::run_pons({"task", "list", "--journal", folder_ / "j.db"}).out;
+  [[nodiscard]] std::string stories() { return tests::run_pons({"task", "list", "--journal", folder_ / "j.db"}).out; }
+  [[nodiscard]] std::int64_t stamp_ns() const {
+    return state_.header.stamp.sec * std::int64_t{1'000'000'000} + state_.header.stamp.nanosec;
   }
   [[nodiscard]] bool spun(const std::function<bool()>& done) { return spin_until({node_.get()}, done); }
 
@@ -190,6 +193,50 @@ TEST_F(RosArm, ACancelledGoalStopsTheArmAndANewOneReplacesTheOld) {
   EXPECT_GT(rests, before - 0.09) << "on its way";
   end_run();
   EXPECT_THAT(stories(), AllOf(HasSubstr("trajectory-"), HasSubstr("CANCELLED")));
+}
+
+TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
+  std::vector<std::vector<double>> asked;
+  ASSERT_TRUE(node_->subscribe<Float64MultiArray>("/cerebellum/low_level_cmd", Qos{.depth = 1000},
+                                                  [&](const Float64MultiArray& each) { asked.push_back(each.data); }));
+  auto says = node_->advertise<Float64MultiArray>("/brain/high_level_cmd");
+  ASSERT_TRUE(says);
+  const std::vector<double> before = state_.position;
+  Float64MultiArray set_point;
+  set_point.data = before;
+  // Said until it is heard; then once a second, by the run's own time.
+  int steps = 0;
+  ASSERT_TRUE(spun([&] {
+    if (steps++ % 250 == 0) {
+      EXPECT_TRUE(says->publish(set_point));
+    }
+    return !asked.empty();
+  }));
+  for (int i = 1; i <= 3; ++i) {
+    set_point.data[0] = before[0] + 0.1 * i;
+    ASSERT_TRUE(says->publish(set_point));
+    const std::int64_t until = stamp_ns() + 1'000'000'000;
+    ASSERT_TRUE(spun([&] { return stamp_ns() >= until; }));
+  }
+  ASSERT_TRUE(spun([&] { return std::abs(turned_.back() - before[0] - 0.3) < 0.002; })) << turned_.back() - before[0];
+  const std::size_t until_there = asked.size();
+  Float64MultiArray wrong;
+  wrong.data = {1, 2};
+  ASSERT_TRUE(says->publish(wrong));
+  end_run();
+  // Two milliseconds from one to the next: nothing is faster than the arm may be, nor does it stand while set-points
+  // come.
+  double fastest = 0;
+  for (std::size_t i = 1; i < asked.size(); ++i) {
+    ASSERT_EQ(asked[i].size(), 7U);
+    fastest = std::max(fastest, std::abs(asked[i][0] - asked[i - 1][0]) / 0.002);
+  }
+  EXPECT_GT(fastest, 0.08);
+  EXPECT_LT(fastest, 0.3);
+  EXPECT_NEAR(asked.back()[0], before[0] + 0.3, 0.002);
+  EXPECT_GT(until_there, 1500U) << "500 in each of three seconds and more";
+  EXPECT_THAT(stories(), HasSubstr("servo-"));
+  EXPECT_THAT(run_.err(), HasSubstr("/brain/high_level_cmd: positions: 2 positions for 7 joints"));
 }
 
 }  // namespace

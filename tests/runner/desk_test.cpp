@@ -70,14 +70,19 @@ TEST(Desk, TellsOfAnArmsAxesOnceItsLoopHas) {
   auto asks = std::make_unique<Asks>(answered);
   Asks& visitor = *asks;
   Desk desk(std::move(asks), bridge, *journal, {}, health, [] { return nullptr; });
-  const auto ask = [&] {
-    visitor.texts = {R"({"op":"axes"})"};
+  const auto ask = [&](const std::string& text = R"({"op":"axes"})") {
+    visitor.texts = {text};
     desk.attend(Time{});
     return answered.back();
   };
   EXPECT_NE(ask().find("the robot is no arm"), std::string::npos);
   link::State state;
-  desk.serve(Desk::Axes{{"j1", "j2"}, [&]() -> const link::State& { return state; }});
+  desk.serve(Desk::Axes{{"j1", "j2"},
+                        [&]() -> const link::State& { return state; },
+                        [&](const AxisVector& q, Time) -> Expected<std::string> {
+                          if (q.size() != 2) return fail("other joints", "positions", "give two");
+                          return "servo-1";
+                        }});
   EXPECT_NE(ask().find("has told nothing of its arm yet"), std::string::npos);
   state.position = state.speed = AxisVector::Constant(2, 0.5);
   state.commanded = at_rest(AxisVector::Constant(2, 0.25));
@@ -86,6 +91,9 @@ TEST(Desk, TellsOfAnArmsAxesOnceItsLoopHas) {
   EXPECT_EQ(visitor.told.at("positions"), (std::vector{0.5, 0.5}));
   EXPECT_EQ(visitor.told.at("commanded").at("positions"), (std::vector{0.25, 0.25}));
   EXPECT_EQ(visitor.told.at("commanded").at("speeds"), (std::vector{0.0, 0.0}));
+  ask(R"({"op":"servo","positions":[1,2]})");
+  EXPECT_EQ(visitor.told.at("id"), "servo-1");
+  EXPECT_NE(ask(R"({"op":"servo","positions":[1]})").find("other joints"), std::string::npos);
 }
 
 TEST(Desk, ARunThatIsNotServedIsNotToldToRest) {

@@ -29,6 +29,9 @@ class Shown final : public Sink {
     topics_[topic].came.emplace_back(now, std::vector<std::byte>(message.begin(), message.end()));
   }
 
+  [[nodiscard]] std::string_view name() const override { return "test"; }
+  [[nodiscard]] std::uint64_t dropped() const override { return 0; }
+
   // What came on that topic since the last call.
   template <wire::Message T>
   [[nodiscard]] std::vector<T> take(const std::string& name) {

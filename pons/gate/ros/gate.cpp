@@ -9,7 +9,53 @@ namespace {
 
 constexpr std::chrono::milliseconds kLooksAtLeast{200};  // though nothing wakes it
 
+// In the queue of a topic whose messages are sent so far apart; what is beyond is sent at once.
+constexpr std::size_t kAheadMost = 64;
+
 }  // namespace
+
+// Messages that were made ahead of their time, one by one.
+class Gate::Metronome final : public Part {
+ public:
+  void add(Writer& writer, Duration apart) { lines_.push_back({&writer, apart, {}, {}}); }
+  // False: it is no writer of these.
+  [[nodiscard]] bool take(const Writer& writer, std::vector<std::byte>& message) {
+    const auto line = std::ranges::find(lines_, &writer, &Line::writer);
+    if (line == lines_.end()) return false;
+    if (line->waiting.empty()) line->due = std::max(line->due, Clock::now());
+    line->waiting.push_back(std::move(message));
+    return true;
+  }
+  void spin(Clock::time_point now) override {
+    for (Line& line : lines_) {
+      while (!line.waiting.empty() && (line.due <= now || line.waiting.size() > kAheadMost)) {
+        if (!line.writer->write(line.waiting.front())) ++dropped_;
+        line.waiting.pop_front();
+        if (line.due <= now) line.due += line.apart;
+      }
+      // After a pause there is nothing to be caught up with.
+      if (line.waiting.empty()) line.due = std::max(line.due, now);
+    }
+  }
+  [[nodiscard]] Clock::time_point due() const override {
+    auto first = Clock::time_point::max();
+    for (const Line& line : lines_) {
+      if (!line.waiting.empty()) first = std::min(first, line.due);
+    }
+    return first;
+  }
+  [[nodiscard]] std::uint64_t take_dropped() { return std::exchange(dropped_, 0); }
+
+ private:
+  struct Line {
+    Writer* writer;
+    Duration apart;
+    std::deque<std::vector<std::byte>> waiting;
+    Clock::time_point due;
+  };
+  std::vector<Line> lines_;
+  std::uint64_t dropped_ = 0;
+};
 
 Expected<std::unique_ptr<Gate>> Gate::open(const NodeSettings& settings) {
   auto node = Node::open(settings);
@@ -18,7 +64,11 @@ Expected<std::unique_ptr<Gate>> Gate::open(const NodeSettings& settings) {
 }
 
 Gate::Gate(std::unique_ptr<Node> node)
-    : node_(std::move(node)), questions_("ROS 2", kAskedMost, [woken = node_.get()] { woken->wake(); }) {}
+    : node_(std::move(node)), questions_("ROS 2", kAskedMost, [woken = node_.get()] { woken->wake(); }) {
+  auto metronome = std::make_unique<Metronome>();
+  metronome_ = metronome.get();
+  node_->add_part(std::move(metronome));
+}
 
 Gate::~Gate() { stop(); }
 
@@ -46,11 +96,12 @@ void Gate::run() {
 }
 
 Expected<std::size_t> Gate::add_topic(std::string_view topic, std::string_view type, std::string_view hash,
-                                      const Qos& qos) {
+                                      const Qos& qos, Duration apart) {
   auto writer = node_->add_writer(topic, Use::kTopic, type, hash, qos);
   if (!writer) return std::unexpected(writer.error());
   writers_.push_back(std::move(*writer));
   wanted_.emplace_back(false);
+  if (apart > Duration{0}) metronome_->add(*writers_.back(), apart);
   return writers_.size() - 1;
 }
 
@@ -74,8 +125,11 @@ void Gate::write_all() {
     queued.swap(queued_);
     queued_bytes_ = 0;
   }
-  for (const auto& [writer, bytes] : queued)
-    if (!writers_[writer]->write(bytes)) ++dropped_;
+  for (auto& [topic, bytes] : queued) {
+    Writer& writer = *writers_[topic];
+    if (!metronome_->take(writer, bytes) && !writer.write(bytes)) ++dropped_;
+  }
+  dropped_ += metronome_->take_dropped();
 }
 
 void Gate::look_who_hears() {

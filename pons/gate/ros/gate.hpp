@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/questions.hpp"
 #include "pons/gate/ros/node.hpp"
@@ -57,9 +58,10 @@ class Gate final : public Visitors {
     const auto number = add_topic(topic, T::kName, T::kHash, qos);
     return number ? Expected<Outlet<T>>(Outlet<T>(*this, *number)) : std::unexpected(number.error());
   }
-  // Likewise, of a type that only whoever calls knows; for put().
+  // Likewise, of a type that only whoever calls knows; for put(). What is put is sent so far apart at least, unless it
+  // is too much for that.
   [[nodiscard]] Expected<std::size_t> add_topic(std::string_view topic, std::string_view type, std::string_view hash,
-                                                const Qos& qos);
+                                                const Qos& qos, Duration apart = {});
   // What it is told to do is done on its thread from start() on.
   [[nodiscard]] Node& node() { return *node_; }
   void start();
@@ -77,7 +79,7 @@ class Gate final : public Visitors {
 
   // ---- on the thread of whoever answers ----
 
-  // At most all that were asked since the last call; answers may come from any thread, also when the gate has gone.
+  // As Questions::poll(); answers may come also when the gate has gone.
   [[nodiscard]] std::vector<Request> poll() override { return questions_.poll(); }
   // What people should know, a line each.
   [[nodiscard]] std::vector<std::string> take_warnings();
@@ -99,6 +101,8 @@ class Gate final : public Visitors {
   }
 
  private:
+  class Metronome;
+
   explicit Gate(std::unique_ptr<Node> node);
   void run();
   void write_all();
@@ -106,6 +110,7 @@ class Gate final : public Visitors {
 
   std::unique_ptr<Node> node_;
   std::vector<std::unique_ptr<Writer>> writers_;
+  Metronome* metronome_;                  // a part of the node
   std::deque<std::atomic<bool>> wanted_;  // a writer; all may ask
   Questions questions_;
   std::mutex mutex_;

@@ -20,6 +20,8 @@ using wire::std_msgs::msg::String;
 using wire::std_srvs::srv::SetBool;
 using Image = wire::sensor_msgs::msg::Image;
 
+constexpr Qos kDeep{.depth = 2000};
+
 std::unique_ptr<Gate> test_gate() {
   auto opened = Gate::open({.participant = {.domain = test_domain()}, .name = {"/", "gate"}});
   EXPECT_TRUE(opened) << opened.error().line();
@@ -38,6 +40,28 @@ TEST(RosGate, WhatIsPutIsHeardInOrder) {
                                       [&](const String& text) { heard += text.data + " "; }));
   EXPECT_TRUE(spin_until({node.get()}, [&] { return heard.ends_with("19 "); }));
   EXPECT_EQ(heard, "0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 ");
+}
+
+TEST(RosGate, WhatIsMadeAheadIsSentInItsTimeAndTooMuchAtOnce) {
+  const auto gate = test_gate();
+  const auto topic = gate->add_topic("said", String::kName, String::kHash, kDeep, 50ms);
+  ASSERT_TRUE(topic);
+  gate->start();
+  const auto node = test_node("listener");
+  std::vector<std::chrono::steady_clock::time_point> heard;
+  ASSERT_TRUE(node->subscribe<String>("said", kDeep,
+                                      [&](const String&) { heard.push_back(std::chrono::steady_clock::now()); }));
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return gate->wanted(*topic); }));
+  std::vector<std::byte> bytes;
+  ASSERT_TRUE(wire::encode(String{"tick"}, bytes));
+  for (int i = 0; i < 10; ++i) gate->put(*topic, bytes);
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return heard.size() == 10; }));
+  EXPECT_GE(heard.back() - heard.front(), 200ms) << "nine times fifty, less what the first was late";
+  // Of a thousand the last are sent so far apart, and not all.
+  for (int i = 0; i < 1000; ++i) gate->put(*topic, bytes);
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return heard.size() == 1010; }));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 25s) << "half as long as a thousand take";
 }
 
 TEST(RosGate, WhatIsAskedIsPolledAndAnsweredAcrossThreads) {
@@ -87,7 +111,30 @@ TEST(RosGate, WhoAsksTooMuchIsRefused) {
   for (std::size_t i = 0; i <= Gate::kAskedMost; ++i)
     gate->ask(Json{{"op", "robot"}}, [&](const Json& told) { refused = told.at("error"); });
   EXPECT_THAT(refused, ::testing::HasSubstr("1024 requests wait already"));
-  EXPECT_EQ(gate->poll().size(), Gate::kAskedMost);
+  std::size_t polled = 0;
+  for (std::size_t more = 1; more > 0; polled += more) more = gate->poll().size();
+  EXPECT_EQ(polled, Gate::kAskedMost);
+}
+
+TEST(RosGate, OfManyRequestsSomeArePolledAtOnceTheUrgentFirst) {
+  const auto gate = test_gate();
+  const auto ignore = [](const Json&) {};
+  for (int i = 0; i < 100; ++i) gate->ask(Json{{"op", "show"}, {"id", std::to_string(i)}}, ignore);
+  gate->ask(Json{{"op", "stop"}}, ignore, Urgency::kUrgent);
+  std::vector<std::string> texts;
+  std::size_t most = 0;
+  for (int polls = 0; polls < 4; ++polls) {
+    const std::vector<Request> requests = gate->poll();
+    most = std::max(most, requests.size());
+    for (const Request& request : requests) texts.push_back(request.text);
+  }
+  EXPECT_EQ(most, Questions::kPolledAtOnce + 1);
+  ASSERT_EQ(texts.size(), 101U);
+  EXPECT_EQ(texts[0], R"({"op":"stop"})"
+                      "\n");
+  for (int i = 0; i < 100; ++i)
+    EXPECT_EQ(Json::parse(texts[static_cast<std::size_t>(i) + 1]).at("id"), std::to_string(i));
+  EXPECT_TRUE(gate->poll().empty());
 }
 
 TEST(RosGate, WhatIsUrgentHasRoomWhenNothingElseHas) {

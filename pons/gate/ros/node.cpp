@@ -13,6 +13,8 @@
 namespace pons::gate::ros {
 namespace {
 
+using namespace std::chrono_literals;
+
 using wire::rmw_dds_common::msg::ParticipantEntitiesInfo;
 
 constexpr Qos kDiscoveryQos{.durability = Qos::Durability::kTransientLocal, .depth = 1};
@@ -78,9 +80,10 @@ void Node::spin() {
 void Node::spin_for(std::chrono::milliseconds at_most) {
   auto until = Part::Clock::now() + at_most;
   for (const auto& part : parts_) until = std::min(until, part->due());
-  const auto rest = std::chrono::ceil<std::chrono::milliseconds>(until - Part::Clock::now()).count();
+  const std::chrono::nanoseconds rest = std::clamp<std::chrono::nanoseconds>(until - Part::Clock::now(), 0ns, 60s);
+  const timespec longest{rest / 1s, (rest % 1s).count()};
   pollfd waited{wake_.get(), POLLIN, 0};
-  (void)::poll(&waited, 1, static_cast<int>(std::clamp<std::int64_t>(rest, 0, 60'000)));
+  (void)::ppoll(&waited, 1, &longest, nullptr);
   spin();
 }
 
