@@ -287,11 +287,14 @@ Expected<std::string> BridgeHalf::servo(const AxisVector& position, Time now) {
   if (!servoed_) return fail("no set-point says which arm it means", "servo", "ask in a world with one arm");
   if (!cell().arm.operational())
     return fail("the robot is not armed", "servo", "wait, or `pons robot` says what it needs");
+  if (cell().held) return fail("the cups hold " + cell().held->code, "servo", "have it put down");
+  if (cell().servo != nullptr) {
+    if (auto going = cell().servo->take(position, now); !going) return std::unexpected(going.error());
+    return bridge->mover(0);
+  }
   auto taken = servoed_->take({{"positions", std::vector<double>(position.begin(), position.end())}}, now);
   if (!taken) return std::unexpected(taken.error());
-  if (!taken->begun && cell().servo != nullptr) {
-    if (auto going = cell().servo->take(position, now); !going) return std::unexpected(going.error());
-  }
+  if (!taken->begun) return fail(taken->id + " is about to begin", "servo", "send it again");
   return std::move(taken->id);
 }
 

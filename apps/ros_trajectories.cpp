@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "apps/outside.hpp"
+#include "pons/skills/follow_trajectory.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::apps {
@@ -25,8 +26,8 @@ using Tolerance = wire::control_msgs::msg::JointTolerance;
 
 constexpr std::string_view kAction = "joint_trajectory_controller/follow_joint_trajectory";
 constexpr std::chrono::milliseconds kLooksEach{50};  // ros2_control's action_monitor_rate
-// What is left of a value's digits: a task's JSON has room for so many points then.
-constexpr double kFinest = 1e-9;
+// What is left of a value's digits: a task's JSON has room for as many points as the skill takes then.
+constexpr double kFineness = 1e9, kRounded = 1e6;
 // As the skill begins what it says of these.
 constexpr std::string_view kPathViolated = "path_tolerance_violated", kGoalViolated = "goal_tolerance_violated";
 
@@ -34,7 +35,7 @@ Expected<Json> numbers(const std::vector<double>& values, const std::string& whe
   Json list = Json::array();
   for (const double value : values) {
     if (!std::isfinite(value)) return fail("is not finite", where, "give numbers");
-    list.push_back(std::round(value / kFinest) * kFinest);
+    list.push_back(std::abs(value) < kRounded ? std::round(value * kFineness) / kFineness : value);
   }
   return list;
 }
@@ -123,6 +124,9 @@ Expected<Json> arguments_from(const Goal& goal, const std::vector<std::string>& 
   if (auto known = check_known(goal); !known) return std::unexpected(known.error());
   if (goal.trajectory.points.empty())
     return fail("a goal without points moves nothing", "points", "cancel a goal to stop it");
+  if (goal.trajectory.points.size() > skills::kMostTrajectoryPoints)
+    return fail(fmt::format("a goal of {} points is too long", goal.trajectory.points.size()), "points",
+                fmt::format("send {} at most", skills::kMostTrajectoryPoints));
   Json arguments{{"joints", goal.trajectory.joint_names}, {"points", Json::array()}};
   for (const Point& point : goal.trajectory.points) {
     auto read = point_from(point, arguments["points"].size());

@@ -51,7 +51,7 @@ Expected<RunOptions> run_options(const RunFacts& facts, Inputs& inputs) {
   RunOptions options;
   options.world = facts.world;
   options.parcels.seed = facts.seed;
-  options.parcels.parcels_given = facts.parcels && !facts.manifest.empty();
+  options.parcels.parcels_given = facts.parcels.value_or(0) > 0 && (facts.stays || !facts.manifest.empty());
   if (facts.parcels) options.parcels.parcels = *facts.parcels;
   options.body.visits = facts.visits;
   options.body.arm_at = facts.arm_at;

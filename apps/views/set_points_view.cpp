@@ -24,10 +24,15 @@ void SetPointsView::show(Time now) {
   const bool goes = cell_.arm.operational() && cell_.servo != nullptr;
   if (goes) until_ = std::max(now, cell_.arm.motion_end());
   if (!goes && (now >= until_ || !cell_.arm.operational())) return next_.reset();
-  if (!next_ || *next_ + kLatest < now) next_ = now;
-  // So far nothing is replaced any more. A period that comes late leaves no gap.
-  for (const Time until = cell_.arm.splice_time(now); *next_ < until; *next_ += kApart) {
-    const AxisVector position = cell_.arm.planned(*next_).position;
+  const Duration late = cell_.arm.late();
+  if (!next_ || *next_ + kLatest < now) next_ = now, told_ = now - kApart - late;
+  // So far nothing is replaced any more. A period that comes late leaves no gap, nor is one told twice that is slowed.
+  const Time until = cell_.arm.splice_time(now);
+  const std::int64_t count = std::max<std::int64_t>(0, (until - *next_ + kApart - Duration{1}) / kApart);
+  const Time from = told_, to = std::max(from, *next_ + (count - 1) * kApart - late);
+  for (std::int64_t i = 1; i <= count; ++i, *next_ += kApart) {
+    told_ = from + (to - from) * i / count;
+    const AxisVector position = cell_.arm.planned(told_ + late).position;
     message_.data.assign(position.begin(), position.end());
     commands_.put(*next_, message_);
   }

@@ -29,7 +29,8 @@ class SetPointsView final : public View {
   const skills::Cell& cell_;
   Outlet<Float64MultiArray> commands_;
   Float64MultiArray message_;
-  std::optional<Time> next_;  // while any are told
+  std::optional<Time> next_;  // when another one is told, while any are
+  Time told_;                 // of the last one, in the motion's time, which a zone makes slower
   Time until_;                // so long at least
 };
 

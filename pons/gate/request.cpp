@@ -40,7 +40,7 @@ constexpr std::string_view kSchema = R"({
     "period_ms": {"type": "number", "minimum": 0, "maximum": 1000000},
     "actions": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
     "last": {"type": "boolean"},
-    "positions": {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": 16},
+    "positions": {"type": "array", "items": {"type": "number"}, "minItems": 1, "maxItems": 8},
     "ahead_m_s": {"type": "number", "minimum": -100, "maximum": 100},
     "turn_rad_s": {"type": "number", "minimum": -100, "maximum": 100}
   }
@@ -149,6 +149,7 @@ Expected<Asked> asked_from(std::string_view text) {
   if (operation == "servo") {
     Asked asked{.operation = Operation::kServo};
     const auto positions = json->at("positions").get<std::vector<double>>();
+    static_assert(kMaxAxes == 8, "as the schema has it");
     asked.positions = AxisVector::Map(positions.data(), static_cast<Eigen::Index>(positions.size()));
     return asked;
   }

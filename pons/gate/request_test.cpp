@@ -63,6 +63,8 @@ TEST(AskedFrom, ReadsWhereTheArmShallBe) {
   EXPECT_FALSE(asked_from(R"({"op":"servo"})"));
   EXPECT_FALSE(asked_from(R"({"op":"servo","positions":[]})"));
   EXPECT_FALSE(asked_from(R"({"op":"servo","positions":["a"]})"));
+  EXPECT_TRUE(asked_from(R"({"op":"servo","positions":[1,2,3,4,5,6,7,8]})"));
+  EXPECT_FALSE(asked_from(R"({"op":"servo","positions":[1,2,3,4,5,6,7,8,9]})")) << "more than any robot has";
   EXPECT_FALSE(asked_from(R"({"op":"axes","positions":[1]})"));
 }
 

@@ -288,7 +288,7 @@ void stretch(std::vector<TimedPoint>& points, double factor) {
 }
 
 Expected<std::vector<TimedPoint>> give_time(std::vector<TimedPoint> points, const InTime& make,
-                                            const AxisLimits& limits) {
+                                            const AxisLimits& limits, std::size_t first) {
   const std::vector<TimedPoint> asked = points;
   double all_longer = 1;  // as much for each leg would do
   for (int round = 0; round < kMostRounds; ++round) {
@@ -298,7 +298,7 @@ Expected<std::vector<TimedPoint>> give_time(std::vector<TimedPoint> points, cons
     if (beyond.empty()) return points;
     if (const Excess* const place = only_places(beyond))
       return fail(fmt::format("axis {} leaves its position limits on the way to it", place->axis + 1),
-                  fmt::format("point {}", place->point + 1), "keep the points away from the limits");
+                  fmt::format("point {}", place->point + first), "keep the points away from the limits");
     const double worst = std::ranges::max(beyond, {}, &Excess::longer).longer;
     if (round == 0 || round >= kRounds) all_longer *= kLonger * worst;
     if (round + 1 >= kRounds) {

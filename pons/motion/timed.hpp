@@ -64,9 +64,10 @@ using InTime = std::function<Expected<Trajectory>(std::span<const TimedPoint>)>;
 
 // The same places at times in which `make` keeps the limits: a leg that does not is given longer, by what its worst
 // excess asks for, a few rounds long; where that leads nowhere, all legs alike. No leg gets shorter. Speeds that were
-// given get less with their legs. Errors: those of `make`; a position limit is not kept, which no time mends.
+// given get less with their legs. Errors: those of `make`; a position limit is not kept, which no time mends;
+// the points are numbered from `first` on.
 [[nodiscard]] Expected<std::vector<TimedPoint>> give_time(std::vector<TimedPoint> points, const InTime& make,
-                                                          const AxisLimits& limits);
+                                                          const AxisLimits& limits, std::size_t first = 1);
 // All of it so many times as long.
 void stretch(std::vector<TimedPoint>& points, double factor);
 

@@ -140,6 +140,7 @@ class Place final : public ArmSkill {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
     }
     if (!cell_.held->alone) return {Status::kFailed, "another hangs on " + cell_.held->code, {}};
+    if (cell_.held->doubtful) return {Status::kFailed, "it may be another: nobody has seen it", {}};
     if (times_struck_ >= kStruckMost)
       return {Status::kFailed, fmt::format("{}: struck something {} times on the way", name_, times_struck_), {}};
     const world::Place* target = cell_.world.place(name_);

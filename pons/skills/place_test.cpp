@@ -229,6 +229,9 @@ TEST_F(CarriedTest, WhoIsFeltToHangOnItOnTheWayEndsTheWay) {
   EXPECT_NEAR(cell_.held->mass_kg, 4, 1);
   const auto again = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
   EXPECT_EQ(again->tick(now_).status, Status::kFailed) << "not before it was laid down";
+  cell_.held->alone = true, cell_.held->doubtful = true;
+  const auto doubtful = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+  EXPECT_EQ(doubtful->tick(now_).reason, "it may be another: nobody has seen it");
 }
 
 // Then a mouth is jammed, maybe. What stops the arm for another reason is no collision, however often it comes.

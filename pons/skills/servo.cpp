@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,7 @@ constexpr Duration kLookAhead = std::chrono::milliseconds(1000);  // longer than
 constexpr Duration kClosest = std::chrono::milliseconds(20), kFarthest = std::chrono::seconds(2);
 constexpr Duration kAtFirst = std::chrono::seconds(1);
 constexpr double kLongerThanApart = 1.5;
+constexpr Duration kRest = std::chrono::milliseconds(20);  // at the end of a motion: where it is to rest
 
 AxisVector values_of(const Json& positions) {
   AxisVector values(static_cast<Eigen::Index>(positions.size()));
@@ -33,7 +35,9 @@ AxisVector values_of(const Json& positions) {
 
 class FollowSetPoints final : public ArmSkill, public Servo {
  public:
-  FollowSetPoints(Cell& cell, AxisVector first) : cell_(cell), first_(std::move(first)) { cell_.servo = this; }
+  FollowSetPoints(Cell& cell, AxisVector first) : cell_(cell), delay_(cell.arm), wish_(std::move(first)) {
+    cell_.servo = this;
+  }
   ~FollowSetPoints() override {
     if (cell_.servo == this) cell_.servo = nullptr;
   }
@@ -44,15 +48,18 @@ class FollowSetPoints final : public ArmSkill, public Servo {
 
   Progress tick(Time now) override {
     rests_ = false;
+    move_along();
     if (!heard_) heard_ = now;
     if (!cell_.arm.operational()) {
       way_.clear();
       return verdict_ ? *verdict_ : silent(now) ? over("none came while the arm was stopped") : Progress{};
     }
     if (verdict_) return now < cell_.arm.motion_end() ? Progress{} : *verdict_;
+    if (cell_.held) return {Status::kFailed, "the cups hold " + cell_.held->code, detail()};
     if (cell_.is_waited_for && cell_.is_waited_for()) return end(now, over("a task waits for the arm"));
     if (silent(now)) return end(now, over("nobody sends any"));
-    if (first_) return begin(now);
+    // The first one from rest.
+    if (wish_ && (set_points_ > 0 || now >= cell_.arm.motion_end())) (void)go(*std::exchange(wish_, std::nullopt), now);
     look(now);
     return {};
   }
@@ -69,69 +76,82 @@ class FollowSetPoints final : public ArmSkill, public Servo {
 
   // ---- the set-points ----
 
+  // One is planned for in a period; of those that come besides, the last is left for the next.
   Expected<void> take(const AxisVector& position, Time now) override {
-    if (first_ && !verdict_) {
-      auto good = check_set_point(cell_, position);
-      if (good) first_ = position, heard_ = now;
-      return good;
+    if (verdict_ || rests_ || !cell_.arm.operational())
+      return fail("the arm takes none now", "positions",
+                  "wait until it is at rest, or `pons robot` says what it needs");
+    if (auto good = check_set_point(cell_, position); !good) return refused(good.error(), now);
+    if (wish_ || planned_at_ == now) {
+      wish_ = position, heard_ = now;
+      return {};
     }
-    auto taken = go_to(position, now);
-    if (!taken) {
-      ++refused_;
-      return taken;
-    }
-    ++set_points_;
-    heard_ = now;
-    return {};
+    return go(position, now);
   }
 
  private:
   [[nodiscard]] bool silent(Time now) const { return now >= *heard_ + kServoSilence; }
   [[nodiscard]] Json detail() const { return {{"set_points", set_points_}, {"refused", refused_}}; }
   [[nodiscard]] Progress over(const char* why) const {
+    if (set_points_ == 0 && refused_ > 0) return {Status::kFailed, why_refused_, detail()};
     Progress progress{Status::kSucceeded, {}, detail()};
     progress.detail["why"] = why;
     return progress;
   }
 
-  Progress begin(Time now) {
-    if (cell_.held) return {Status::kFailed, "the cups hold " + cell_.held->code, detail()};
-    if (now < cell_.arm.motion_end()) return {};
-    const AxisVector first = *std::exchange(first_, std::nullopt);
-    const auto taken = take(first, now);
-    return taken ? Progress{} : Progress{Status::kFailed, taken.error().line(), detail()};
+  std::unexpected<Error> refused(const Error& why, Time now) {
+    ++refused_;
+    heard_ = now;
+    why_refused_ = why.line();
+    return std::unexpected(why);
+  }
+
+  Expected<void> go(const AxisVector& position, Time now) {
+    const Time before = *heard_;
+    if (auto gone = go_to(position, now); !gone) return refused(gone.error(), now);
+    if (set_points_ > 0) {
+      std::ranges::rotate(apart_, apart_.begin() + 1);
+      apart_.back() = std::clamp(now - before, kClosest, kFarthest);
+    }
+    ++set_points_;
+    heard_ = now;
+    return {};
   }
 
   Expected<void> go_to(const AxisVector& position, Time now) {
-    if (verdict_ || rests_ || !cell_.arm.operational())
-      return fail("the arm takes none now", "positions",
-                  "wait until it is at rest, or `pons robot` says what it needs");
-    if (auto good = check_set_point(cell_, position); !good) return good;
+    planned_at_ = now;
     const Time from = cell_.arm.splice_time(now);
-    auto apart = apart_;
-    if (set_points_ > 0) {
-      std::ranges::rotate(apart, apart.begin() + 1);
-      apart.back() = std::clamp(now - *heard_, kClosest, kFarthest);
-    }
-    auto way = motion::move(cell_.arm.planned(from), from, {position, AxisVector::Zero(position.size())},
-                            cell_.limits_empty(), from_s(kLongerThanApart * to_s(*std::ranges::max_element(apart))));
+    const AxisState state = cell_.arm.planned(from);
+    const Duration longest = *std::ranges::max_element(apart_);
+    // Slowed by a zone, or on its way to rest, it may be beyond what it is planned with.
+    auto way = motion::move(state, from, {position, AxisVector::Zero(position.size())},
+                            covering(cell_.limits_empty(), state), from_s(kLongerThanApart * to_s(longest)));
     if (!way) return std::unexpected(way.error());
-    if (auto clear = judge(*way, from); !clear) return clear;
+    const Time end = way->back().end();
+    if (auto clear = judge(*way, from, from + kLookAhead); !clear) return clear;
+    if (auto clear = judge(*way, end - kRest, end); !clear) return clear;
     if (auto sent = cell_.arm.stream(*way); !sent) return sent;
+    move_along();
     way_ = *std::move(way);
-    apart_ = apart;
     looked_at_ = now;
     return {};
   }
 
-  [[nodiscard]] Expected<void> judge(const motion::Trajectory& way, Time from) {
-    return cell_.router.judge(way, from, std::min(from + kLookAhead, way.back().end()), nullptr, cell_.objects());
+  // The motion becomes later while a zone slows it.
+  void move_along() {
+    const Duration later = delay_.take();
+    for (Segment& segment : way_) segment.start += later;
+  }
+
+  [[nodiscard]] Expected<void> judge(const motion::Trajectory& way, Time from, Time until) {
+    return cell_.router.judge(way, from, std::min(until, way.back().end()), nullptr, cell_.objects());
   }
 
   void look(Time now) {
     if (way_.empty() || now < looked_at_ + kLookEvery) return;
     looked_at_ = now;
-    const auto clear = judge(way_, std::max(now, way_.front().start));
+    const Time from = std::max(now, way_.front().start);
+    const auto clear = judge(way_, from, from + kLookAhead);
     if (clear && now < way_.back().end()) return;
     way_.clear();
     if (clear) return;
@@ -147,13 +167,16 @@ class FollowSetPoints final : public ArmSkill, public Servo {
   }
 
   Cell& cell_;
-  std::optional<AxisVector> first_;  // until it is gone to
-  std::optional<Time> heard_;        // the last one
-  motion::Trajectory way_;           // under way
+  Delay delay_;
+  std::optional<AxisVector> wish_;  // until it is gone to
+  std::optional<Time> heard_;       // of the last one
+  motion::Trajectory way_;          // under way
   // Between the last ones. The longest counts: two that a network has brought together are no haste.
   std::array<Duration, 3> apart_{kAtFirst, kAtFirst, kAtFirst};
+  std::optional<Time> planned_at_;
   Time looked_at_;
   std::int64_t set_points_ = 0, refused_ = 0;
+  std::string why_refused_;  // the last one
   bool rests_ = false;
   std::optional<Progress> verdict_;
 };

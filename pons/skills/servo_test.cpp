@@ -158,6 +158,77 @@ TEST_F(ServoTest, WhatComesInTheWayStopsItAndASetPointElsewhereMovesItOn) {
   EXPECT_NEAR(turned(), 0.1, 1e-6);
 }
 
+// As when somebody steps into a zone that slows it: whoever comes in the way is still seen in time.
+TEST_F(ServoTest, SlowedItLooksAheadOfWhereItIs) {
+  const auto down = cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  ASSERT_TRUE(down);
+  begin(*down);
+  (void)go(0.3);
+  (void)go(1.9, [&] { late_ += std::chrono::microseconds(9'500); });
+  const double height_m = tip_now().z();
+  ASSERT_GT(height_m, world_.belt.surface_z_m + 0.17) << "by the clock it would be there";
+  ObjectBelief object;
+  object.track = 1;
+  object.code = "P9";
+  object.stamp = now_;
+  object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + 0.12);
+  object.size_m = {0.3, 0.3, 0.12};
+  seen_ = {object};
+  (void)go(0.9);
+  EXPECT_GT(tip_now().z(), world_.belt.surface_z_m + 0.12);
+  EXPECT_NE(std::ranges::find(notes_, "stopped", &task::Note::kind), notes_.end());
+}
+
+TEST_F(ServoTest, OfSeveralInOnePeriodTheLastIsGoneTo) {
+  begin(home());
+  (void)go(0.1);
+  for (const double turned : {0.3, -0.2, 0.1}) ASSERT_TRUE(cell_.servo->take(home(turned), now_));
+  (void)go(3.4);
+  EXPECT_NEAR(turned(), 0.1, 1e-6);
+  EXPECT_EQ(go(5).detail.at("set_points"), 3) << "the first of all, one at once, and the last";
+}
+
+TEST_F(ServoTest, OneThatComesWhileTheArmBrakesAsHardAsItMayIsGoneTo) {
+  begin(home());
+  (void)go(0.1);
+  ASSERT_TRUE(cell_.servo->take(home(2.0), now_));
+  (void)go(0.7);
+  ASSERT_TRUE(cell_.stop(now_));
+  (void)go(0.05);
+  const auto taken = cell_.servo->take(home(0), now_);
+  ASSERT_TRUE(taken) << taken.error().line();
+  (void)go(3.4);
+  EXPECT_NEAR(turned(), 0, 1e-6);
+}
+
+TEST_F(ServoTest, WhereTheFirstIsBlockedTheNextHearsWhyAndWithoutOneItFails) {
+  const auto down = cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  ASSERT_TRUE(down);
+  ObjectBelief object;
+  object.track = 1;
+  object.code = "P9";
+  object.stamp = now_;
+  object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + 0.2);
+  object.size_m = {0.3, 0.3, 0.2};
+  seen_ = {object};
+  pass();
+  for (const bool another : {true, false}) {
+    begin(*down);
+    EXPECT_FALSE(task::is_end(go(0.5).status));
+    EXPECT_EQ(cell_.arm.motion_end(), Time{}) << "nothing moves";
+    if (another) {
+      const auto taken = cell_.servo->take(*down, now_);
+      ASSERT_FALSE(taken);
+      EXPECT_THAT(taken.error().line(), HasSubstr("P9"));
+    }
+    const Progress end = go(5);
+    EXPECT_EQ(end.status, Status::kFailed);
+    EXPECT_THAT(end.reason, HasSubstr("the arm would touch P9"));
+    EXPECT_EQ(end.detail.at("refused"), another ? 2 : 1);
+    skill_.reset();
+  }
+}
+
 TEST_F(ServoTest, PausedItRestsAndTakesNone) {
   begin(home(0.5));
   (void)go(0.6);

@@ -67,6 +67,7 @@ class ObedientArmTest : public testing::Test {
   bool opened_ = false;
   std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
+  Duration late_{0};     // the motion is, behind the clock
   double hangs_kg_ = 0;  // stiffly; 0: the wrist feels nothing, not even the tool
   Eigen::Vector2d wrist_nm_ = Eigen::Vector2d::Zero();
   Falls falls_{};  // into each of the world's places
@@ -83,6 +84,7 @@ class ObedientArmTest : public testing::Test {
     state.commanded = at;
     state.position = at.position, state.speed = at.speed;
     state.belt_speed_m_s = belt_m_s_;
+    state.late = late_;
     state.fallen_into = falls_;
     if (hangs_kg_ > 0) Vector3::Map(state.wrist_force_n.data()) = pull_n(at.position);
     std::ranges::copy(wrist_nm_, state.wrist_torque_nm.begin());

@@ -82,6 +82,7 @@ class FollowTimed final : public ArmSkill {
  private:
   enum class Phase : std::uint8_t { kPlan, kLook, kMove, kSettle, kStop };
 
+  [[nodiscard]] std::size_t first_number() const { return asked_->begins ? 2 : 1; }
   [[nodiscard]] std::string axis_name(Eigen::Index axis) const {
     return cell_.model.axis_names()[static_cast<std::size_t>(axis)];
   }
@@ -263,7 +264,7 @@ class FollowTimed final : public ArmSkill {
   [[nodiscard]] Expected<std::vector<TimedPoint>> give_enough(const std::vector<TimedPoint>& points,
                                                               const motion::InTime& make) {
     const AxisLimits limits = cell_.limits_timed();
-    auto given = motion::give_time(points, make, limits);
+    auto given = motion::give_time(points, make, limits, first_number());
     for (int round = 0; given && cell_.held && round < kLoadRounds; ++round) {
       const auto way = make(*given);
       if (!way) return std::unexpected(way.error());
@@ -289,7 +290,7 @@ class FollowTimed final : public ArmSkill {
     return fmt::format(
         "point {}: {} would need {:.2f} times its {} limit; reach it after {:.2f} s at the soonest, "
         "not {:.2f} s",
-        first.point + (asked_->begins ? 2 : 1), axis_name(first.axis), first.use, motion::name(first.of),
+        first.point + first_number(), axis_name(first.axis), first.use, motion::name(first.of),
         up_to_hundredths(possible[first.point].time_s), points[first.point].time_s);
   }
 

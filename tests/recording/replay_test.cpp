@@ -258,8 +258,17 @@ TEST_F(Replay, ARunThatIsKilledLeavesEachFinishedChunk) {
                                HasSubstr("a.mcap: ")));
 }
 
-TEST_F(Replay, CtrlCComesAgainAtItsTime) {
-  Running run(folder_.path(), "run", {"run", "small_cell", "--parcels", "200", "--quiet", "--record", file("a.mcap")});
+class ReplayOfABreak : public Replay, public testing::WithParamInterface<std::vector<std::string>> {};
+
+// The one sorts, and goes on with nothing to do; the other has no parcels at all.
+INSTANTIATE_TEST_SUITE_P(, ReplayOfABreak,
+                         testing::Values(Words{"--parcels", "200"}, Words{"--stay", "--parcels", "2"},
+                                         Words{"--stay"}));
+
+TEST_P(ReplayOfABreak, CtrlCComesAgainAtItsTime) {
+  Words words{"run", "small_cell", "--quiet", "--record", file("a.mcap")};
+  words.insert(words.end(), GetParam().begin(), GetParam().end());
+  Running run(folder_.path(), "run", words);
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   const auto size = [&] { return fs::exists(folder_ / "a.mcap") ? fs::file_size(folder_ / "a.mcap") : 0; };
   while (size() < 200'000 && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
