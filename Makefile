@@ -107,7 +107,7 @@ bench-peers: ## build what the benchmarks compare against
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
 	for program in cdr control_step inverse_kinematics journal recording ros_images ros_round_trip scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
 	build/release/bench/trajectory_generation --gate --cases 1000000 --rounds 10
-	bench/ros_flood.py --gate
+	bench/ros_flood.py --gate --burner
 
 bench: build bench-peers ## run the benchmarks; docs/figures.md says which figure is whose
 	@programs=$$(find build/release/bench -maxdepth 1 -type f -executable | sort); \

@@ -7,6 +7,7 @@
 
 #include "apps/foxglove_tasks.hpp"
 #include "apps/run_recorder.hpp"
+#include "pons/rt/grant.hpp"
 #include "pons/wire/schema.hpp"
 
 namespace pons::apps {
@@ -44,6 +45,7 @@ Expected<std::unique_ptr<FoxgloveSink>> FoxgloveSink::open(const FoxgloveOptions
   std::unique_ptr<FoxgloveSink> sink(new FoxgloveSink(std::move(*server)));
   sink->tasks_ = options.tasks;
   if (options.tasks) serve_tasks(*sink->server_);
+  const rt::KeptOff off(rt::loop_cpu());
   sink->server_->start();
   return sink;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "apps/dialects/interpreter.hpp"
+#include "pons/rt/grant.hpp"
 #include "pons/wire/types/sensor_msgs/msg/compressed_image.hpp"
 #include "pons/wire/types/sensor_msgs/msg/image.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
@@ -34,6 +35,7 @@ class Together final : public gate::Visitors {
 }  // namespace
 
 Expected<std::unique_ptr<RosNode>> RosNode::open(const gate::ros::NodeSettings& settings) {
+  const rt::KeptOff off(rt::loop_cpu());
   auto gate = gate::ros::Gate::open(settings);
   if (!gate) return std::unexpected(gate.error());
   std::unique_ptr<RosNode> node(new RosNode(std::move(*gate)));
@@ -44,6 +46,11 @@ Expected<std::unique_ptr<RosNode>> RosNode::open(const gate::ros::NodeSettings& 
   node->lifecycle_ = std::make_unique<RosLifecycle>(*node->gate_);
   if (auto served = node->lifecycle_->serve(); !served) return std::unexpected(served.error());
   return node;
+}
+
+void RosNode::start() {
+  const rt::KeptOff off(rt::loop_cpu());
+  gate_->start();
 }
 
 Expected<void> RosNode::serve_base(const std::vector<world::OutsideSkill>& others) {

@@ -52,7 +52,8 @@ class RosNode final : public Sink {
   // Likewise: the node's parameters, which tell of the run in that world, and how often it shows some things. Errors:
   // those of RosParameters::serve().
   [[nodiscard]] Expected<void> serve_parameters(std::string_view world);
-  void start() { gate_->start(); }
+  // What comes over the network is dealt with off the loop's CPU.
+  void start();
 
   // On the bridge's thread.
   [[nodiscard]] bool wants(std::size_t topic) const override { return gate_->wanted(topic); }

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Whether a flood on the ROS 2 domain reaches the control loop: runs of a world in real time as a node, one quiet and
-one beside a peer (tests/ros/hostile_peer) that writes small messages to all topics and services that the run takes, as
-fast as it goes, turn by turn. Compares how late the loop's ticks begin and how long its steps and the bridge's ticks
-take.
+one beside a peer (tests/ros/hostile_peer) that writes small messages to all topics and services that the run takes, but
+those that stop it, as fast as it goes, turn by turn. Compares how late the loop's ticks begin and how long its steps
+and the bridge's ticks take.
 
 The peer is kept off the loop's CPU, as other programs of a robot's computer are (docs/real_time.md, packaging/).
 What it takes of the other CPUs the run lacks, flood or not: --burner puts a program of the same appetite, which sends
@@ -68,8 +68,7 @@ def main():
     parser.add_argument("--parcels", type=int, default=3)
     parser.add_argument("--world", default="parcel_cell")
     parser.add_argument("--burner", action="store_true")
-    # In memory: what a disk does beside a flood, the disk's computer decides.
-    parser.add_argument("--folder", default="/dev/shm", help="where journals lie")
+    parser.add_argument("--folder", help="where journals lie (that of temporary files)")
     parser.add_argument("--domain", type=int, default=15)
     parser.add_argument("--pons", default=str(BUILD / "apps/pons"))
     parser.add_argument("--peer", default=str(BUILD / "tests/ros/hostile_peer"))

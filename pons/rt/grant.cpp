@@ -119,4 +119,15 @@ bool is_isolated(int cpu, const std::filesystem::path& sys) {
   return cpu >= 0 && CPU_ISSET(static_cast<std::size_t>(cpu), &isolated);
 }
 
+KeptOff::KeptOff(int cpu) {
+  if (cpu < 0 || sched_getaffinity(0, sizeof before_, &before_) != 0) return;
+  cpu_set_t others = before_;
+  CPU_CLR(static_cast<std::size_t>(cpu), &others);
+  kept_ = CPU_COUNT(&others) > 0 && sched_setaffinity(0, sizeof others, &others) == 0;
+}
+
+KeptOff::~KeptOff() {
+  if (kept_) (void)sched_setaffinity(0, sizeof before_, &before_);
+}
+
 }  // namespace pons::rt

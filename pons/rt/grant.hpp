@@ -2,6 +2,8 @@
 // refuse.
 #pragma once
 
+#include <sched.h>
+
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -53,5 +55,19 @@ struct Grant {
 
 // Whether the kernel keeps that CPU free of other work.
 [[nodiscard]] bool is_isolated(int cpu, const std::filesystem::path& sys = "/sys");
+
+// While it lives, the thread that made it keeps off a CPU, and for good whatever threads it starts meanwhile. Does
+// nothing for -1, or where no other is left. Destroyed by the same thread.
+class KeptOff {
+ public:
+  explicit KeptOff(int cpu);
+  ~KeptOff();
+  KeptOff(const KeptOff&) = delete;
+  KeptOff& operator=(const KeptOff&) = delete;
+
+ private:
+  cpu_set_t before_{};
+  bool kept_ = false;
+};
 
 }  // namespace pons::rt

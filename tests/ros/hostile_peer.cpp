@@ -3,7 +3,7 @@
 //
 // usage: hostile_peer DOMAIN NODE ROLE    ROLE: malformed: what cannot be read (nothing, too little, random bytes,
 // lengths that cannot be), to each topic so many; flood: small messages, of which a part can be read, as fast as it
-// goes. Prints "sent to TOPIC" after a hundred from each; ends when its input does.
+// goes, but to what stops a robot. Prints "sent to TOPIC" after a hundred from each; ends when its input does.
 #include <poll.h>
 #include <unistd.h>
 
@@ -113,10 +113,11 @@ class Hostile {
     makes_[0] = std::make_unique<test::PlainDds>(test::PlainDds::Settings{.domain = domain, .listener = &readers_});
     makes_[1] = std::make_unique<test::PlainDds>(test::PlainDds::Settings{.domain = domain, .prefix = cyclone});
   }
-  // To each topic one, from each make.
+  // To each topic one, from each make; `spares` says to which none.
   template <typename Make>
-  void send(const Make& make) {
+  void send(const Make& make, const std::vector<std::string_view>& spares) {
     for (const auto& [topic, type] : readers_.types()) {
+      if (std::ranges::any_of(spares, [&](std::string_view word) { return topic.contains(word); })) continue;
       auto [there, is_new] = writers_.try_emplace(topic);
       if (is_new) {
         // Offers what any reader may want.
@@ -157,8 +158,11 @@ int main(int count, char** words) {
     Hostile hostile(static_cast<std::uint32_t>(std::atoi(words[1])));
     Maker maker;
     const bool floods = role == "flood";
+    // A request that can be read is granted: a robot that is asked to stop stands until a person resets it.
+    std::vector<std::string_view> spares;
+    if (floods) spares = {"emergency_stop", "/stopRequest", "change_state"};
     for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, floods ? 0 : kPauseMs) == 0;)
-      hostile.send([&](int number) { return floods ? maker.small(number) : maker.malformed(number); });
+      hostile.send([&](int number) { return floods ? maker.small(number) : maker.malformed(number); }, spares);
   } catch (const std::exception& problem) {
     return std::fprintf(stderr, "hostile_peer: %s\n", problem.what()), 1;
   }
