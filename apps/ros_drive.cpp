@@ -13,20 +13,8 @@ Expected<void> RosDrive::serve() {
 void RosDrive::take(const Twist& twist) {
   const double ahead = twist.linear.x, turn = twist.angular.z;
   if (!std::isfinite(ahead) || !std::isfinite(turn))
-    return refuse(Error{"the velocity is not finite", "linear.x, angular.z", "give numbers"}.line());
-  gate_.ask(gate::Json{{"op", "drive"}, {"ahead_m_s", ahead}, {"turn_rad_s", turn}}, [this](const gate::Json& told) {
-    if (told.value("ok", false)) {
-      refused_.clear();
-    } else {
-      refuse(told.value("error", "no answer"));
-    }
-  });
-}
-
-void RosDrive::refuse(const std::string& why) {
-  if (why == refused_) return;
-  refused_ = why;
-  gate_.node().warn("cmd_vel: " + why);
+    return wishes_.refuse(Error{"the velocity is not finite", "linear.x, angular.z", "give numbers"}.line());
+  wishes_.ask({{"op", "drive"}, {"ahead_m_s", ahead}, {"turn_rad_s", turn}});
 }
 
 }  // namespace pons::apps

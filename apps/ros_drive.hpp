@@ -1,8 +1,7 @@
 // How nodes of ROS 2 steer a base by hand: the topic cmd_vel. Everything happens on the node's thread.
 #pragma once
 
-#include <string>
-
+#include "apps/ros_by_hand.hpp"
 #include "pons/core/error.hpp"
 #include "pons/gate/ros/gate.hpp"
 #include "pons/wire/types/geometry_msgs/msg/twist.hpp"
@@ -19,11 +18,9 @@ class RosDrive {
 
  private:
   void take(const Twist& twist);
-  // Said once, until it is another thing or all is well again: these come twenty times a second.
-  void refuse(const std::string& why);
 
   gate::ros::Gate& gate_;
-  std::string refused_;
+  RosByHand wishes_{gate_, "cmd_vel"};
 };
 
 }  // namespace pons::apps

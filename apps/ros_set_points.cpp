@@ -11,7 +11,7 @@
 namespace pons::apps {
 
 Expected<void> RosSetPoints::serve(const world::Dialect& spec) {
-  topic_ = spec.topic.text;
+  wishes_.emplace(gate_, spec.topic.text);
   return listen<Float64MultiArray>(gate_.node(), spec.topic,
                                    [this](const Float64MultiArray& set_point) { take(set_point); });
 }
@@ -19,22 +19,10 @@ Expected<void> RosSetPoints::serve(const world::Dialect& spec) {
 void RosSetPoints::take(const Float64MultiArray& set_point) {
   const auto& data = set_point.data;
   if (data.empty() || data.size() > kMaxAxes)
-    return refuse(Error{fmt::format("has {} values", data.size()), "data", "give one a joint, in rad"}.line());
+    return wishes_->refuse(Error{fmt::format("has {} values", data.size()), "data", "give one a joint, in rad"}.line());
   if (!std::ranges::all_of(data, [](double value) { return std::isfinite(value); }))
-    return refuse(Error{"is not finite", "data", "give numbers"}.line());
-  gate_.ask(gate::Json{{"op", "servo"}, {"positions", data}}, [this](const gate::Json& told) {
-    if (told.value("ok", false)) {
-      refused_.clear();
-    } else {
-      refuse(told.value("error", "no answer"));
-    }
-  });
-}
-
-void RosSetPoints::refuse(const std::string& why) {
-  if (why == refused_) return;
-  refused_ = why;
-  gate_.node().warn(topic_ + ": " + why);
+    return wishes_->refuse(Error{"is not finite", "data", "give numbers"}.line());
+  wishes_->ask({{"op", "servo"}, {"positions", data}});
 }
 
 }  // namespace pons::apps

@@ -2,8 +2,9 @@
 // motion sends it. What the loop is asked for meanwhile, views/set_points_view.hpp shows. On the node's thread.
 #pragma once
 
-#include <string>
+#include <optional>
 
+#include "apps/ros_by_hand.hpp"
 #include "pons/core/error.hpp"
 #include "pons/gate/ros/gate.hpp"
 #include "pons/wire/types/std_msgs/msg/float64_multi_array.hpp"
@@ -21,12 +22,9 @@ class RosSetPoints {
 
  private:
   void take(const Float64MultiArray& set_point);
-  // Said once, until it is another thing or all is well again: they come again and again.
-  void refuse(const std::string& why);
 
   gate::ros::Gate& gate_;
-  std::string topic_;
-  std::string refused_;
+  std::optional<RosByHand> wishes_;  // once it is served
 };
 
 }  // namespace pons::apps

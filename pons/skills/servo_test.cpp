@@ -54,6 +54,20 @@ class ServoTest : public ObedientArmTest {
     }
     return progress;
   }
+  // With the tip over the belt, straight below.
+  [[nodiscard]] Expected<AxisVector> low() {
+    return cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  }
+  // A parcel of that height stands there.
+  void sees_below(double height_m) {
+    ObjectBelief object;
+    object.track = 1;
+    object.code = "P9";
+    object.stamp = now_;
+    object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + height_m);
+    object.size_m = {0.3, 0.3, height_m};
+    seen_ = {object};
+  }
   [[nodiscard]] double turned() const { return cell_.arm.state().position[0] - world_.robot.home[0]; }
   [[nodiscard]] double speed() const { return cell_.arm.state().speed[0]; }
 
@@ -133,17 +147,11 @@ TEST_F(ServoTest, ATaskThatWaitsGetsTheArmAtRest) {
 }
 
 TEST_F(ServoTest, WhatComesInTheWayStopsItAndASetPointElsewhereMovesItOn) {
-  const auto down = cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  const auto down = low();
   ASSERT_TRUE(down);
   begin(*down);
   (void)go(0.3);
-  ObjectBelief object;
-  object.track = 1;
-  object.code = "P9";
-  object.stamp = now_;
-  object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + 0.2);
-  object.size_m = {0.3, 0.3, 0.2};
-  seen_ = {object};
+  sees_below(0.2);
   (void)go(1.2);
   EXPECT_GT(tip_now().z(), world_.belt.surface_z_m + 0.2);
   EXPECT_NEAR(cell_.arm.state().speed.norm(), 0, 1e-9);
@@ -160,20 +168,14 @@ TEST_F(ServoTest, WhatComesInTheWayStopsItAndASetPointElsewhereMovesItOn) {
 
 // As when somebody steps into a zone that slows it: whoever comes in the way is still seen in time.
 TEST_F(ServoTest, SlowedItLooksAheadOfWhereItIs) {
-  const auto down = cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  const auto down = low();
   ASSERT_TRUE(down);
   begin(*down);
   (void)go(0.3);
   (void)go(1.9, [&] { late_ += std::chrono::microseconds(9'500); });
   const double height_m = tip_now().z();
   ASSERT_GT(height_m, world_.belt.surface_z_m + 0.17) << "by the clock it would be there";
-  ObjectBelief object;
-  object.track = 1;
-  object.code = "P9";
-  object.stamp = now_;
-  object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + 0.12);
-  object.size_m = {0.3, 0.3, 0.12};
-  seen_ = {object};
+  sees_below(0.12);
   (void)go(0.9);
   EXPECT_GT(tip_now().z(), world_.belt.surface_z_m + 0.12);
   EXPECT_NE(std::ranges::find(notes_, "stopped", &task::Note::kind), notes_.end());
@@ -202,15 +204,9 @@ TEST_F(ServoTest, OneThatComesWhileTheArmBrakesAsHardAsItMayIsGoneTo) {
 }
 
 TEST_F(ServoTest, WhereTheFirstIsBlockedTheNextHearsWhyAndWithoutOneItFails) {
-  const auto down = cell_.model.inverse(Cell::tip_down({tip_now().x(), 0, world_.belt.surface_z_m + 0.05}, 0), home());
+  const auto down = low();
   ASSERT_TRUE(down);
-  ObjectBelief object;
-  object.track = 1;
-  object.code = "P9";
-  object.stamp = now_;
-  object.world_from_top.translation() = Vector3(tip_now().x(), 0, world_.belt.surface_z_m + 0.2);
-  object.size_m = {0.3, 0.3, 0.2};
-  seen_ = {object};
+  sees_below(0.2);
   pass();
   for (const bool another : {true, false}) {
     begin(*down);

@@ -59,57 +59,52 @@ TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
   EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
 }
 
-TEST(Desk, TellsOfAnArmsAxesOnceItsLoopHas) {
-  const bridge::TemporaryFolder folder;
-  const auto journal = bridge::Journal::open(folder / "j.db").value();
-  const world::World world;
-  const task::SkillRegistry skills;
-  bridge::Bridge bridge(*journal, skills, world);
-  const runner::Health health{{}};
-  std::vector<std::string> answered;
-  auto asks = std::make_unique<Asks>(answered);
-  Asks& visitor = *asks;
-  Desk desk(std::move(asks), bridge, *journal, {}, health, [] { return nullptr; });
-  const auto ask = [&](const std::string& text = R"({"op":"axes"})") {
-    visitor.texts = {text};
-    desk.attend(Time{});
-    return answered.back();
-  };
-  EXPECT_NE(ask().find("the robot is no arm"), std::string::npos);
+// Of a run without robots and skills.
+class BareDesk : public testing::Test {
+ protected:
+  std::string ask(const std::string& text) {
+    visitor_.texts = {text};
+    desk_.attend(Time{});
+    return answered_.back();
+  }
+  bridge::TemporaryFolder folder_;
+  std::unique_ptr<bridge::Journal> journal_ = bridge::Journal::open(folder_ / "j.db").value();
+  const world::World world_;
+  const task::SkillRegistry skills_;
+  bridge::Bridge bridge_{*journal_, skills_, world_};
+  const runner::Health health_{{}};
+  std::vector<std::string> answered_;
+  std::unique_ptr<Asks> asks_ = std::make_unique<Asks>(answered_);
+  Asks& visitor_ = *asks_;
+  Desk desk_{std::move(asks_), bridge_, *journal_, {}, health_, [] { return nullptr; }};
+};
+
+TEST_F(BareDesk, TellsOfAnArmsAxesOnceItsLoopHas) {
+  const std::string axes = R"({"op":"axes"})";
+  EXPECT_NE(ask(axes).find("the robot is no arm"), std::string::npos);
   link::State state;
-  desk.serve(Desk::Axes{{"j1", "j2"},
-                        [&]() -> const link::State& { return state; },
-                        [&](const AxisVector& q, Time) -> Expected<std::string> {
-                          if (q.size() != 2) return fail("other joints", "positions", "give two");
-                          return "servo-1";
-                        }});
-  EXPECT_NE(ask().find("has told nothing of its arm yet"), std::string::npos);
+  desk_.serve(Desk::Axes{{"j1", "j2"},
+                         [&]() -> const link::State& { return state; },
+                         [&](const AxisVector& q, Time) -> Expected<std::string> {
+                           if (q.size() != 2) return fail("other joints", "positions", "give two");
+                           return "servo-1";
+                         }});
+  EXPECT_NE(ask(axes).find("has told nothing of its arm yet"), std::string::npos);
   state.position = state.speed = AxisVector::Constant(2, 0.5);
   state.commanded = at_rest(AxisVector::Constant(2, 0.25));
-  ask();
-  EXPECT_EQ(visitor.told.at("names"), (std::vector<std::string>{"j1", "j2"}));
-  EXPECT_EQ(visitor.told.at("positions"), (std::vector{0.5, 0.5}));
-  EXPECT_EQ(visitor.told.at("commanded").at("positions"), (std::vector{0.25, 0.25}));
-  EXPECT_EQ(visitor.told.at("commanded").at("speeds"), (std::vector{0.0, 0.0}));
+  ask(axes);
+  EXPECT_EQ(visitor_.told.at("names"), (std::vector<std::string>{"j1", "j2"}));
+  EXPECT_EQ(visitor_.told.at("positions"), (std::vector{0.5, 0.5}));
+  EXPECT_EQ(visitor_.told.at("commanded").at("positions"), (std::vector{0.25, 0.25}));
+  EXPECT_EQ(visitor_.told.at("commanded").at("speeds"), (std::vector{0.0, 0.0}));
   ask(R"({"op":"servo","positions":[1,2]})");
-  EXPECT_EQ(visitor.told.at("id"), "servo-1");
+  EXPECT_EQ(visitor_.told.at("id"), "servo-1");
   EXPECT_NE(ask(R"({"op":"servo","positions":[1]})").find("other joints"), std::string::npos);
 }
 
-TEST(Desk, ARunThatIsNotServedIsNotToldToRest) {
-  const bridge::TemporaryFolder folder;
-  const auto journal = bridge::Journal::open(folder / "j.db").value();
-  const world::World world;
-  const task::SkillRegistry skills;
-  bridge::Bridge bridge(*journal, skills, world);
-  const runner::Health health{{}};
-  std::vector<std::string> answered;
-  auto asks = std::make_unique<Asks>(answered);
-  asks->texts = {R"({"op":"rest"})", R"({"op":"end"})"};
-  Desk desk(std::move(asks), bridge, *journal, {}, health, [] { return nullptr; });
-  desk.attend(Time{});
-  ASSERT_EQ(answered.size(), 2U);
-  for (const std::string& each : answered) EXPECT_NE(each.find("cannot be told to rest"), std::string::npos) << each;
+TEST_F(BareDesk, ARunThatIsNotServedIsNotToldToRest) {
+  for (const char* const text : {R"({"op":"rest"})", R"({"op":"end"})"})
+    EXPECT_NE(ask(text).find("cannot be told to rest"), std::string::npos) << text;
 }
 
 }  // namespace
