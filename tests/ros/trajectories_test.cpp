@@ -218,7 +218,10 @@ TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
     const std::int64_t until = stamp_ns() + 1'000'000'000;
     ASSERT_TRUE(spun([&] { return stamp_ns() >= until; }));
   }
-  ASSERT_TRUE(spun([&] { return std::abs(turned_.back() - before[0] - 0.3) < 0.002; })) << turned_.back() - before[0];
+  // Two topics: what one says may be heard before what the other said earlier.
+  const auto there = [&](double turned) { return std::abs(turned - before[0] - 0.3) < 0.002; };
+  ASSERT_TRUE(spun([&] { return there(turned_.back()) && there(asked.back()[0]); }))
+      << turned_.back() - before[0] << ", asked for " << asked.back()[0] - before[0];
   const std::size_t until_there = asked.size();
   Float64MultiArray wrong;
   wrong.data = {1, 2};
@@ -233,7 +236,6 @@ TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
   }
   EXPECT_GT(fastest, 0.08);
   EXPECT_LT(fastest, 0.3);
-  EXPECT_NEAR(asked.back()[0], before[0] + 0.3, 0.002);
   EXPECT_GT(until_there, 1500U) << "500 in each of three seconds and more";
   EXPECT_THAT(stories(), HasSubstr("servo-"));
   EXPECT_THAT(run_.err(), HasSubstr("/brain/high_level_cmd: positions: 2 positions for 7 joints"));
