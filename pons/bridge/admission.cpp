@@ -143,11 +143,8 @@ Expected<Admission> Bridge::take(Candidate candidate, Time now) {
   }
   unkept_ = true;
   Open& open = add_open(std::move(candidate.task), std::move(candidate.program), now, journal_.newest());
-  if (candidate.asked.empty()) {
-    enqueue(open);
-  } else {
-    ask(open, std::move(candidate.asked), now);
-  }
+  enqueue(open, now);
+  if (!candidate.asked.empty()) ask(open, std::move(candidate.asked), now);
   return admission;
 }
 

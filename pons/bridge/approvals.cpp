@@ -80,6 +80,7 @@ void Bridge::expire_asked(Time now) {
     if (now - held_for_ >= open.asked_since + patience(open.asked)) late.push_back(&open);
   }
   for (const Open* const open : late) {
+    arbiter_.remove(open->task.id);
     finish(open->task.id, task::Outcome::kFailed, fmt::format("nobody has allowed it in time: {}", names(open->asked)),
            Json::object(), now);
   }

@@ -55,16 +55,15 @@ Bridge::Open& Bridge::add_open(task::Task task, std::shared_ptr<const tree::Prog
   if (task.tree && task.tree->xml.empty()) open->program = std::move(program);
   open->sequence = sequence;
   open->accepted = accepted;
-  open->waits_since = accepted - held_for_;
   open->priority = task.priority;
   open->task = std::move(task);
   std::string id = open->task.id;
   return *open_.emplace(std::move(id), std::move(open)).first->second;
 }
 
-void Bridge::enqueue(const Open& open) {
+void Bridge::enqueue(const Open& open, Time since) {
   const auto deadline = open.begun ? std::nullopt : open.task.deadline;
-  Claim claim{open.task.id, open.priority, deadline, open.waits_since, open.resources};
+  Claim claim{open.task.id, open.priority, deadline, since - held_for_, open.resources};
   for (std::size_t way = 1; way < open.robots.size(); ++way)
     claim.instead.push_back(resources_for(open.task, nullptr, open.robots[way]));
   arbiter_.add(claim);
@@ -131,12 +130,12 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
   open.done = story.done();
   open.allowed = story.allowed();
   open.paused = story.paused();
+  // Who has begun has not waited all the time.
+  enqueue(open, begun ? now : record.accepted);
   if (!asked.empty()) {
     ask(open, std::move(asked), now);
   } else if (open.paused) {
     park(open, now);
-  } else {
-    enqueue(open);
   }
   return {};
 }
@@ -164,7 +163,7 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
   open.allowed = story.allowed();
   if (!open.resources.empty()) open.priority = Arbiter::kFirst;  // it may hold what the next one would need
   if (story.paused()) open.told = Open::Told::kPause;
-  enqueue(open);
+  enqueue(open, now);
   return {};
 }
 
@@ -207,15 +206,15 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
   open.allowed = story.allowed();
   open.events = story.length();
   checkpoint(open, now);
-  if (!story.handed_over()) {
-    if (!open.resources.empty()) open.priority = Arbiter::kFirst;  // it may hold what the next one would need
-    if (story.paused()) open.told = Open::Told::kPause;
-  } else if (story.paused()) {
+  if (!story.handed_over() && !open.resources.empty()) open.priority = Arbiter::kFirst;  // as in go_on()
+  enqueue(open, now);
+  if (!story.paused()) return {};
+  if (story.handed_over()) {
     open.paused = true;
     park(open, now);
-    return {};
+  } else {
+    open.told = Open::Told::kPause;
   }
-  enqueue(open);
   return {};
 }
 
@@ -282,7 +281,7 @@ std::vector<std::string> Bridge::start_granted(Time now) {
   std::vector<std::string> granted = arbiter_.grant(now - held_for_, fits());
   for (const std::string& id : granted) {
     Open& open = *open_.find(id)->second;
-    open.robot = open.robots[arbiter_.way(id)];
+    keep_to(open, open.robots[arbiter_.way(id)]);
     open.stage = Open::Stage::kRuns;
     running_.emplace(id, &open);
     if (std::exchange(open.handed_over, false)) {

@@ -118,7 +118,8 @@ class Bridge {
   // Cancels everything and refuses what comes; tick() on until idle().
   void stop(Time now, std::string_view reason);
   // That robot has had an emergency stop, for that cause: open tasks are held or cancelled as the world says, but for
-  // those that another robot runs or, being in order, may run. Called again before released() it does nothing.
+  // those that another robot runs or, being in order, may run. One that has begun no other robot may run. Called again
+  // before released() it does nothing.
   void emergency_stop(Time now, std::string_view cause, std::size_t robot = 0);
   void released(Time now, std::size_t robot = 0);
 
@@ -207,10 +208,11 @@ class Bridge {
                                std::int64_t sequence);
   [[nodiscard]] std::unique_ptr<tree::Tree> tree_of(const task::Task& task,
                                                     std::shared_ptr<const tree::Program> program);
-  void enqueue(const Open& open);
+  void enqueue(const Open& open, Time since);
   // robots.cpp
   [[nodiscard]] std::size_t robot_named(std::string_view name) const;  // the first, where there is none of that name
   void keep_to(Open& open, std::size_t robot) const;
+  [[nodiscard]] static bool may_run(const Open& open, std::size_t robot);
   [[nodiscard]] std::vector<std::size_t> robots_for(const task::Task& task, const tree::Program* program) const;
   [[nodiscard]] std::vector<std::string> resources_for(const task::Task& task, const tree::Program* program,
                                                        std::size_t robot) const;

@@ -29,17 +29,15 @@ struct Bridge::Open {
   int priority = 50;          // it waits with
   std::int64_t sequence = 0;  // of its acceptance in the journal
   Time accepted;
-  Time waits_since;      // it ages from then on, in the arbiter's time, which stands while nothing may start
-  Time parked_at;        // in that time, too
-  std::size_t done = 0;  // steps that an earlier bridge has seen succeed
+  std::size_t done = 0;                          // steps that an earlier bridge has seen succeed
   std::shared_ptr<const tree::Program> program;  // of its tree, none of steps; of one sent along not before it starts
-  std::vector<std::size_t> robots;               // that may run it; those of the arbiter's ways
-  std::size_t robot = 0;                         // that does
-  std::vector<std::string> resources;            // of the first way
+  std::vector<std::size_t> robots;     // that may run it, those of the arbiter's ways; one that has begun: one
+  std::size_t robot = 0;               // the first of them
+  std::vector<std::string> resources;  // with that one
   std::unique_ptr<tree::Tree>
       tree;                       // none before it was granted for the first time, but for one that was begun earlier
   Asked asked;                    // what a person must allow before it begins
-  Time asked_since;               // in that time, too
+  Time asked_since;               // in the arbiter's time, which stands while nothing may start
   std::set<std::string> allowed;  // uses, by key()
   bool unwritten = false;         // a leaf has ended since the last checkpoint
   Stage stage = Stage::kWaits;

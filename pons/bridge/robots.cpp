@@ -76,12 +76,17 @@ std::size_t Bridge::robot_named(std::string_view name) const {
   return robot == robots_.end() ? 0 : static_cast<std::size_t>(robot - robots_.begin());
 }
 
-// Of one that an earlier bridge has begun: what it has begun with hangs there, or lies before that one.
+// Of one that begins, or that an earlier bridge has begun: what it has begun with hangs there, or lies before that one.
 void Bridge::keep_to(Open& open, std::size_t robot) const {
-  if (std::ranges::find(open.robots, robot) == open.robots.end()) return;  // the world has changed
+  if (open.robots.size() == 1) return;
+  if (!may_run(open, robot)) return;  // the world has changed
   open.robots = {robot};
   open.robot = robot;
   open.resources = resources_for(open.task, open.program.get(), robot);
+}
+
+bool Bridge::may_run(const Open& open, std::size_t robot) {
+  return std::ranges::find(open.robots, robot) != open.robots.end();
 }
 
 // The first one's the review has seen to be there.
@@ -130,8 +135,10 @@ Arbiter::Fits Bridge::fits() const {
 
 void Bridge::emergency_stop(Time now, std::string_view cause, std::size_t robot) {
   if (std::exchange(robots_[robot].emergency, true)) return;
-  const bool all = std::ranges::all_of(robots_, &Robot::emergency);
-  const auto concerned = [&](const Open& open) { return open.stage == Open::Stage::kRuns ? open.robot == robot : all; };
+  const auto concerned = [&](const Open& open) {
+    return may_run(open, robot) &&
+           std::ranges::all_of(open.robots, [&](std::size_t other) { return robots_[other].emergency; });
+  };
   if (on_emergency_stop_ == world::OnEmergencyStop::kCancel) {
     end_those(concerned, now, fmt::format("stopped: {}", cause));
     return;
@@ -147,7 +154,7 @@ void Bridge::emergency_stop(Time now, std::string_view cause, std::size_t robot)
 void Bridge::released(Time now, std::size_t robot) {
   if (!std::exchange(robots_[robot].emergency, false)) return;
   for (const auto& [id, open] : open_) {
-    if (open->stage == Open::Stage::kRuns && open->robot != robot) continue;
+    if (!may_run(*open, robot)) continue;
     if (!std::exchange(open->held, false)) continue;
     unkept_ = true;
     tell(*open, now, kReleasedEvent);

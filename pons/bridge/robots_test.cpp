@@ -1,8 +1,11 @@
 // Two robots behind one bridge: who gets which task, and what becomes of it when one stops.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <string_view>
 
 #include "pons/bridge/journal/story.hpp"
 #include "pons/bridge/test_bridge.hpp"
@@ -46,6 +49,9 @@ class Robots : public testing::Test {
       if (event.kind == kStartedEvent) return event.detail.at("robot");
     }
     return {};
+  }
+  std::ptrdiff_t told(const std::string& id, std::string_view kind) {
+    return std::ranges::count(journal_->task(id).value()->events, kind, &Event::kind);
   }
   std::optional<OutcomeRecord> recorded(const std::string& id) {
     return journal_->task(id).value().value().record.outcome;
@@ -210,15 +216,41 @@ TEST_F(Robots, AnEmergencyStopHoldsWhatItsRobotRuns) {
   submit("c");
   tick(2);
   bridge_->emergency_stop(now_, "stop input", 0);
-  const auto has_held = [&](const std::string& id) {
-    const auto events = journal_->task(id).value()->events;
-    return std::ranges::any_of(events, [](const Event& event) { return event.kind == kHeldEvent; });
-  };
-  EXPECT_TRUE(has_held("a"));
-  EXPECT_FALSE(has_held("b"));
-  EXPECT_FALSE(has_held("c")) << "the other may run it";
+  EXPECT_EQ(told("a", kHeldEvent), 1);
+  EXPECT_EQ(told("b", kHeldEvent), 0);
+  EXPECT_EQ(told("c", kHeldEvent), 0) << "the other may run it";
   bridge_->emergency_stop(now_, "stop input", 1);
-  EXPECT_TRUE(has_held("b") && has_held("c"));
+  EXPECT_EQ(told("a", kHeldEvent), 1);
+  EXPECT_EQ(told("b", kHeldEvent), 1);
+  EXPECT_EQ(told("c", kHeldEvent), 1);
+  bridge_->released(now_, 1);
+  EXPECT_EQ(told("a", kReleasedEvent), 0);
+  EXPECT_EQ(told("b", kReleasedEvent), 1);
+  EXPECT_EQ(told("c", kReleasedEvent), 1);
+}
+
+// An urgent task has taken the second one's place; the first is another's all the time.
+TEST_F(Robots, APreemptedTaskWaitsForItsOwn) {
+  submit("a", R"(,"priority":100)");
+  submit("b");
+  tick(2);
+  submit("urgent", R"(,"priority":95)");
+  tick(3);
+  ASSERT_EQ(robot_of("urgent"), "arm_2");
+  ASSERT_EQ(bridge_->state("b"), "preempted");
+  // Out of the queue and back in it, it has not forgotten.
+  ASSERT_TRUE(bridge_->pause("b", now_, "lunch"));
+  ASSERT_TRUE(bridge_->resume("b", now_));
+  bridge_->emergency_stop(now_, "stop input", 1);
+  EXPECT_EQ(told("b", kHeldEvent), 1) << "no other may run it";
+  bridge_->released(now_, 1);
+  EXPECT_EQ(told("b", kReleasedEvent), 1);
+  tick(17);
+  ASSERT_TRUE(recorded("a"));
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"urgent"}) << "the first is free";
+  tick(60);
+  EXPECT_EQ(recorded("b")->outcome, task::Outcome::kSucceeded);
+  EXPECT_EQ(actors_[0].log.started.size(), 1U);
 }
 
 }  // namespace

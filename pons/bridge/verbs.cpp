@@ -60,7 +60,6 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   // One that an earlier bridge had begun may hold something: it is paused as soon as it has its resources again.
   const bool may_hold = open.priority == Arbiter::kFirst;
   if (open.stage != Open::Stage::kRuns && !may_hold) {
-    arbiter_.remove(open.task.id);
     if (open.stage == Open::Stage::kWaits) park(open, now);
     open.paused = true;
     tell(open, now, kPausedEvent, {{"reason", reason}});
@@ -75,15 +74,14 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
 
 void Bridge::park(Open& open, Time now) {
   open.stage = Open::Stage::kParked;
-  open.parked_at = now - held_for_;
+  arbiter_.park(open.task.id, now - held_for_);
   parked_.insert(open.task.id);
 }
 
 void Bridge::unpark(Open& open, Time now) {
   open.stage = Open::Stage::kWaits;
-  open.waits_since += (now - held_for_) - open.parked_at;
+  arbiter_.unpark(open.task.id, now - held_for_);
   parked_.erase(open.task.id);
-  enqueue(open);
 }
 
 Expected<void> Bridge::resume(std::string_view id, Time now) {
@@ -165,12 +163,13 @@ Expected<void> Bridge::end(std::string_view id, Ending ending, Time now, std::st
   return {};
 }
 
-// What it has begun was left at a safe point, with nothing in use.
+// What it has begun was left at a safe point, with nothing in use; unless an earlier bridge had begun it and was gone.
 void Bridge::end_waiting(Open& open, Time now, std::string_view reason) {
   const std::string id = open.task.id;
   arbiter_.remove(id);
   Json detail = Json::object();
   if (open.tree) detail = {{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
+  if (open.priority == Arbiter::kFirst) detail["stop"] = task::name(task::StopResult::kUncertain);
   finish(id, task::Outcome::kCancelled, std::string(reason), std::move(detail), now);
 }
 

@@ -287,6 +287,46 @@ TEST_F(VerbsTest, APreemptedTaskMayBePausedResumedAndCancelled) {
   EXPECT_EQ(steady.log.cancels, 0) << "the arm is another's";
 }
 
+// Who runs grows no older; neither by a pause, nor by a new bridge, may that time come to count.
+TEST_F(VerbsTest, APreemptedTaskDoesNotCountTheTimeThatItRan) {
+  Actor patrol("patrol", {{.ticks = 1'000'000}});
+  skills_.add(patrol.type(1, from_s(1000)));
+  world_.schedule.ageing = from_s(1);
+  reopen();
+  ASSERT_TRUE(submit("a", "patrol"));
+  tick(60 * 100);
+  ASSERT_TRUE(submit("urgent", "pick", kUrgent));
+  tick(3);
+  ASSERT_EQ(last("a").kind, "preempted");
+  EXPECT_EQ(pause("a"), "");
+  EXPECT_EQ(resume("a"), "");
+  ASSERT_TRUE(submit("urgent2", "slow", kUrgent));
+  tick(20);
+  EXPECT_EQ(recorded("urgent")->outcome, Outcome::kSucceeded);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"urgent2"});
+  ASSERT_TRUE(bridge_->commit(now_));
+  reopen();
+  const auto gone = [](const task::Task&, std::size_t done) {
+    return Resumption{.done = done, .outcome = Outcome::kFailed, .reason = "nobody knows"};
+  };
+  ASSERT_TRUE(bridge_->recover(gone, now_));
+  ASSERT_TRUE(submit("urgent3", "slow", kUrgent));
+  tick(2);
+  EXPECT_EQ(bridge_->running(), std::vector<std::string>{"urgent3"});
+}
+
+// Nobody has seen what it left, and nobody moves for it any more.
+TEST_F(VerbsTest, WhatAnEarlierBridgeHadBegunEndsUncertainWhereItNeverWentOn) {
+  ASSERT_TRUE(submit("begun", "pick"));
+  tick(2);
+  reopen();
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+  EXPECT_EQ(cancel("begun"), "");
+  tick();
+  EXPECT_EQ(recorded("begun")->outcome, Outcome::kCancelled);
+  EXPECT_EQ(recorded("begun")->detail.at("stop"), "UNCERTAIN");
+}
+
 TEST_F(VerbsTest, AParkedTasksPersonHasTheLastWord) {
   ASSERT_TRUE(submit("a", "pick"));
   tick(2);

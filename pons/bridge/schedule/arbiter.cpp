@@ -23,7 +23,8 @@ Arbiter::Arbiter(const std::vector<std::string>& resources, const world::Schedul
 // ---- the queue ----
 
 void Arbiter::add(const Claim& claim) {
-  assert(waiting_.find(claim.id) == waiting_.end() && running_.find(claim.id) == running_.end());
+  assert(waiting_.find(claim.id) == waiting_.end() && running_.find(claim.id) == running_.end() &&
+         parked_.find(claim.id) == parked_.end());
   Entry& entry = waiting_[claim.id];
   entry.claim = claim;
   entry.number = added_++;
@@ -56,7 +57,26 @@ Arbiter::Mask Arbiter::mask_of(const std::vector<std::string>& resources) const 
   return mask;
 }
 
+void Arbiter::park(std::string_view id, Time now) {
+  const auto found = waiting_.find(id);
+  assert(found != waiting_.end());
+  wait_no_more(found->second);
+  found->second.parked_at = now;
+  parked_.insert(waiting_.extract(found));
+}
+
+void Arbiter::unpark(std::string_view id, Time now) {
+  const auto found = parked_.find(id);
+  assert(found != parked_.end());
+  Entry& entry = found->second;
+  entry.since += now - entry.parked_at;
+  entry.ages_from += now - entry.parked_at;
+  waiting_.insert(parked_.extract(found));
+  wait(entry);
+}
+
 bool Arbiter::remove(std::string_view id) {
+  if (const auto parked = parked_.find(id); parked != parked_.end()) return parked_.erase(parked), true;
   const auto found = waiting_.find(id);
   if (found == waiting_.end()) return false;
   wait_no_more(found->second);
@@ -144,7 +164,7 @@ const Arbiter::Entry* Arbiter::next(const std::set<Ways>& passed, const std::map
 std::vector<std::size_t> Arbiter::fitting(const Entry& entry, const Fits& fits) const {
   std::vector<std::size_t> ways;
   for (std::size_t way = 0; way < entry.ways.size(); ++way) {
-    if (!fits || fits(entry.claim.id, entry.way + way)) ways.push_back(way);
+    if (!fits || fits(entry.claim.id, way)) ways.push_back(way);
   }
   return ways;
 }
@@ -182,7 +202,7 @@ void Arbiter::give(const Entry& waits, std::size_t way, std::vector<std::string>
   wait_no_more(entry);  // and the lane may be no more
   entry.started = true;
   entry.since = now_;
-  entry.way += way;
+  entry.way = way;
   entry.ways = {entry.ways[way]};
   held_ |= entry.needs();
   seated_ += entry.needs() == 0 ? 1 : 0;

@@ -57,7 +57,8 @@ class Arbiter {
   void add(const Claim& claim);
   // The tasks that may start now, in order; they hold their resources from here on. `now` must not run back.
   [[nodiscard]] std::vector<std::string> grant(Time now, const Fits& fits = {});
-  // In which way a task that runs was granted.
+  // Which of the ways that it waited for a task that runs was granted. It keeps to that one: once handed over, it waits
+  // for no other.
   [[nodiscard]] std::size_t way(std::string_view id) const { return running_.find(id)->second.way; }
   // A task that was granted has ended.
   void release(std::string_view id);
@@ -67,7 +68,11 @@ class Arbiter {
   // Withheld, no resource is given to anybody from the next grant() on; seats are.
   enum class Withheld : std::uint8_t { kNothing, kResources };
   void withhold(Withheld what);
-  // Takes a task out of the queue; false when it is not in it.
+  // A task in the queue leaves it, and comes back at the age that it had; whether it is granted, and its deadline, are
+  // nobody's concern meanwhile. `now` as for grant().
+  void park(std::string_view id, Time now);
+  void unpark(std::string_view id, Time now);
+  // Takes out a task that waits or is parked; false when there is none.
   bool remove(std::string_view id);
   // Takes out the queued tasks whose deadline is before `now`, in the queue's order.
   [[nodiscard]] std::vector<std::string> take_expired(Time now);
@@ -95,8 +100,8 @@ class Arbiter {
   using Ways = std::vector<Mask>;
   struct Entry {
     Claim claim;
-    Ways ways;            // those it may take
-    std::size_t way = 0;  // of the claim's, the first that it may take, or the one granted
+    Ways ways;                                                 // those it may take
+    std::size_t way = 0;                                       // of a running one: which of those that it might take
     [[nodiscard]] Mask needs() const { return ways.front(); }  // of a running one: what it holds
     std::uint64_t number = 0;
     Rank rank;                        // by which it waits, or was granted
@@ -104,6 +109,7 @@ class Arbiter {
     Time since;                       // it waits, or holds what it needs
     Time ages_from;                   // it has waited as long as if ever since then
     bool started = false;             // then its deadline was met
+    Time parked_at;                   // of a parked one
   };
   using Entries = std::map<std::string, Entry, std::less<>>;
   // Those that wait for the same resources, of which only the first can be next; with none, for a seat.
@@ -129,7 +135,7 @@ class Arbiter {
 
   world::Schedule schedule_;
   std::map<std::string, std::size_t, std::less<>> bits_;
-  Entries waiting_, running_;
+  Entries waiting_, running_, parked_;
   Lanes lanes_;  // none empty
   Agenda ageing_, deadlines_;
   Mask held_ = 0, withheld_ = 0;
