@@ -1,12 +1,16 @@
 // What a bridge does with the order book that it shares with others.
+#include <algorithm>
+
 #include "pons/bridge/bridge.hpp"
+#include "pons/bridge/open_task.hpp"
 
 namespace pons::bridge {
 namespace {
 
 constexpr Duration kLookPeriod = std::chrono::milliseconds(100);
-// What one bridge has claimed no other can run: it takes little more than it can begin.
-constexpr std::size_t kAhead = 4;
+// What one bridge has claimed no other can run: it takes little more than it can begin, and gathers few that people
+// have to allow.
+constexpr std::size_t kAhead = 4, kAskAhead = 64;
 
 }  // namespace
 
@@ -14,9 +18,18 @@ void Bridge::take_orders(Time now) {
   const bool may = !fault_ && !stopping_ && !closed_ && !std::ranges::all_of(robots_, &Robot::emergency) && !held();
   if (!may || now < look_at_) return;
   look_at_ = now + kLookPeriod;
-  const std::size_t waiting = arbiter_.queue_length() + asking_.size();
-  if (waiting >= kAhead || open_.size() + kAhead > kMaxOpen) return;
-  const auto orders = journal_.claim(kAhead - waiting);
+  if (asking_.size() >= kAskAhead || open_.size() + kAhead > kMaxOpen) return;
+  std::size_t waiting = arbiter_.queue_length();
+  int least = 0;
+  if (waiting >= kAhead) {
+    // An urgent one overtakes those that wait here already.
+    least = urgent_priority_;
+    waiting = static_cast<std::size_t>(std::ranges::count_if(open_, [least](const auto& entry) {
+      return entry.second->stage == Open::Stage::kWaits && entry.second->task.priority >= least;
+    }));
+  }
+  if (waiting >= kAhead) return;
+  const auto orders = journal_.claim(kAhead - waiting, least);
   if (!orders) {
     set_fault(orders.error());
     return;

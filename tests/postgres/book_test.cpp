@@ -179,6 +179,46 @@ TEST_F(BookTest, ABridgeTakesOrdersWhileItHasLittleToDoAndTellsHowTheyEnd) {
   EXPECT_EQ(found("later").claimed_by, "") << "nor does one that stops";
 }
 
+TEST_F(BookTest, AnUrgentOrderWaitsForNoRoom) {
+  const auto senders = book();
+  Actor patrol("patrol", {{.ticks = 1'000'000}});
+  skills_.add(patrol.type());
+  const auto journal = open("one");
+  Bridge bridge(*journal, skills_, world_);
+  for (int i = 0; i < 6; ++i)
+    ASSERT_TRUE(bridge.submit(fmt::format(R"({{"id":"own{}","steps":[{{"skill":"patrol"}}]}})", i), now_));
+  bridge.tick(now_);
+  for (int i = 0; i < 9; ++i) ASSERT_TRUE(senders->submit(order(fmt::format("urgent{}", i), 95)));
+  ASSERT_TRUE(senders->submit(order("usual")));
+  run(bridge, 0.2);
+  EXPECT_EQ(found("urgent0").outcome, task::Outcome::kSucceeded) << "it was preempted for it";
+  EXPECT_EQ(found("urgent8").claimed_by, "") << "of those, too, no more than four at once";
+  run(bridge);
+  EXPECT_EQ(found("urgent8").outcome, task::Outcome::kSucceeded);
+  EXPECT_EQ(found("usual").claimed_by, "") << "there is no room for it";
+}
+
+// People may be long in coming.
+TEST_F(BookTest, WhatAsksAPersonKeepsNoOtherOut) {
+  const world::Review review{.tiers = {"operator"},
+                             .rules = {{.name = "all of it", .skills = {"heavy"}, .approve = "operator"}}};
+  const auto senders = book();
+  for (int i = 0; i < 80; ++i) ASSERT_TRUE(senders->submit(order(fmt::format("asks{}", i), 60, "heavy")));
+  const auto journal = open("one");
+  Bridge bridge(*journal, skills_, world_);
+  const task::Facts facts;
+  bridge.use_rules(Rules::compile(review, skills_, facts).value(), Contradictions(review.contradictions));
+  run(bridge);
+  EXPECT_EQ(bridge.parked().size(), 64u) << "nor does one bridge take all";
+  for (const std::string& id : std::set<std::string>(bridge.parked()))
+    ASSERT_TRUE(bridge.cancel(id, now_, "nobody comes"));
+  run(bridge);
+  EXPECT_EQ(bridge.parked().size(), 16u);
+  ASSERT_TRUE(senders->submit(order("usual")));
+  run(bridge);
+  EXPECT_EQ(found("usual").outcome, task::Outcome::kSucceeded);
+}
+
 TEST_F(BookTest, WhatTheBridgeRefusesFailsWithTheReason) {
   const auto senders = book();
   ASSERT_TRUE(senders->submit(order("odd", 50, "fly")));

@@ -12,9 +12,9 @@ Expected<BookEnd> BookEnd::open(Database& database) {
   // What another bridge is about to take is as good as taken: who waited for it would hold up its own robot. The locked
   // rows come first, by themselves: no plan can lock more than it takes.
   const std::array<std::pair<Statement*, std::string_view>, 3> statements{{
-      {&end.waits_, "SELECT 1 FROM pons.book WHERE claimed_by IS NULL LIMIT 1"},
+      {&end.waits_, "SELECT 1 FROM pons.book WHERE claimed_by IS NULL AND priority >= ?1 LIMIT 1"},
       {&end.claim_,
-       "WITH free AS MATERIALIZED (SELECT number FROM pons.book WHERE claimed_by IS NULL "
+       "WITH free AS MATERIALIZED (SELECT number FROM pons.book WHERE claimed_by IS NULL AND priority >= ?3 "
        "ORDER BY priority DESC, number LIMIT ?2 FOR UPDATE SKIP LOCKED), "
        "mine AS (UPDATE pons.book b SET claimed_by = ?1, claimed = clock_timestamp() FROM free "
        "WHERE b.number = free.number RETURNING b.number, b.priority, b.id, b.body) "
@@ -31,15 +31,15 @@ Expected<BookEnd> BookEnd::open(Database& database) {
   return end;
 }
 
-Expected<bool> BookEnd::waits() {
-  const auto found = waits_.run_for_integer();
+Expected<bool> BookEnd::waits(int least) {
+  const auto found = waits_.bind(std::int64_t{least}).run_for_integer();
   if (!found) return std::unexpected(found.error());
   return *found == 1;
 }
 
-Expected<std::vector<Order>> BookEnd::claim(std::size_t most) {
+Expected<std::vector<Order>> BookEnd::claim(std::size_t most, int least) {
   Reading reading(claim_);
-  claim_.bind(bridge_).bind(static_cast<std::int64_t>(most));
+  claim_.bind(bridge_).bind(static_cast<std::int64_t>(most)).bind(std::int64_t{least});
   std::vector<Order> orders;
   for (;;) {
     const auto row = claim_.step();

@@ -18,10 +18,10 @@ class BookEnd {
   // Of a PostgreSQL database, which outlives it; the book is made where there is none.
   [[nodiscard]] static Expected<BookEnd> open(Database& database);
 
-  // Whether there is an order that nobody has claimed. Locks nothing.
-  [[nodiscard]] Expected<bool> waits();
+  // Whether there is an order of at least that priority that nobody has claimed. Locks nothing.
+  [[nodiscard]] Expected<bool> waits(int least);
   // Within a transaction.
-  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most);
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least);
   [[nodiscard]] Expected<void> close(std::string_view id, task::Outcome outcome, std::string_view reason);
 
  private:

@@ -332,16 +332,16 @@ Expected<void> Journal::commit() { return impl_->make_durable(); }
 
 // ---- the order book beside it ----
 
-Expected<std::vector<Order>> Journal::claim(std::size_t most) {
+Expected<std::vector<Order>> Journal::claim(std::size_t most, int least) {
   std::vector<Order> none;
   if (!impl_->book || most == 0) return none;
   if (impl_->failed) return std::unexpected(*impl_->failed);
-  const auto waits = impl_->book->waits();
+  const auto waits = impl_->book->waits(least);
   if (waits && !*waits) return none;
   if (waits) {
     if (auto begun = impl_->ensure_transaction(); !begun) return std::unexpected(begun.error());
   }
-  auto orders = waits ? impl_->book->claim(most) : std::unexpected(waits.error());
+  auto orders = waits ? impl_->book->claim(most, least) : std::unexpected(waits.error());
   if (!orders) impl_->give_up(orders.error());
   return orders;
 }

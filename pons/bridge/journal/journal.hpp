@@ -127,9 +127,10 @@ class Journal {
   [[nodiscard]] Expected<void> commit();
 
   // Takes up to `most` orders out of the order book of the journal's database, as this bridge's: the most important and
-  // then the oldest first, none that another bridge has, and for good only with the next commit(), so that it becomes
-  // durable together with their acceptance. None from a file. Error: as a write's.
-  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most);
+  // then the oldest first, none that another bridge has or whose priority is less than `least`, and for good only with
+  // the next commit(), so that it becomes durable together with their acceptance. None from a file. Error: as a
+  // write's.
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least = 0);
   // How an order that was claimed has ended; outcome() says it by itself. Nothing happens where it is no such order, or
   // has ended before. Error: as a write's.
   [[nodiscard]] Expected<void> close_order(std::string_view id, task::Outcome outcome, std::string_view reason);

@@ -5,8 +5,9 @@
  *
  * Three tasks, each of which comes again as often as it likes. Task t counts t, and needs resource t, the next one round,
  * or both; with a deadline or without. The last one is urgent. A run ends at any time. A person pauses any that runs,
- * and resumes it at any time; in between it does not end. A step is an event, or the part of a tick that grants and
- * preempts: the bridge is one thread. Several events may come before a tick.
+ * and resumes it at any time; in between it does not end. One that waits, paused, is out of the queue until it is
+ * resumed. A step is an event, or the part of a tick that grants and preempts: the bridge is one thread. Several events
+ * may come before a tick.
  *
  * Time is counted in periods of ageing, and only up to where it makes no more difference. All deadlines are the same,
  * and none is missed. `uses` (what a task has its hands on) and `overtaken` are the model's own memory.
@@ -28,6 +29,7 @@
 #define AWAY 0
 #define WAITS 1
 #define RUNS 2
+#define PARKED 3
 
 #define NOTHING 0
 #define PAUSE 1
@@ -256,6 +258,9 @@ proctype task(byte me) {
 /* Also one that was told to hand over: that is forgotten, and it may be told again. */
 #define PAUSES(t) d_step { stage[t] == RUNS && told[t] != PAUSE -> told[t] = PAUSE }
 #define RESUMES(t) d_step { told[t] == PAUSE -> told[t] = NOTHING; changed = true }
+/* One that waits leaves the queue: whom it let by has not overtaken it. */
+#define PARKS(t) d_step { stage[t] == WAITS -> stage[t] = PARKED; overtaken[t] = 0; changed = true }
+#define COMES_BACK(t) d_step { stage[t] == PARKED -> stage[t] = WAITS; changed = true }
 
 proctype person() {
 end:
@@ -266,6 +271,12 @@ end:
   :: RESUMES(0)
   :: RESUMES(1)
   :: RESUMES(2)
+  :: PARKS(0)
+  :: PARKS(1)
+  :: PARKS(2)
+  :: COMES_BACK(0)
+  :: COMES_BACK(1)
+  :: COMES_BACK(2)
   od
 }
 
