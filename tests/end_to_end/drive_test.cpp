@@ -118,6 +118,17 @@ TEST_F(SteeredTest, CreepsWhereItDoesNotKnowWhereItIs) {
   EXPECT_LT(speed_m_s(), 0.11);
 }
 
+TEST_F(SteeredTest, CreepsWhereItsLidarIsSilent) {
+  begin();
+  arm();
+  steer_for({0.5, 0}, 2);
+  ASSERT_GT(speed_m_s(), 0.3);
+  lidar_is_silent_ = true;
+  steer_for({0.5, 0}, 2);
+  EXPECT_GT(speed_m_s(), 0.05);
+  EXPECT_LT(speed_m_s(), 0.11);
+}
+
 TEST_F(SteeredTest, ATaskGoesFirst) {
   begin();
   arm();

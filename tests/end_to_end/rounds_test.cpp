@@ -69,6 +69,35 @@ TEST_F(RoundsTest, ABlindBaseDoesNotSayThatItArrived) {
   EXPECT_EQ(truth().collisions, 0);
 }
 
+TEST_F(RoundsTest, ABaseWhoseLidarFallsSilentBrakesAndSaysSo) {
+  begin();
+  drive("north", R"({"place":"north_aisle"})");
+  run_for(4);
+  ASSERT_GT(speed_m_s(), 0.2);
+  lidar_is_silent_ = true;
+  const Pose2 blind = place();
+  run_for(2);
+  EXPECT_LT(speed_m_s(), 0.005);
+  EXPECT_LT((place().position() - blind.position()).norm(), 0.6);
+  EXPECT_EQ(rounds_->bridge_side->health().parts().at("camera lidar").condition, runner::Condition::kBad);
+  await("north", 12);
+  EXPECT_EQ(outcome("north"), Outcome::kFailed);
+  EXPECT_THAT(reason("north"), HasSubstr("sees nothing"));
+  EXPECT_EQ(truth().collisions, 0) << truth().touched;
+}
+
+TEST_F(RoundsTest, WhenItsLidarComesBackItGoesOn) {
+  begin();
+  drive("north", R"({"place":"north_aisle"})");
+  run_for(4);
+  lidar_is_silent_ = true;
+  run_for(5);
+  lidar_is_silent_ = false;
+  await("north");
+  EXPECT_EQ(outcome("north"), Outcome::kSucceeded) << reason("north");
+  expect_good();
+}
+
 TEST_F(RoundsTest, GoesRoundWhatTheMapDoesNotShow) {
   put_there("unmapped_pallet", "1.2 0.1 0.25", "0.2 0.35 0.25");
   begin();
@@ -236,7 +265,8 @@ TEST_F(RoundsTest, WhatIsSaidIsHeardForAsLongAsItTakes) {
   EXPECT_LT(length_s, 4);
   EXPECT_GE(to_s(now_ - begun), length_s);
   EXPECT_TRUE(fs::is_regular_file(folder_ / "speech" / told("say").at("file").get<std::string>()));
-  EXPECT_NEAR(runner::wav_length_s(folder_ / "speech" / told("say").at("file").get<std::string>()).value_or(0), length_s, 1e-9);
+  EXPECT_NEAR(runner::wav_length_s(folder_ / "speech" / told("say").at("file").get<std::string>()).value_or(0),
+              length_s, 1e-9);
 }
 
 }  // namespace

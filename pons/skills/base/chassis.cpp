@@ -10,6 +10,8 @@ constexpr Duration kRemembered = std::chrono::seconds(2);  // no scan is longer 
 constexpr Duration kStep = std::chrono::milliseconds(10);
 // So unsure, or with so little of a scan on the map, the base may be anywhere.
 constexpr double kSure_m = 0.10, kSure_rad = 0.10, kSureShare = 0.4;
+// So long after it was due without it, a scan no longer shows what is around: a base has driven a quarter of a metre.
+constexpr Duration kSeesFor = std::chrono::milliseconds(500);
 
 }  // namespace
 
@@ -21,6 +23,7 @@ Chassis::Chassis(link::BridgeEnd& link, const world::World& the_world, Duration 
       map_from_base_(the_world.base->start) {}
 
 void Chassis::refresh(Time now) {
+  now_ = now;
   wheels.refresh(now);
   floor.forget_until(now);
   const link::State& state = wheels.state();
@@ -43,8 +46,12 @@ void Chassis::locate(const BaseBelief& belief) {
   floor.see(belief);
 }
 
+bool Chassis::sees() const {
+  return belief_ && now_ - belief_->stamp <= from_s(world.cameras.front().latency_s) + kSeesFor;
+}
+
 bool Chassis::sure() const {
-  if (!belief_) return false;
+  if (!sees()) return false;
   const Eigen::Matrix3d& c = belief_->covariance;
   return std::sqrt(std::max(c(0, 0), c(1, 1))) < kSure_m && std::sqrt(c(2, 2)) < kSure_rad &&
          (belief_->returns == 0 || belief_->matched > kSureShare);

@@ -26,7 +26,9 @@ class Chassis {
 
   // As of the newest scan; nothing before the first.
   [[nodiscard]] const std::optional<BaseBelief>& belief() const { return belief_; }
-  // Whether it knows where it is well enough to drive.
+  // Whether there was a scan lately, as of the last refresh. Without any the lidar is broken, covered or not there yet.
+  [[nodiscard]] bool sees() const;
+  // Whether it knows where it is, and what is around, well enough to drive.
   [[nodiscard]] bool sure() const;
   // Where it is as of the last refresh: the belief, carried on by what the wheels have turned since.
   [[nodiscard]] const Pose2& map_from_base() const { return map_from_base_; }
@@ -63,6 +65,7 @@ class Chassis {
     Time stamp;
     AxisVector wheels_rad;
   };
+  Time now_;  // of the last refresh
   std::optional<BaseBelief> belief_;
   Pose2 map_from_base_;
   Odometry odometry_{drive};

@@ -81,7 +81,9 @@ class Navigate final : public Driven {
       unsure_since_ = now;
     }
     if (now < *unsure_since_ + kWaitsForSight) return {};
-    return {Status::kFailed, "the base does not know where it is: too little of what its lidar sees is on the map"};
+    return {Status::kFailed, chassis_.sees()
+                                 ? "the base does not know where it is: too little of what its lidar sees is on the map"
+                                 : "the base sees nothing: its lidar has shown nothing for a while"};
   }
 
   Progress plan(Time now) {
