@@ -140,10 +140,12 @@ class Navigate final : public Driven {
       plan_anew();
       return plan(now);
     }
-    if (renewed_at_ && now < *renewed_at_ + kRenewed) return {};
-    if (arrives_ && now + 2 * kRenewed >= chassis_.wheels.motion_end()) {
-      phase_ = Phase::kSettles;
-      return {};
+    if (renewed_at_) {
+      if (now < *renewed_at_ + kRenewed) return {};
+      if (arrives_ && now + 2 * kRenewed >= chassis_.wheels.motion_end()) {
+        phase_ = Phase::kSettles;
+        return {};
+      }
     }
     renewed_at_ = now;
     const Time from = chassis_.wheels.splice_time(now);
@@ -206,9 +208,10 @@ class Navigate final : public Driven {
   std::optional<WaySearch> search_;
   std::optional<Error> refused_;  // by the last search
   std::uint64_t version_ = 0;     // of the floor when the way was last looked at
-  std::optional<Time> renewed_at_, blocked_since_, unsure_since_, headway_at_;
+  std::optional<Time> renewed_at_;  // the newest look ahead along this way,
+  bool arrives_ = false;            // and whether that ends at the goal
+  std::optional<Time> blocked_since_, unsure_since_, headway_at_;
   Pose2 headway_from_;
-  bool arrives_ = false;
   int corrections_ = 0, detours_ = 0;
   double way_m_ = 0;
   std::vector<task::Note> notes_;
