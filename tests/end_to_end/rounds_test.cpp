@@ -235,6 +235,24 @@ TEST_F(RoundsTest, RunningIntoSomethingStopsIt) {
   run_until([&] { return rounds_->cerebellum->state().safety != link::SafetyState::kOperational; }, 1);
   run_for(1);
   EXPECT_LT((place().position() - hit.position()).norm(), 0.05);
+  await("go");
+  EXPECT_EQ(outcome("go"), Outcome::kFailed);
+  EXPECT_THAT(reason("go"), AllOf(HasSubstr("ran into something at (1."), HasSubstr("that its lidar does not see")));
+  EXPECT_EQ(told("go").at("collisions"), 3);
+  EXPECT_EQ(truth().collisions, 3) << "each time it backs off, and goes elsewhere";
+}
+
+TEST_F(RoundsTest, WhatItRanIntoItGoesRoundFromThenOn) {
+  put_there("unmapped_beam", "1.2 0 0.20", "0.1 0.2 0.03");
+  begin();
+  drive("go", R"({"place":"middle_aisle"})");
+  await("go");
+  EXPECT_EQ(outcome("go"), Outcome::kSucceeded) << reason("go");
+  expect_at({5.6, 0, 0});
+  drive("home", R"({"place":"dock"})");
+  await("home");
+  EXPECT_EQ(outcome("home"), Outcome::kSucceeded) << reason("home");
+  EXPECT_EQ(truth().collisions, 1);
 }
 
 TEST_F(RoundsTest, AScanTellsWhatTheMapDoesNotShow) {

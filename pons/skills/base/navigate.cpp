@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -23,8 +24,13 @@ constexpr Duration kRenewed = std::chrono::milliseconds(100);
 constexpr Duration kSettled = std::chrono::milliseconds(500);  // the filter has seen it stand in a few scans
 constexpr Duration kWaitsForRoom = std::chrono::seconds(25);   // who stands in the way may go on
 constexpr Duration kWaitsForSight = std::chrono::seconds(10);
-constexpr Duration kHeadway = std::chrono::seconds(20);  // without getting nearer by kNearer_m
-constexpr double kNearer_m = 0.05, kNearer_rad = 0.1;
+constexpr int kLooksInVain = 200;  // looks ahead, 20 s of driving, after which it has not moved by so much
+constexpr double kMoved_m = 0.05, kMoved_rad = 0.1;
+// What it runs into may be gone round once it is known where it stands, which takes a touch or two.
+constexpr int kMostCollisions = 3;
+constexpr double kBacksOff_m_s = 0.1, kBackedOff_m = 0.12;
+constexpr double kFront_rad = 1.0;  // of its circle, to either side of where it drives
+constexpr int kFrontPoints = 9;     // on each side: closer to each other than cells are
 constexpr int kCorrections = 8;
 
 task::Json json_of(const Pose2& pose) { return {{"x", pose.x}, {"y", pose.y}, {"yaw", wrapped(pose.yaw)}}; }
@@ -39,31 +45,33 @@ class Navigate final : public Driven {
   Progress tick(Time now) override {
     Progress progress = Driven::tick(now);
     const Vector2 here = chassis_.map_from_base().position();
-    const bool on_way = !steer_.way().empty() && phase_ != Phase::kPlans;
+    const bool on_way = !steer_.way().empty() && (phase_ == Phase::kDrives || phase_ == Phase::kSettles);
     chassis_.head_for({{goal_, on_way ? left_along(steer_.way(), here) : (goal_.position() - here).norm(), detours_}});
     progress.notes = std::exchange(notes_, {});
     return progress;
   }
 
  private:
-  enum class Phase : std::uint8_t { kPlans, kDrives, kSettles };
+  enum class Phase : std::uint8_t { kBacksOff, kPlans, kDrives, kSettles };
 
-  void begin_anew() override { plan_anew(); }
+  void begin_anew() override {
+    drives_ = false;
+    plan_anew();
+  }
   void plan_anew() {
     phase_ = Phase::kPlans;
     search_.reset();
     refused_.reset();
-    headway_at_.reset();
   }
 
   Progress go(Time now) override {
-    if (!chassis_.wheels.operational()) {
-      plan_anew();
-      return {};
-    }
+    if (!chassis_.wheels.operational()) return is_stopped(now);
     if (!chassis_.sure()) return look_for_itself(now);
     unsure_since_.reset();
+    drives_ = true;
     switch (phase_) {
+      case Phase::kBacksOff:
+        return back_off(now);
       case Phase::kPlans:
         return plan(now);
       case Phase::kDrives:
@@ -72,6 +80,53 @@ class Navigate final : public Driven {
         return settle(now);
     }
     return {Status::kFailed, "unreachable"};
+  }
+
+  // By the loop. A stop on a collision ends by itself: what the lidar does not show it would run into again and again.
+  Progress is_stopped(Time now) {
+    if (!std::exchange(drives_, false)) return {};
+    plan_anew();
+    if (!chassis_.wheels.has_struck()) return {};
+    const Vector2 at = feel_front(now);
+    notes_.push_back({"collision", {{"at", {at.x(), at.y()}}}});
+    phase_ = Phase::kBacksOff;
+    renewed_at_.reset();
+    if (++collisions_ < kMostCollisions) return {};
+    return {Status::kFailed,
+            fmt::format("ran into something at ({:.2f}, {:.2f}) m that its lidar does not see, after {} collisions",
+                        at.x(), at.y(), collisions_),
+            detail()};
+  }
+
+  // Whatever stopped it stands somewhere along the side on which it drove. Where the middle of that is, map frame.
+  Vector2 feel_front(Time now) {
+    struck_ = {chassis_.map_from_base(), chassis_.drive.twist(chassis_.wheels.state().commanded.speed).ahead < 0};
+    Pose2 front = struck_.from;
+    if (struck_.backwards) front.yaw += std::numbers::pi;
+    const auto towards = [&](double aside_rad) {
+      return front * Vector2(chassis_.world.base->radius_m * Vector2(std::cos(aside_rad), std::sin(aside_rad)));
+    };
+    std::vector<Vector2> points;
+    for (int i = -kFrontPoints; i <= kFrontPoints; ++i) points.push_back(towards(kFront_rad * i / kFrontPoints));
+    chassis_.floor.feel(points, now);
+    return towards(0);
+  }
+
+  // The way it came, out of touch with what it ran into: turning there it would rub along it.
+  Progress back_off(Time now) {
+    if (renewed_at_ && now < *renewed_at_ + kRenewed) return {};
+    renewed_at_ = now;
+    const Time from = chassis_.wheels.splice_time(now);
+    const Rolling start = chassis_.expected(from);
+    if ((start.map_from_base.position() - struck_.from.position()).norm() >= kBackedOff_m) {
+      phase_ = Phase::kPlans;
+      return {};
+    }
+    const model::Twist2 back{struck_.backwards ? kBacksOff_m_s : -kBacksOff_m_s, 0};
+    if (const auto held = steer_.hold(start, from, back, Room::kKnown)) {
+      if (auto sent = chassis_.wheels.stream(*held); !sent) return {Status::kRetry, sent.error().line(), detail()};
+    }
+    return no_headway(now);
   }
 
   Progress look_for_itself(Time now) {
@@ -100,6 +155,7 @@ class Navigate final : public Driven {
       return wait_for_room(now);
     }
     refused_.reset();
+    blocked_since_.reset();
     double length_m = 0;
     task::Json corners = task::Json::array();
     for (std::size_t i = 0; i < (*found)->size(); ++i) {
@@ -160,17 +216,17 @@ class Navigate final : public Driven {
     return no_headway(now);
   }
 
-  // Whether it gets nearer to its goal at all; the way there may lead away from it for a while.
+  // Whether it moves at all: the way to its goal may lead away from it for a while. While it plans, waits, or is
+  // stopped it does not look ahead, and that does not count.
   Progress no_headway(Time now) {
     const Pose2& here = chassis_.map_from_base();
-    const bool moved = !headway_at_ || (here.position() - headway_from_.position()).norm() > kNearer_m ||
-                       std::abs(wrapped(here.yaw - headway_from_.yaw)) > kNearer_rad;
+    const bool moved = !headway_from_ || (here.position() - headway_from_->position()).norm() > kMoved_m ||
+                       std::abs(wrapped(here.yaw - headway_from_->yaw)) > kMoved_rad;
     if (moved) {
       headway_from_ = here;
-      headway_at_ = now;
-      blocked_since_.reset();
+      looks_in_vain_ = 0;
     }
-    if (now < *headway_at_ + kHeadway) return {};
+    if (++looks_in_vain_ <= kLooksInVain) return {};
     brake(now);
     return {Status::kFailed,
             fmt::format("stuck at ({:.2f}, {:.2f}) m: there is too little room to drive on", here.x, here.y), detail()};
@@ -199,6 +255,7 @@ class Navigate final : public Driven {
             {"sigma_m", std::sqrt(std::max(covariance(0, 0), covariance(1, 1)))},
             {"way_m", way_m_},
             {"detours", detours_},
+            {"collisions", collisions_},
             {"corrections", corrections_}};
   }
 
@@ -206,13 +263,21 @@ class Navigate final : public Driven {
   Steer steer_;
   Phase phase_ = Phase::kPlans;
   std::optional<WaySearch> search_;
-  std::optional<Error> refused_;  // by the last search
-  std::uint64_t version_ = 0;     // of the floor when the way was last looked at
+  std::optional<Error> refused_;    // by the last search
+  std::uint64_t version_ = 0;       // of the floor when the way was last looked at
   std::optional<Time> renewed_at_;  // the newest look ahead along this way,
   bool arrives_ = false;            // and whether that ends at the goal
-  std::optional<Time> blocked_since_, unsure_since_, headway_at_;
-  Pose2 headway_from_;
-  int corrections_ = 0, detours_ = 0;
+  std::optional<Time> blocked_since_, unsure_since_;
+  std::optional<Pose2> headway_from_;
+  int looks_in_vain_ = 0;
+  // Where it was when it ran into something, and how it drove.
+  struct Struck {
+    Pose2 from;
+    bool backwards = false;
+  };
+  Struck struck_;
+  bool drives_ = false;  // so that a stop is of what it did itself
+  int corrections_ = 0, detours_ = 0, collisions_ = 0;
   double way_m_ = 0;
   std::vector<task::Note> notes_;
 };

@@ -86,6 +86,21 @@ TEST_F(OnTheFloor, WhatALookGoesThroughIsGone) {
   EXPECT_LT(floor_.clearance_m(Vector2(2.5, 0.5)), 0.05);
 }
 
+TEST_F(OnTheFloor, WhatWasFeltIsThereThoughALookGoesThrough) {
+  const Time felt(std::chrono::seconds(1));
+  floor_.feel({{1.5, 0.5}, {100, 100}}, felt);
+  EXPECT_EQ(floor_.version(), 1U);
+  EXPECT_LT(floor_.clearance_m(Vector2(1.5, 0.5)), 0.05);
+  BaseBelief look;
+  look.stamp = Time(std::chrono::seconds(2));
+  look.eye = {0, 0.525};
+  look.ends = {{2.0, 0.525}};
+  floor_.see(look);
+  EXPECT_LT(floor_.clearance_m(Vector2(1.5, 0.5)), 0.05);
+  floor_.forget_until(felt + std::chrono::minutes(5));
+  EXPECT_GT(floor_.clearance_m(Vector2(1.5, 0.5)), 0.3);
+}
+
 TEST_F(OnTheFloor, SaysWhyThereIsNoWay) {
   EXPECT_THAT(way({0, 0}, {4.5, 1.2}).error().line(), HasSubstr("the map has no room"));
   EXPECT_THAT(way({0, 0}, {40, 1.2}).error().line(), HasSubstr("the map has no room"));
