@@ -77,14 +77,13 @@ class Judge {
 
   void arrived(const std::string& what, const Pose2& goal, Time at) {
     ++verdict_.goals;
-    const auto after = std::ranges::upper_bound(truth_.way, at, {}, &sim::BasePlace::stamp);
-    if (after == truth_.way.begin()) {
+    const std::optional<Pose2> there = truth_.way.at(at);
+    if (!there) {
       ++verdict_.missed;
       return find(fmt::format("{}: the journal says it arrived before it was anywhere", what));
     }
-    const Pose2& there = std::prev(after)->map_from_base;
-    const double off_m = (there.position() - goal.position()).norm();
-    const double off_rad = std::abs(wrapped(there.yaw - goal.yaw));
+    const double off_m = (there->position() - goal.position()).norm();
+    const double off_rad = std::abs(wrapped(there->yaw - goal.yaw));
     verdict_.worst_goal_m = std::max(verdict_.worst_goal_m, off_m);
     verdict_.worst_goal_rad = std::max(verdict_.worst_goal_rad, off_rad);
     if (off_m <= rules_.goal_m && off_rad <= rules_.goal_rad) return;

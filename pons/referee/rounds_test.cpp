@@ -15,7 +15,7 @@ class RoundsJudged : public ::testing::Test {
  protected:
   // The base drives along x at 0.1 m/s, for ever.
   RoundsJudged() {
-    for (int i = 0; i < 1000; ++i) truth_.way.push_back({Time(std::chrono::milliseconds(10 * i)), {0.001 * i, 0, 0}});
+    for (int i = 0; i < 1000; ++i) truth_.way.add({Time(std::chrono::milliseconds(10 * i)), {0.001 * i, 0, 0}});
     truth_.fastest_m_s = 0.1;
   }
   void drive_to(const std::string& id, const Json& arguments, double arrives_s,

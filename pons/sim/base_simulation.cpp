@@ -128,7 +128,7 @@ struct BaseSimulation::Impl final : body::Body {
       truth.touched = name == nullptr ? "something" : name;
     }
     touching = touched >= 0;
-    if (stepped.ns() % kTold.count() == 0) truth.way.push_back({stepped, place()});
+    if (stepped.ns() % kTold.count() == 0) truth.way.add({stepped, place()});
   }
 
   const world::World& world;

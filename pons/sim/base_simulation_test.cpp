@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <numbers>
 
@@ -16,6 +18,29 @@ world::World rounds() {
   auto world = world::load("worlds", "rounds");
   EXPECT_TRUE(world) << world.error().line();
   return std::move(*world);
+}
+
+// A day of standing, with half a minute's drive in each hour.
+TEST(BaseWay, OfWhatIsLongAgoItKnowsWhereItStood) {
+  constexpr Duration kApart = std::chrono::milliseconds(10);
+  constexpr std::int64_t kHour = 360'000, kDrives = 3000;  // places
+  BaseWay way;
+  const auto place = [&](std::int64_t i) {
+    const std::int64_t in_hour = std::min(i % kHour, kDrives);
+    const double tremble_m = 1e-6 * static_cast<double>(i % 3);
+    const double driven_m = 0.005 * static_cast<double>(i / kHour * kDrives + in_hour);
+    return BasePlace{Time(i * kApart), {driven_m + tremble_m, 0, 0.3}};
+  };
+  constexpr std::int64_t kDay = 24 * kHour;
+  EXPECT_FALSE(way.at(Time{}));
+  for (std::int64_t i = 0; i < kDay; ++i) way.add(place(i));
+  EXPECT_LT(way.size(), BaseWay::kWhole / kApart + 30);
+  for (const std::int64_t i : {kDrives + 1, kHour - 1, kHour + kDrives, 20 * kHour + 5000}) {
+    ASSERT_TRUE(way.at(Time(i * kApart)));
+    EXPECT_NEAR(way.at(Time(i * kApart))->x, place(i).map_from_base.x, 1e-3) << i;
+  }
+  const std::int64_t lately = kDay - 1000;
+  EXPECT_EQ(way.at(Time(lately * kApart) + Duration(1))->x, place(lately).map_from_base.x) << "exact";
 }
 
 class OnItsFloor : public ::testing::Test {
@@ -45,7 +70,7 @@ TEST_F(OnItsFloor, DrivesAlongWhatItsRealWheelsRoll) {
   drive(2, 2, 6);
   body::Sensors sensors;
   simulation_->body().read(sensors);
-  const Pose2 at = truth().way.back().map_from_base;
+  const Pose2 at = truth().way.lately().back().map_from_base;
   const double rolled = 0.1 * sensors.position.mean();
   EXPECT_NEAR(truth().driven_m, rolled * 1.005, 0.01) << "its wheels are 1.5 % larger and 0.5 % smaller than drawn";
   // The larger left wheel turns it to the right: by the difference of what both rolled, over the track.
@@ -109,9 +134,9 @@ TEST_F(OnItsFloor, WithoutPowerItsBrakesHoldIt) {
   now_ += std::chrono::seconds(2);
   simulation_->body().write({.torque_nm = AxisVector::Zero(2), .power = false});
   simulation_->advance_to(now_);
-  const Pose2 at = truth().way.back().map_from_base;
+  const Pose2 at = truth().way.lately().back().map_from_base;
   simulation_->advance_to(now_ + std::chrono::seconds(2));
-  EXPECT_NEAR(truth().way.back().map_from_base.x, at.x, 1e-3);
+  EXPECT_NEAR(truth().way.lately().back().map_from_base.x, at.x, 1e-3);
 }
 
 TEST_F(OnItsFloor, KeepsTheContractOfABody) {

@@ -1,12 +1,51 @@
 #include "pons/sim/truth.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "pons/sim/cell.hpp"
 #include "pons/sim/simulation.hpp"
 
 namespace pons::sim {
+namespace {
+
+constexpr double kSame_m = 1e-3, kSame_rad = 1e-3;  // two places that are one
+constexpr double kStands_s = 1;                     // it stands that would not leave the place within so long
+
+bool is_within(const Pose2& a, const Pose2& b, double share) {
+  return (a.position() - b.position()).norm() <= share * kSame_m &&
+         std::abs(wrapped(a.yaw - b.yaw)) <= share * kSame_rad;
+}
+
+bool stands(const BasePlace& before, const BasePlace& after) {
+  return is_within(before.map_from_base, after.map_from_base, to_s(after.stamp - before.stamp) / kStands_s);
+}
+
+template <typename Places>
+std::optional<Pose2> newest_by(const Places& places, Time time) {
+  const auto after = std::ranges::upper_bound(places, time, {}, &BasePlace::stamp);
+  return after == places.begin() ? std::nullopt : std::optional(std::prev(after)->map_from_base);
+}
+
+}  // namespace
+
+void BaseWay::add(const BasePlace& place) {
+  lately_.push_back(place);
+  while (place.stamp - lately_.front().stamp > kWhole) {
+    const BasePlace oldest = lately_.front();
+    lately_.pop_front();
+    const bool known = !stands_.empty() && is_within(stands_.back().map_from_base, oldest.map_from_base, 1);
+    if (!known && stands(oldest, lately_.front())) stands_.push_back(oldest);
+  }
+}
+
+std::optional<Pose2> BaseWay::at(Time time) const {
+  const auto lately = newest_by(lately_, time);
+  return lately ? lately : newest_by(stands_, time);
+}
 
 std::string_view name(LabelTruth label) {
   static constexpr std::array<std::string_view, 5> kNames{"readable", "down", "damaged", "unknown_code", "two_codes"};

@@ -2,7 +2,9 @@
 // perceives or decides can reach it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -89,10 +91,30 @@ struct BasePlace {
   Pose2 map_from_base;
 };
 
+// Where a base was, in a memory that does not grow with the time that it goes on: every place of the last kWhole, and
+// of what is longer ago where it stood. That is where goals are, and a run that ends with its tasks is shorter.
+class BaseWay {
+ public:
+  static constexpr Duration kWhole = std::chrono::minutes(30);
+
+  // The places in the order of their time.
+  void add(const BasePlace& place);
+  // Every one of the last kWhole, the newest last.
+  [[nodiscard]] const std::deque<BasePlace>& lately() const { return lately_; }
+  // Where it was then: exact within kWhole; before that where it stood last, within 1 mm and 1 mrad. Nothing: it was
+  // nowhere yet.
+  [[nodiscard]] std::optional<Pose2> at(Time time) const;
+  [[nodiscard]] std::size_t size() const { return lately_.size() + stands_.size(); }
+
+ private:
+  std::deque<BasePlace> lately_;
+  std::vector<BasePlace> stands_;  // where it came to stand, each once
+};
+
 // Where a base really was, and what it ran into, over every physics step so far.
 struct BaseTruth {
-  std::vector<BasePlace> way;  // every 10 ms
-  double fastest_m_s = 0;      // of its frame, along the floor
+  BaseWay way;             // every 10 ms
+  double fastest_m_s = 0;  // of its frame, along the floor
   double driven_m = 0;
   int collisions = 0;   // times it came to touch anything but the floor
   std::string touched;  // what it touched last

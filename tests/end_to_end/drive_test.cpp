@@ -37,7 +37,7 @@ class SteeredTest : public RoundsTest {
     return steered ? "" : steered.error().line();
   }
   [[nodiscard]] double turns_rad_s() const {
-    const auto& way = truth().way;
+    const auto& way = truth().way.lately();
     if (way.size() < 2) return 0;
     return wrapped(way.back().map_from_base.yaw - way[way.size() - 2].map_from_base.yaw) / 0.01;
   }

@@ -115,9 +115,9 @@ class RoundsTest : public ::testing::Test {
     return detail;
   }
   [[nodiscard]] const sim::BaseTruth& truth() const { return sim::truth_of(*rounds_->simulation); }
-  [[nodiscard]] Pose2 place() const { return truth().way.back().map_from_base; }
+  [[nodiscard]] Pose2 place() const { return truth().way.lately().back().map_from_base; }
   [[nodiscard]] double speed_m_s() const {
-    const auto& way = truth().way;
+    const auto& way = truth().way.lately();
     return (way.back().map_from_base.position() - way[way.size() - 2].map_from_base.position()).norm() / 0.01;
   }
   void expect_at(const Pose2& goal) {
