@@ -17,7 +17,7 @@ namespace {
 constexpr double kStays = 1e-9;    // rad or m: so little is no way
 constexpr double kBeyond = 0.002;  // of a leg: so far beyond its ends is not seen
 constexpr double kSwing = 0.2;     // of the way that a given speed leads in a leg's time: so far it swings beyond
-constexpr int kRounds = 12, kMostRounds = 16;
+constexpr int kRounds = 6, kMostStretches = 4;
 constexpr double kLonger = 1 + 1e-6;  // than the limits ask for, so that rounding does no harm
 
 using Matrix2 = Eigen::Matrix2d;
@@ -222,10 +222,36 @@ void lengthen(std::vector<TimedPoint>& points, const std::vector<Excess>& beyond
   }
 }
 
-// The first one, where no other limit is broken.
-const Excess* only_places(const std::vector<Excess>& beyond) {
-  const bool all = std::ranges::all_of(beyond, [](const Excess& e) { return e.of == Excess::Of::kPosition; });
-  return all ? &beyond.front() : nullptr;
+// What `make` asks for beyond the limits. Errors: its own; there is a position among them, and no other limit.
+Expected<std::vector<Excess>> beyond_limits(std::span<const TimedPoint> points, const InTime& make,
+                                            const AxisLimits& limits, std::size_t first) {
+  const auto way = make(points);
+  if (!way) return std::unexpected(way.error());
+  std::vector<Excess> beyond = excesses(*way, points, limits);
+  const bool only_places =
+      std::ranges::all_of(beyond, [](const Excess& each) { return each.of == Excess::Of::kPosition; });
+  if (beyond.empty() || !only_places) return beyond;
+  return fail(fmt::format("axis {} leaves its position limits on the way to it", beyond.front().axis + 1),
+              fmt::format("point {}", beyond.front().point + first), "keep the points away from the limits");
+}
+
+// So many times as long all of it takes, if each leg is to keep its limits by that.
+double longest(const std::vector<Excess>& beyond) {
+  return beyond.empty() ? 1 : kLonger * std::ranges::max(beyond, {}, &Excess::longer).longer;
+}
+
+// Of the points between two that a motion goes through, the one that it is farthest from at its time; `behind` where it
+// is nowhere farther off than `within`.
+std::size_t farthest(std::span<const TimedPoint> points, std::size_t before, std::size_t behind,
+                     const Trajectory& motion, double within) {
+  std::size_t found = behind;
+  for (std::size_t k = before + 1; k < behind; ++k) {
+    const AxisVector& due = points[k].position;
+    const double off =
+        (sample(motion, Time(from_s(points[k].time_s)), due.size()).position - due).cwiseAbs().maxCoeff();
+    if (off > within) within = off, found = k;
+  }
+  return found;
 }
 
 }  // namespace
@@ -289,26 +315,55 @@ void stretch(std::vector<TimedPoint>& points, double factor) {
 
 Expected<std::vector<TimedPoint>> give_time(std::vector<TimedPoint> points, const InTime& make,
                                             const AxisLimits& limits, std::size_t first) {
-  const std::vector<TimedPoint> asked = points;
-  double all_longer = 1;  // as much for each leg would do
-  for (int round = 0; round < kMostRounds; ++round) {
-    const auto way = make(points);
-    if (!way) return std::unexpected(way.error());
-    const std::vector<Excess> beyond = excesses(*way, points, limits);
-    if (beyond.empty()) return points;
-    if (const Excess* const place = only_places(beyond))
-      return fail(fmt::format("axis {} leaves its position limits on the way to it", place->axis + 1),
-                  fmt::format("point {}", place->point + first), "keep the points away from the limits");
-    const double worst = std::ranges::max(beyond, {}, &Excess::longer).longer;
-    if (round == 0 || round >= kRounds) all_longer *= kLonger * worst;
-    if (round + 1 >= kRounds) {
-      points = asked;
-      stretch(points, all_longer);
-    } else {
-      lengthen(points, beyond);
+  std::vector<TimedPoint> quickest;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto beyond = beyond_limits(points, make, limits, first);
+    if (!beyond) return std::unexpected(beyond.error());
+    const double longer = longest(*beyond);
+    if (quickest.empty() || points.back().time_s * longer < quickest.back().time_s) {
+      if (beyond->empty()) return points;
+      quickest = points;
+      stretch(quickest, longer);
     }
+    if (beyond->empty()) break;
+    lengthen(points, *beyond);
+  }
+  // So long each of them should do; times are whole nanoseconds, though, and a motion may be made otherwise of others.
+  for (int round = 0; round < kMostStretches; ++round) {
+    const auto beyond = beyond_limits(quickest, make, limits, first);
+    if (!beyond) return std::unexpected(beyond.error());
+    if (beyond->empty()) return quickest;
+    stretch(quickest, longest(*beyond));
   }
   return fail("no times were found in which the limits are kept", "timed motion", "give fewer points, further apart");
+}
+
+Expected<std::vector<TimedPoint>> thinned(std::span<const TimedPoint> points, Shape shape, double within,
+                                          std::size_t most) {
+  if (points.size() < 2 || points.front().time_s != 0)
+    return fail("the first of two points or more is not at 0", "timed motion", "begin with where it rests");
+  std::vector<std::size_t> kept{points.size() - 1};
+  while (kept.size() < most) {
+    std::vector<TimedPoint> through;
+    for (const std::size_t k : kept) through.push_back(points[k]);
+    const auto motion = move_in_time(points.front().position, Time{}, through, shape);
+    if (!motion) return std::unexpected(motion.error());
+    std::vector<std::size_t> more;
+    std::size_t before = 0;
+    for (const std::size_t k : kept) {
+      const std::size_t found = farthest(points, std::exchange(before, k), k, *motion, within);
+      if (found != k) more.push_back(found);
+      more.push_back(k);
+    }
+    if (more.size() == kept.size()) {
+      through.insert(through.begin(), points.front());
+      return through;
+    }
+    kept = std::move(more);
+  }
+  return fail(fmt::format("more than {} of {} points are needed to pass each within {} of where it is", most,
+                          points.size(), within),
+              "timed motion", "give fewer, or a calmer motion");
 }
 
 }  // namespace pons::motion

@@ -43,6 +43,13 @@ enum class Shape : std::uint8_t {
 [[nodiscard]] Expected<Trajectory> move_in_time(const AxisVector& start, Time at, std::span<const TimedPoint> points,
                                                 Shape shape);
 
+// `most` of the points or fewer, such that the motion through them is within so much of each of them at its time. The
+// first has to be at 0: there it rests; it is kept, and so is the last. From two on, points are added where the motion
+// is farthest off, leg by leg, as Ramer, Douglas and Peucker do for a line. Errors: those of move_in_time(); not so
+// few.
+[[nodiscard]] Expected<std::vector<TimedPoint>> thinned(std::span<const TimedPoint> points, Shape shape, double within,
+                                                        std::size_t most);
+
 // What a motion asks for beyond a limit.
 struct Excess {
   enum class Of : std::uint8_t { kPosition, kSpeed, kAcceleration, kJerk };
@@ -63,9 +70,9 @@ struct Excess {
 using InTime = std::function<Expected<Trajectory>(std::span<const TimedPoint>)>;
 
 // The same places at times in which `make` keeps the limits: a leg that does not is given longer, by what its worst
-// excess asks for, a few rounds long; where that leads nowhere, all legs alike. No leg gets shorter. Speeds that were
-// given get less with their legs. Errors: those of `make`; a position limit is not kept, which no time mends;
-// the points are numbered from `first` on.
+// excess asks for, a few rounds long. With all legs so much longer as the worst then asks for, each round would do; the
+// quickest is taken. No leg gets shorter. Speeds that were given get less with their legs. Errors: those of `make`; a
+// position limit is not kept, which no time mends; the points are numbered from `first` on.
 [[nodiscard]] Expected<std::vector<TimedPoint>> give_time(std::vector<TimedPoint> points, const InTime& make,
                                                           const AxisLimits& limits, std::size_t first = 1);
 // All of it so many times as long.

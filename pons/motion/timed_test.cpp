@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "pons/core/random.hpp"
+#include "pons/motion/test_plans.hpp"
 
 namespace pons::motion {
 namespace {
@@ -256,6 +257,53 @@ TEST(TimedTest, GivesTimeUntilAllLimitsAreKeptAndTakesNone) {
     EXPECT_LE(given->back().time_s, 40 * points.back().time_s);
     EXPECT_LE(given->at(4).speed->norm(), points[4].speed->norm());
   }
+}
+
+// Corners of seven axes, and a quarter of their accelerations.
+std::vector<AxisVector> corners(int sides) {
+  AxisVector one(7), other(7);
+  one << 0.8, 0.3, -0.4, 0.5, 0.2, -0.6, 0.9;
+  other << -0.3, 0.2, 0.5, 0.3, -0.6, 0.2, -0.5;
+  return laps(AxisVector::Zero(7), one, other, sides);
+}
+AxisVector gently() { return 0.25 * limits(7).acceleration_rad_s2; }
+
+// What was planned without a thought of jerk: the last interval may be however short, and accelerations step anywhere.
+TEST(TimedTest, APlanThatIsSampledTakesHardlyLonger) {
+  for (const double share : {0.1, 0.5, 1.0}) {
+    for (const double last_s : {0.001, 0.004, 0.010, 0.020, 0.046, 0.090}) {
+      const auto plan = plan_that_ends_after(last_s, corners(2), share * limits(7).speed_rad_s, share * gently());
+      std::vector<TimedPoint> points = plan.points();
+      ASSERT_NEAR(points.back().time_s - points[points.size() - 2].time_s, last_s, 1e-6);
+      points.erase(points.begin());
+      const auto given = give_time(points, from_rest(AxisVector::Zero(7)), limits(7));
+      ASSERT_TRUE(given) << given.error().line();
+      EXPECT_LT(given->back().time_s - points.back().time_s, 0.04) << share << ", " << last_s;
+    }
+  }
+}
+
+// A minute of them, ten a second.
+TEST(TimedTest, OfManyPointsItKeepsThoseThatLeadItPastAll) {
+  constexpr double kWithin = 0.001;
+  const auto points = SampledPlan(corners(15), 0.1 * limits(7).speed_rad_s, 0.1 * gently()).points();
+  ASSERT_GT(points.size(), 550U);
+  const auto few = thinned(points, Shape::kBetween, kWithin, 200);
+  ASSERT_TRUE(few) << few.error().line();
+  EXPECT_LT(few->size(), 150U);
+  EXPECT_EQ(few->front().time_s, 0);
+  EXPECT_EQ(few->back().time_s, points.back().time_s);
+  const auto way = from_rest(AxisVector::Zero(7))(std::span(*few).subspan(1));
+  ASSERT_TRUE(way) << way.error().line();
+  for (const TimedPoint& point : points) {
+    const AxisVector is = sample(*way, kAt + from_s(point.time_s), 7).position;
+    EXPECT_LE((is - point.position).cwiseAbs().maxCoeff(), kWithin + 1e-9) << point.time_s;
+  }
+  const auto fewer = thinned(points, Shape::kBetween, kWithin, few->size() / 2);
+  ASSERT_FALSE(fewer);
+  EXPECT_THAT(fewer.error().line(), HasSubstr("points are needed to pass each within 0.001"));
+  EXPECT_THAT(thinned(std::span(points).subspan(1), Shape::kBetween, kWithin, 200).error().line(),
+              HasSubstr("begin with where it rests"));
 }
 
 TEST(TimedTest, WhatTimeCannotMendIsSaid) {
