@@ -120,9 +120,12 @@ Expected<std::vector<TimedPoint>> read(Cell& cell, const Json& arguments) {
   if (!points) return points;
   const bool begins = points->front().time_s == 0;
   if (begins && points->size() == 1) points->push_back({kStays_s, points->front().position, std::nullopt});
+  AxisLimits limits = cell.limits_planned();
+  // Where it may take longer, only the whole of it tells how much that is.
+  if (arguments.contains(kTimeTolerance)) limits.speed_rad_s.setConstant(std::numeric_limits<double>::infinity());
   Expected<void> good = check_times(*points, begins ? 1 : 0);
-  if (good) good = check_limits(*points, names, cell.limits_planned());
-  if (good) good = check_legs(*points, names, cell.limits_planned());
+  if (good) good = check_limits(*points, names, limits);
+  if (good) good = check_legs(*points, names, limits);
   for (std::size_t k = 0; good && k < points->size(); ++k)
     good = cell.reach.stands_free((*points)[k].position, number(k));
   if (!good) return std::unexpected(good.error());

@@ -15,8 +15,8 @@
 
 #include "pons/core/random.hpp"
 #include "pons/model/collision.hpp"
+#include "pons/skills/follow_kit.hpp"
 #include "pons/skills/skills.hpp"
-#include "pons/skills/test_kit.hpp"
 #include "pons/task/schema.hpp"
 
 namespace pons::skills {
@@ -30,79 +30,13 @@ using ::testing::AllOf;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
-constexpr const char* kTrajectory = "follow_trajectory";
-constexpr const char* kPath = "follow_path";
-
 world::World with_post(world::World world, const Vector3& at) {
   world.places.push_back({"post", world::PlaceKind::kObstacle, at, {0.03, 0.03, 0.2}});
   return world;
 }
 
-class FollowTest : public ObedientArmTest {
+class FollowTest : public FollowKit {
  protected:
-  FollowTest() {
-    opened_ = true;
-    add_skills(registry_, cell_, {});
-    pass();
-  }
-
-  [[nodiscard]] AxisVector home(const std::vector<std::pair<int, double>>& turned = {}) const {
-    AxisVector q = world_.robot.home;
-    for (const auto& [axis, by] : turned) q[axis] += by;
-    return q;
-  }
-  // Names in reverse, so that their order counts.
-  [[nodiscard]] Json joints() const {
-    std::vector<std::string> names = cell_.model.axis_names();
-    std::ranges::reverse(names);
-    return names;
-  }
-  [[nodiscard]] static Json values(const AxisVector& q) {
-    std::vector<double> reversed(q.begin(), q.end());
-    std::ranges::reverse(reversed);
-    return reversed;
-  }
-  [[nodiscard]] Json trajectory(const std::vector<std::pair<double, AxisVector>>& points) const {
-    Json arguments{{"joints", joints()}, {"points", Json::array()}};
-    for (const auto& [time_s, q] : points)
-      arguments["points"].push_back({{"positions", values(q)}, {"time_s", time_s}});
-    return arguments;
-  }
-  [[nodiscard]] static Json path(const std::vector<std::pair<double, Vector3>>& points) {
-    Json arguments{{"points", Json::array()}};
-    for (const auto& [time_s, p] : points)
-      arguments["points"].push_back({{"position", {p.x(), p.y(), p.z()}}, {"time_s", time_s}});
-    return arguments;
-  }
-  std::string refusal(const char* skill, const Json& arguments) {
-    const auto good = registry_.find(skill)->feasible(arguments, Moment::kAdmission);
-    return good ? "" : good.error().line();
-  }
-
-  // Ticks it to its end, `meanwhile` with the time since it set out.
-  Progress run(const char* skill, const Json& arguments, const std::function<void(double)>& meanwhile = {}) {
-    skill_ = registry_.find(skill)->start(arguments, now_);
-    set_out_.reset();
-    for (int tick = 0; tick < 6000; ++tick) {
-      Progress progress = skill_->tick(now_);
-      for (const task::Note& note : progress.notes)
-        if (note.kind == "plan" && !set_out_) set_out_ = cell_.arm.splice_time(now_);
-      if (task::is_end(progress.status)) return progress;
-      pass();
-      for (link::Command heard; link::CerebellumEnd(*link_).receive(heard);) continue;
-      if (off_rad_ > 0) measured_off();
-      if (meanwhile && set_out_) meanwhile(to_s(now_ - *set_out_));
-    }
-    ADD_FAILURE() << "it does not end";
-    return {};
-  }
-  // Axis 1 is measured beside what is asked of it.
-  void measured_off() {
-    link::State state = cell_.arm.state();
-    state.position[1] += off_rad_;
-    link::CerebellumEnd(*link_).publish(state);
-    cell_.arm.refresh(now_);
-  }
   // A posture, and the way there high in the air.
   [[nodiscard]] AxisVector folded_onto_itself() {
     model::CollisionModel judge(cell_.model.copy(), {.self_m = 0.0});
@@ -128,12 +62,6 @@ class FollowTest : public ObedientArmTest {
     object.size_m = {0.3, 0.3, 0.25};
     seen_ = {object};
   }
-  [[nodiscard]] double off(const AxisVector& q) const { return (cell_.arm.state().position - q).cwiseAbs().maxCoeff(); }
-
-  task::SkillRegistry registry_;
-  std::unique_ptr<task::Skill> skill_;
-  std::optional<Time> set_out_;
-  double off_rad_ = 0;
 };
 
 TEST_F(FollowTest, IsAtEachPointAtItsTime) {

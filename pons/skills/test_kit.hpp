@@ -15,17 +15,20 @@
 
 namespace pons::skills {
 
-// The real one, from the checkout's root.
-inline world::World parcel_cell() {
-  auto world = world::load("worlds", "parcel_cell");
+// A real one, from the checkout's root.
+inline world::World shipped_world(const char* name) {
+  auto world = world::load("worlds", name);
   EXPECT_TRUE(world) << world.error().line();
   return std::move(*world);
 }
+inline world::World parcel_cell() { return shipped_world("parcel_cell"); }
 
 // An armed arm that does at once what it is told, and holds something until its cups are opened_.
 class ObedientArmTest : public testing::Test {
  protected:
   static constexpr double kSealed_kpa = 60;
+
+  explicit ObedientArmTest(world::World world = parcel_cell()) : world_(std::move(world)) {}
 
   void stands(const Vector3& tip) {
     const auto at = cell_.model.inverse(Cell::tip_down(tip, 0), world_.robot.home);
@@ -58,7 +61,7 @@ class ObedientArmTest : public testing::Test {
   }
   [[nodiscard]] Vector3 tip_now() { return cell_.model.world_from_tip(cell_.arm.state().position).translation(); }
 
-  world::World world_ = parcel_cell();
+  world::World world_;
   std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd end_{*link_};
   Cell cell_{end_, world_, model::RobotModel::load(world_.robot).value()};

@@ -19,12 +19,12 @@ using task::Json;
 using task::Progress;
 using task::Status;
 
-constexpr Duration kLookPiece = std::chrono::milliseconds(400);     // of the way, in one tick
-constexpr Duration kLookEvery = std::chrono::milliseconds(100);     // while it goes, so far ahead:
-constexpr Duration kLookAhead = std::chrono::milliseconds(1000);    // longer than the arm takes to stop
-constexpr Duration kSettleWithin = std::chrono::milliseconds(500);  // after the end of the motion
-constexpr double kBroughtOn_s = 1.0;                                // at most, along its way, by being stopped;
-constexpr double kOnTheWay_rad = 0.3;                               // further off it has been elsewhere
+constexpr Duration kLookPiece = std::chrono::milliseconds(400);   // of the way, in one tick
+constexpr Duration kLookEvery = std::chrono::milliseconds(100);   // while it goes, so far ahead:
+constexpr Duration kLookAhead = std::chrono::milliseconds(1000);  // longer than the arm takes to stop
+constexpr double kSettleWithin_s = 0.5;                           // after the end of a motion whose times are kept
+constexpr double kBroughtOn_s = 1.0;                              // at most, along its way, by being stopped;
+constexpr double kOnTheWay_rad = 0.3;                             // further off it has been elsewhere
 constexpr double kStep_s = 0.01;
 constexpr Duration kSearchFor = std::chrono::milliseconds(1000);  // the way back to it
 constexpr double kFirstLeg_s = 0.02;                              // of a way that goes on, at least
@@ -95,6 +95,7 @@ class FollowTimed final : public ArmSkill {
     return {{"points", asked_ ? asked_->points.size() : 0},
             {"progress", progress()},
             {"took_s", began_ ? to_s(now - *began_) : 0.0},
+            {"longer_s", longer_s_},
             {"worst_rad", worst_rad_}};
   }
 
@@ -113,10 +114,11 @@ class FollowTimed final : public ArmSkill {
     if (!way) return {Status::kFailed, way.error().line(), detail(now)};
     auto possible = give_enough(points, make);
     if (!possible) return {Status::kFailed, possible.error().line(), detail(now)};
-    if (possible->back().time_s > points.back().time_s) {
-      if (!began_) return {Status::kFailed, too_quick(points, *way, *possible), detail(now)};
-      way = make(*possible);
-    }
+    const double longer_s = possible->back().time_s - points.back().time_s;
+    if (!began_ && longer_s > asked_->goal_time_tolerance_s.value_or(0))
+      return {Status::kFailed, too_quick(points, *way, *possible), detail(now)};
+    if (longer_s > 0) way = make(*possible);
+    if (!began_) longer_s_ = longer_s;
     points_ = *std::move(possible);
     way_ = *std::move(way);
     told_before_ = progress_;
@@ -165,7 +167,9 @@ class FollowTimed final : public ArmSkill {
     looked_ = until;
     if (looked_ < end) return {};
     if (auto sent = cell_.arm.stream(way); !sent) return {Status::kRetry, sent.error().line(), detail(now)};
-    cell_.note("plan", {{"to", "follow"}, {"points", points_.size()}, {"arrives_s", way.back().end().s()}});
+    cell_.note(
+        "plan",
+        {{"to", "follow"}, {"points", points_.size()}, {"arrives_s", way.back().end().s()}, {"longer_s", longer_s_}});
     sent_ = std::move(way);
     begins_ = begin;
     if (!began_) began_ = begin;
@@ -207,7 +211,9 @@ class FollowTimed final : public ArmSkill {
     const AxisVector planned = cell_.arm.planned(end).position;
     const auto arrived = asked_->arrived(cell_.arm.state().position, planned);
     if (arrived) return {Status::kSucceeded, {}, detail(now)};
-    if (now < end + kSettleWithin) return {};
+    const double within_s =
+        asked_->goal_time_tolerance_s ? *asked_->goal_time_tolerance_s - longer_s_ : kSettleWithin_s;
+    if (now < end + from_s(within_s)) return {};
     return {Status::kFailed, "goal_tolerance_violated: " + arrived.error().line(), detail(now)};
   }
 
@@ -282,16 +288,20 @@ class FollowTimed final : public ArmSkill {
 
   [[nodiscard]] std::string too_quick(const std::vector<TimedPoint>& points, const motion::Trajectory& way,
                                       const std::vector<TimedPoint>& possible) const {
+    const double given_s = points.back().time_s, takes_s = possible.back().time_s;
+    std::string allowed;
+    if (asked_->goal_time_tolerance_s)
+      allowed = fmt::format("; all of it would take {:.2f} times as long, {:.2f} s more, of which {:.2f} s are allowed",
+                            takes_s / given_s, up_to_hundredths(takes_s - given_s), *asked_->goal_time_tolerance_s);
     const auto beyond = motion::excesses(way, points, cell_.limits_timed());
     if (beyond.empty())
-      return fmt::format("what the cups hold cannot be carried so quickly; take {:.2f} s for all of it, not {:.2f} s",
-                         up_to_hundredths(possible.back().time_s), points.back().time_s);
+      return fmt::format("what the cups hold cannot be carried so quickly; take {:.2f} s for all of it, not {:.2f} s{}",
+                         up_to_hundredths(takes_s), given_s, allowed);
     const motion::Excess& first = beyond.front();
     return fmt::format(
-        "point {}: {} would need {:.2f} times its {} limit; reach it after {:.2f} s at the soonest, "
-        "not {:.2f} s",
+        "point {}: {} would need {:.2f} times its {} limit; reach it after {:.2f} s at the soonest, not {:.2f} s{}",
         first.point + first_number(), axis_name(first.axis), first.use, motion::name(first.of),
-        up_to_hundredths(possible[first.point].time_s), points[first.point].time_s);
+        up_to_hundredths(possible[first.point].time_s), points[first.point].time_s, allowed);
   }
 
   Cell& cell_;
@@ -305,6 +315,7 @@ class FollowTimed final : public ArmSkill {
   std::optional<Time> began_;  // the first time
   double done_s_ = 0;          // of way_
   double progress_ = 0, told_before_ = 0;
+  double longer_s_ = 0;  // than asked for, as it was planned from the begin
   double worst_rad_ = 0;
   int told_ = 0;
   Cell::Search search_;
@@ -315,22 +326,27 @@ class FollowTimed final : public ArmSkill {
 }  // namespace
 
 task::SkillType timed_skill(Cell& cell, TimedSkill skill) {
+  skill.schema["properties"][kTimeTolerance] = {{"type", "number"}, {"minimum", 0}, {"maximum", kLongestWay_s}};
   return {.name = std::move(skill.name),
           .summary = std::move(skill.summary),
           .schema = std::move(skill.schema),
           .resources = {cell.world.arm},
           .timeout = from_s(2 * kLongestWay_s),
           .attempts = 1,
-          .outputs = {"took_s", "worst_rad"},
+          .outputs = {"took_s", "longer_s", "worst_rad"},
           .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
           .feasible = [&cell, read = skill.read](const Json& arguments, task::Moment) -> Expected<void> {
             const auto way = read(cell, arguments);
             if (!way) return std::unexpected(way.error());
             return {};
           },
-          .start = [&cell, read = skill.read](
-                       const Json& arguments,
-                       Time) { return conduct(cell, std::make_unique<FollowTimed>(cell, read(cell, arguments))); }};
+          .start =
+              [&cell, read = skill.read](const Json& arguments, Time) {
+                auto way = read(cell, arguments);
+                if (way && arguments.contains(kTimeTolerance))
+                  way->goal_time_tolerance_s = arguments.at(kTimeTolerance);
+                return conduct(cell, std::make_unique<FollowTimed>(cell, std::move(way)));
+              }};
 }
 
 Expected<void> check_times(std::span<const TimedPoint> points, std::size_t first) {
