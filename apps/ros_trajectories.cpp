@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "apps/outside.hpp"
+#include "pons/motion/timed.hpp"
 #include "pons/skills/follow_trajectory.hpp"
+#include "pons/skills/timed_way.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::apps {
@@ -21,39 +23,91 @@ using gate::ros::GoalStatus;
 using Goal = RosTrajectories::FollowJointTrajectory::Goal;
 using Feedback = RosTrajectories::FollowJointTrajectory::Feedback;
 using Result = RosTrajectories::FollowJointTrajectory::Result;
+using motion::TimedPoint;
 using Point = wire::trajectory_msgs::msg::JointTrajectoryPoint;
 using Tolerance = wire::control_msgs::msg::JointTolerance;
 
 constexpr std::string_view kAction = "joint_trajectory_controller/follow_joint_trajectory";
 constexpr std::chrono::milliseconds kLooksEach{50};  // ros2_control's action_monitor_rate
-// What is left of a value's digits: a task's JSON has room for as many points as the skill takes then.
-constexpr double kFineness = 1e9, kRounded = 1e6;
+// What is left of a value's digits: a task's JSON has room for as many points as the skill takes then. A speed that
+// ros2_control takes for none at all, as the last one has to be, is none.
+constexpr double kPositionFineness = 1e9, kSpeedFineness = 1e6, kRounded = 1e6;
+// More points than the skill takes are thinned, such that each is passed so closely; and so many can be: what is
+// sampled ten times a second over the longest way.
+constexpr double kThinned_rad = 0.001;
+constexpr std::size_t kMostPoints = 3000;
+// By so much later a goal may end that says nothing of it; and what says that it may end whenever it does, s.
+constexpr double kLater_s = 0.5, kLaterShare = 0.1, kErased_s = -1;
 // As the skill begins what it says of these.
 constexpr std::string_view kPathViolated = "path_tolerance_violated", kGoalViolated = "goal_tolerance_violated";
 
-Expected<Json> numbers(const std::vector<double>& values, const std::string& where) {
-  Json list = Json::array();
-  for (const double value : values) {
+// In the order of the goal's joints.
+Expected<AxisVector> values_from(const std::vector<double>& given, std::string_view what, std::size_t joints,
+                                 double fineness, const std::string& point) {
+  const std::string where = fmt::format("{}.{}", point, what);
+  if (given.size() != joints)
+    return fail(fmt::format("{} {} for {} joints", given.size(), what, joints), where, "give one a joint");
+  AxisVector values(static_cast<Eigen::Index>(joints));
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const double value = given[static_cast<std::size_t>(i)];
     if (!std::isfinite(value)) return fail("is not finite", where, "give numbers");
-    list.push_back(std::abs(value) < kRounded ? std::round(value * kFineness) / kFineness : value);
+    values[i] = std::abs(value) < kRounded ? std::round(value * fineness) / fineness : value;
   }
-  return list;
+  return values;
 }
 
-Expected<Json> point_from(const Point& point, std::size_t number) {
+Expected<TimedPoint> point_from(const Point& point, std::size_t number, std::size_t joints) {
   const std::string where = fmt::format("points[{}]", number);
   if (point.positions.empty()) return fail("has no positions", where, "give each joint's, in rad");
   if (std::ranges::any_of(point.effort, [](double effort) { return effort != 0; }))
     return fail("has efforts", where, "leave them out: motion is commanded by position");
-  auto positions = numbers(point.positions, where + ".positions");
+  auto positions = values_from(point.positions, "positions", joints, kPositionFineness, where);
   if (!positions) return std::unexpected(positions.error());
-  Json json{{"positions", *std::move(positions)},
-            {"time_s", point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec}};
-  if (point.velocities.empty()) return json;
-  auto velocities = numbers(point.velocities, where + ".velocities");
+  TimedPoint read{point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec, *positions, {}};
+  if (point.velocities.empty()) return read;
+  auto velocities = values_from(point.velocities, "velocities", joints, kSpeedFineness, where);
   if (!velocities) return std::unexpected(velocities.error());
-  json["velocities"] = *std::move(velocities);
+  read.speed = *velocities;
+  return read;
+}
+
+// A last interval is what is left of a duration: where that is less than the loop can keep, it is made as much.
+Expected<std::vector<TimedPoint>> points_from(const std::vector<Point>& given, std::size_t joints) {
+  if (given.empty()) return fail("a goal without points moves nothing", "points", "cancel a goal to stop it");
+  if (given.size() > kMostPoints)
+    return fail(fmt::format("a goal of {} points is too long", given.size()), "points",
+                fmt::format("send {} at most", kMostPoints));
+  std::vector<TimedPoint> points;
+  double before_s = 0;
+  for (const Point& each : given) {
+    auto point = point_from(each, points.size(), joints);
+    if (!point) return std::unexpected(point.error());
+    if (point->time_s > before_s) point->time_s = std::max(point->time_s, before_s + motion::kShortestLeg_s);
+    before_s = point->time_s;
+    points.push_back(*std::move(point));
+  }
+  if (points.size() <= skills::kMostTrajectoryPoints) return points;
+  auto few = motion::thinned(points, motion::Shape::kBetween, kThinned_rad, skills::kMostTrajectoryPoints);
+  if (few) return few;
+  return fail(fmt::format("{} are more than {}, and thinned they cannot be: {}", points.size(),
+                          skills::kMostTrajectoryPoints, few.error().line()),
+              "points");
+}
+
+Json json_from(const TimedPoint& point) {
+  Json json{{"positions", std::vector<double>(point.position.begin(), point.position.end())}, {"time_s", point.time_s}};
+  if (point.speed) json["velocities"] = std::vector<double>(point.speed->begin(), point.speed->end());
   return json;
+}
+
+// As ros2_control understands them.
+Expected<double> time_tolerance_from(const wire::builtin_interfaces::msg::Duration& given, double duration_s) {
+  const double asked_s = given.sec + 1e-9 * given.nanosec;
+  if (asked_s == 0) return std::min(kLater_s + kLaterShare * duration_s, skills::kLongestWay_s);
+  if (asked_s == kErased_s) return skills::kLongestWay_s;
+  if (asked_s > 0) return std::min(asked_s, skills::kLongestWay_s);
+  return fail(fmt::format("{} s is no time", asked_s), "goal_time_tolerance",
+              "leave it 0 for the default, or give -1 for as long as it takes");
 }
 
 // The smallest that is given, for the skill has one for all joints: nothing passes that a client would not have passed.
@@ -122,17 +176,13 @@ Expected<Json> arguments_from(const Goal& goal, const std::vector<std::string>& 
     return fail("these are not the arm's joints", "joint_names",
                 fmt::format("name each of {} once", fmt::join(joints, ", ")));
   if (auto known = check_known(goal); !known) return std::unexpected(known.error());
-  if (goal.trajectory.points.empty())
-    return fail("a goal without points moves nothing", "points", "cancel a goal to stop it");
-  if (goal.trajectory.points.size() > skills::kMostTrajectoryPoints)
-    return fail(fmt::format("a goal of {} points is too long", goal.trajectory.points.size()), "points",
-                fmt::format("send {} at most", skills::kMostTrajectoryPoints));
-  Json arguments{{"joints", goal.trajectory.joint_names}, {"points", Json::array()}};
-  for (const Point& point : goal.trajectory.points) {
-    auto read = point_from(point, arguments["points"].size());
-    if (!read) return read;
-    arguments["points"].push_back(*std::move(read));
-  }
+  const auto points = points_from(goal.trajectory.points, joints.size());
+  if (!points) return std::unexpected(points.error());
+  const auto later_s = time_tolerance_from(goal.goal_time_tolerance, points->back().time_s);
+  if (!later_s) return std::unexpected(later_s.error());
+  Json arguments{
+      {"joints", goal.trajectory.joint_names}, {"points", Json::array()}, {skills::kTimeTolerance, *later_s}};
+  for (const TimedPoint& point : *points) arguments["points"].push_back(json_from(point));
   const auto on_path = tolerance_from(goal.path_tolerance, "path_tolerance", joints);
   if (!on_path) return std::unexpected(on_path.error());
   const auto at_goal = tolerance_from(goal.goal_tolerance, "goal_tolerance", joints);
@@ -165,15 +215,25 @@ void RosTrajectories::begin(const GoalId& id, const Goal& asked) {
                          taken(id, joints);
                        },
                    .refused = [this, id](const std::string& why) { refuse(id, Result::INVALID_GOAL, why); },
-                   .happened = {},
+                   .happened = [this, id](const Json& event) { happened(id, event); },
                    .ended = [this, id](const TaskEnd& end) { ended(id, end); }});
 }
 
+void RosTrajectories::happened(const GoalId& id, const Json& event) {
+  const auto going = std::ranges::find(going_, id, &Going::id);
+  if (going == going_.end() || event.at("kind") != "plan") return;
+  going->longer_s = event.at("detail").value("longer_s", 0.0);
+}
+
 void RosTrajectories::ended(const GoalId& id, const TaskEnd& end) {
+  const auto going = std::ranges::find(going_, id, &Going::id);
+  const double longer_s = going == going_.end() ? 0 : going->longer_s;
   std::erase_if(going_, [&](const Going& each) { return each.id == id; });
   const std::int8_t status = status_of(end, goals_->status(id));
-  const bool failed = status == GoalStatus::STATUS_ABORTED;
-  goals_->end(id, status, {failed ? code_of(end.reason) : Result::SUCCESSFUL, end.reason});
+  Result result{status == GoalStatus::STATUS_ABORTED ? code_of(end.reason) : Result::SUCCESSFUL, end.reason};
+  if (status == GoalStatus::STATUS_SUCCEEDED && longer_s > 0)
+    result.error_string = fmt::format("took {:.3f} s longer than asked, as the arm's limits are", longer_s);
+  goals_->end(id, status, std::move(result));
 }
 
 // A goal that is rejected hears no reason.
@@ -184,7 +244,7 @@ void RosTrajectories::refuse(const GoalId& id, std::int32_t code, const std::str
 
 void RosTrajectories::taken(const GoalId& id, const std::vector<std::string>& joints) {
   for (const Going& before : going_) (void)followed_.cancel(before.id, "another goal came");
-  going_.emplace_back(id, joints);
+  going_.push_back({.id = id, .joints = joints});
   if (!std::exchange(looks_, true)) look();
 }
 

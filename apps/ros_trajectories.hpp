@@ -32,6 +32,7 @@ class RosTrajectories {
   using GoalId = gate::ros::GoalId;
   void begin(const GoalId& id, const FollowJointTrajectory::Goal& asked);
   void taken(const GoalId& id, const std::vector<std::string>& joints);
+  void happened(const GoalId& id, const gate::Json& event);
   void ended(const GoalId& id, const TaskEnd& end);
   void refuse(const GoalId& id, std::int32_t code, const std::string& why);
   // Once in a while, as long as a goal goes on: tells its client how the arm follows.
@@ -42,6 +43,7 @@ class RosTrajectories {
   struct Going {
     GoalId id{};
     std::vector<std::string> joints;
+    double longer_s = 0;  // than it asks for
   };
 
   gate::ros::Gate& gate_;
@@ -52,8 +54,9 @@ class RosTrajectories {
   bool looks_ = false;
 };
 
-// The skill's arguments. Errors by `where`: joint_names where these are not the arm's; else whatever the skill has no
-// word for.
+// The skill's arguments: of more points than it takes, fewer that lead past all of them; and by how much later than
+// asked it may end, where the limits ask for it. Errors by `where`: joint_names where these are not the arm's; else
+// whatever the skill has no word for.
 [[nodiscard]] Expected<task::Json> arguments_from(const RosTrajectories::FollowJointTrajectory::Goal& goal,
                                                   const std::vector<std::string>& joints);
 

@@ -15,6 +15,7 @@
 #include "pons/gate/ros/action.hpp"
 #include "pons/gate/ros/node.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
+#include "pons/motion/test_plans.hpp"
 #include "pons/wire/types/control_msgs/action/follow_joint_trajectory.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
 #include "pons/wire/types/std_msgs/msg/float64_multi_array.hpp"
@@ -72,6 +73,28 @@ class RosArm : public ::testing::Test {
       point.time_from_start.sec = static_cast<std::int32_t>(time_s);
       point.time_from_start.nanosec = static_cast<std::uint32_t>((time_s - std::floor(time_s)) * 1e9);
     }
+    return goal;
+  }
+  // Round and round from where the arm is, with this share of what MoveIt takes for its limits.
+  [[nodiscard]] motion::SampledPlan plan(int sides, double share, double last_s) const {
+    AxisVector one(7), other(7);
+    one << 0.5, -0.2, 0.3, 0.2, 0.4, -0.2, 0.9;
+    other << 0.3, -0.1, -0.3, 0.2, -0.5, 0.1, -0.6;
+    const AxisVector from = AxisVector::Map(state_.position.data(), 7);
+    return motion::plan_that_ends_after(last_s, motion::laps(from, one, other, sides),
+                                        AxisVector::Constant(7, 2 * share), AxisVector::Constant(7, 1.875 * share));
+  }
+  [[nodiscard]] Goal asked(const motion::SampledPlan& plan) const {
+    Goal goal;
+    goal.trajectory.joint_names = state_.name;
+    for (const motion::TimedPoint& each : plan.points()) {
+      auto& point = goal.trajectory.points.emplace_back();
+      point.positions = {each.position.begin(), each.position.end()};
+      point.velocities = {each.speed->begin(), each.speed->end()};
+      point.time_from_start.sec = static_cast<std::int32_t>(each.time_s);
+      point.time_from_start.nanosec = static_cast<std::uint32_t>(1e9 * (each.time_s - std::floor(each.time_s)));
+    }
+    for (const std::string& joint : state_.name) goal.path_tolerance.push_back({.name = joint, .position = 0.05});
     return goal;
   }
   // What becomes of the goals sent, in the order of sending.
@@ -134,6 +157,40 @@ TEST_F(RosArm, FollowsWhatMoveItSends) {
   end_run();
 }
 
+// Accelerations step, and the last interval is of milliseconds.
+TEST_F(RosArm, FollowsWhatMoveItPlansAlmostInItsTime) {
+  for (const double last_s : {0.0005, 0.010}) {
+    const motion::SampledPlan planned = plan(2, 0.5, last_s);
+    const Sent& sent = send(asked(planned));
+    const Ended end = end_of(sent);
+    ASSERT_EQ(end.status, GoalStatus::STATUS_SUCCEEDED) << end.result.error_string;
+    EXPECT_EQ(end.result.error_code, Result::SUCCESSFUL);
+    EXPECT_THAT(end.result.error_string, testing::MatchesRegex("took 0\\.0[0-9]+ s longer than asked.*"));
+    for (const auto& told : sent.feedback) {
+      const AxisVector desired = AxisVector::Map(told.desired.positions.data(), 7);
+      double beside = 10;
+      for (double t = 0; t <= planned.duration_s(); t += 0.001)
+        beside = std::min(beside, (planned.at(t).position - desired).cwiseAbs().maxCoeff());
+      EXPECT_LT(beside, 0.005);
+    }
+    const double there = planned.points().back().position[0];
+    ASSERT_TRUE(spun([&] { return std::abs(turned_.back() - there) < 0.005; })) << turned_.back() - there;
+  }
+  end_run();
+}
+
+TEST_F(RosArm, TakesAPlanOfAMinute) {
+  const double before = turned_.back();
+  const Goal goal = asked(plan(20, 0.1, 0.050));
+  ASSERT_GT(goal.trajectory.points.size(), 600U);
+  const Sent& sent = send(goal);
+  ASSERT_TRUE(spun([&] { return sent.end || turned_.back() > before + 0.05; }));
+  ASSERT_TRUE(asks_->cancel(sent.id));
+  const Ended end = end_of(sent);
+  EXPECT_EQ(end.status, GoalStatus::STATUS_CANCELED) << end.result.error_string;
+  end_run();
+}
+
 TEST_F(RosArm, WhatCannotBeIsAbortedByName) {
   struct Wrong {
     std::function<void(Goal&)> make;
@@ -155,6 +212,14 @@ TEST_F(RosArm, WhatCannotBeIsAbortedByName) {
       {[](Goal& g) { g.path_tolerance = {{.name = "joint1", .velocity = 1}}; }, Result::INVALID_GOAL, "only positions"},
       {[](Goal& g) { g.trajectory.points[1].time_from_start = {0, 1'000'000}; }, Result::INVALID_GOAL, "point 2: "},
       {[](Goal& g) { g.trajectory.points[1].positions.back() = 9; }, Result::INVALID_GOAL, "outside its limits"},
+      {[](Goal& g) { g.trajectory.points.resize(3001, g.trajectory.points[0]); }, Result::INVALID_GOAL, "3000 at most"},
+      {[](Goal& g) { g.goal_time_tolerance.sec = -2; }, Result::INVALID_GOAL, "goal_time_tolerance: -2 s is no time"},
+      {[](Goal& g) {
+         g.trajectory.points[1].positions.back() += 0.8;
+         g.trajectory.points[1].time_from_start = {1, 200'000'000};
+         g.goal_time_tolerance.nanosec = 50'000'000;
+       },
+       Result::INVALID_GOAL, "s more, of which 0.05 s are allowed"},
       {[](Goal& g) {
          g.trajectory.points[0].time_from_start = {};
          g.trajectory.points[0].positions[2] += 0.3;
