@@ -23,7 +23,7 @@ Expected<RunAlong> RunAlong::begin(const RecordOptions& options, const FoxgloveO
   if (!options.on()) return along;
   auto notes = notes_of(facts, world);
   if (!notes) return std::unexpected(notes.error());
-  auto recorder = RunRecorder::open(options, earlier, facts.pace, *std::move(notes));
+  auto recorder = RunRecorder::open(options, earlier, facts.pace, bytes_of(facts.keep_free_mib), *std::move(notes));
   if (!recorder) return std::unexpected(recorder.error());
   along.recorder_ = *std::move(recorder);
   return along;

@@ -20,6 +20,7 @@ constexpr std::string_view kEnding = ".mcap";
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20U;
 constexpr std::uint64_t kFilesOfQuota = 8;
 constexpr std::size_t kQueueBytes = std::size_t{32} << 20U;
+constexpr std::uint64_t kKeptFree = 2;  // times what the journal keeps: it goes on when the recording has stopped
 constexpr Duration kLooksEvery = std::chrono::seconds(1);
 constexpr std::size_t kAllKept = 1000;  // where a publisher keeps all, for players
 
@@ -43,7 +44,8 @@ record::Topic topic_of(const ShownTopic& shown, std::string name) {
   return topic;
 }
 
-Expected<record::RecorderOptions> recorder_options(const RecordOptions& options, runner::Pace pace) {
+Expected<record::RecorderOptions> recorder_options(const RecordOptions& options, runner::Pace pace,
+                                                   std::uint64_t keep_free) {
   const std::string where = "--record " + options.file.string();
   if (options.file.extension() != kEnding || options.file.stem().empty())
     return fail("is no name of a recording", where, "let it end with .mcap");
@@ -59,6 +61,7 @@ Expected<record::RecorderOptions> recorder_options(const RecordOptions& options,
   if (made.quota_bytes && *made.quota_bytes / 2 < made.file_bytes)
     return fail("is less than two files take", fmt::format("--record-quota {}", options.quota_mib),
                 fmt::format("ask for {} at least", 2 * made.file_bytes / kMiB));
+  made.keep_free_bytes = kKeptFree * keep_free;
   made.writer.compression = mcap::Compression::kZstd;
   // The disk decides nothing in virtual time, nor does the loss of power matter much to it.
   if (pace == runner::Pace::kRealTime) made.writer.sync_every = std::chrono::seconds(1);
@@ -85,8 +88,9 @@ void add_record_options(CLI::App& command, RecordOptions& options) {
 Expected<std::string> recorded_name(std::string_view topic) { return gate::ros::expanded(topic, {"/", "pons"}, {}); }
 
 Expected<std::unique_ptr<RunRecorder>> RunRecorder::open(const RecordOptions& options, Earlier earlier,
-                                                         runner::Pace pace, std::vector<mcap::Metadata> notes) {
-  auto made = recorder_options(options, pace);
+                                                         runner::Pace pace, std::uint64_t keep_free,
+                                                         std::vector<mcap::Metadata> notes) {
+  auto made = recorder_options(options, pace, keep_free);
   if (!made) return std::unexpected(made.error());
   made->notes = std::move(notes);
   if (earlier == Earlier::kRefused) {

@@ -38,10 +38,11 @@ enum class Earlier : std::uint8_t { kRefused, kFollowed };
 
 class RunRecorder final : public Sink {
  public:
-  // `notes` stand at the beginning of each file. Errors: no name of a recording; one that is there; the quota is too
-  // small; those of the recorder.
+  // `keep_free`: bytes that the journal keeps free on its disk; twice as much is left on the recording's, which may be
+  // the same. `notes` stand at the beginning of each file. Errors: no name of a recording; one that is there; the quota
+  // is too small; those of the recorder.
   [[nodiscard]] static Expected<std::unique_ptr<RunRecorder>> open(const RecordOptions& options, Earlier earlier,
-                                                                   runner::Pace pace,
+                                                                   runner::Pace pace, std::uint64_t keep_free,
                                                                    std::vector<record::mcap::Metadata> notes);
   // Finishes the file.
   ~RunRecorder() override;

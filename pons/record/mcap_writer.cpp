@@ -1,6 +1,7 @@
 #include "pons/record/mcap_writer.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -27,7 +28,10 @@ Expected<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::
   auto file = OutputFile::create(path);
   if (!file) return std::unexpected(file.error());
   std::unique_ptr<McapWriter> writer(new McapWriter(std::move(*file), options));
-  if (auto begun = writer->begin(); !begun) return std::unexpected(begun.error());
+  if (auto begun = writer->begin(); !begun) {
+    ::unlink(path.c_str());
+    return std::unexpected(begun.error());
+  }
   return writer;
 }
 

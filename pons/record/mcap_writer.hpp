@@ -38,7 +38,7 @@ struct WriterOptions {
 
 class McapWriter {
  public:
-  // A new file. Errors: those of OutputFile::create and append.
+  // A new file. Errors: those of OutputFile::create and append; nothing is left of it then.
   [[nodiscard]] static Expected<std::unique_ptr<McapWriter>> create(const std::filesystem::path& path,
                                                                     const WriterOptions& options);
   // Finishes it, if that was not tried yet; what goes wrong then, nobody hears.
@@ -65,6 +65,8 @@ class McapWriter {
   // make a whole file of what is there.
   [[nodiscard]] Expected<void> finish();
 
+  // The file holds neither messages nor attachments, those of the chunk that is being filled left out.
+  [[nodiscard]] bool empty() const { return statistics_.messages == 0 && statistics_.attachments == 0; }
   [[nodiscard]] std::uint64_t bytes() const { return file_.size(); }  // of the file, as it is now
   // At most so long will it be if it is finished now, or, if another message of `size` bytes is written, after that
   // one.

@@ -1,9 +1,11 @@
 #include "pons/record/recorder.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 namespace pons::record {
@@ -16,9 +18,17 @@ constexpr std::size_t kLeastQueue = 4096;
 
 constexpr std::size_t kCountInWords = 4 + 4 + 20;  // of a topic's drops, beside its name
 
+constexpr Timestamp kLooksAtDiskEvery = 1'000'000'000;
+
 constexpr std::size_t aligned(std::size_t size) { return (size + 7) / 8 * 8; }
 
 }  // namespace
+
+std::optional<std::uint64_t> free_bytes_of_disk(const std::filesystem::path& folder) {
+  std::error_code unknown;
+  const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
+  return unknown ? std::nullopt : std::optional<std::uint64_t>(space.available);
+}
 
 Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {
   const std::string name = options.name;
@@ -29,7 +39,10 @@ Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {
   auto rotation = Rotation::open(options.folder, name, options.first);
   if (!rotation) return std::unexpected(rotation.error());
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(*rotation)));
-  if (auto begun = recorder->begin_file(0); !begun) return std::unexpected(begun.error());
+  if (auto begun = recorder->begin_file(0); !begun) {
+    recorder->failed(begun.error(), 0);
+    return std::unexpected(begun.error());
+  }
   return recorder;
 }
 
@@ -207,6 +220,10 @@ void Recorder::write_half(Half& half) {
 }
 
 void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
+  if (writer_ && item.log_time >= looks_at_disk_at_) {
+    if (auto left = leave_room(); !left) failed(left.error(), item.log_time);
+    looks_at_disk_at_ = item.log_time + kLooksAtDiskEvery;
+  }
   if (!writer_) {
     if (retry_at_ && item.log_time < *retry_at_) return lose(item.topic, 1);
     if (auto begun = begin_file(item.log_time); !begun) {
@@ -234,21 +251,39 @@ Expected<void> Recorder::begin_file(Timestamp now) {
     auto room = rotation_.make_room(options_.file_bytes, *options_.quota_bytes);
     if (!room) return room;
   }
+  if (auto left = leave_room(); !left) return left;
   auto writer = McapWriter::create(rotation_.next_path(), options_.writer);
   if (!writer) return std::unexpected(writer.error());
-  for (const mcap::Metadata& each : options_.notes) {
-    if (auto noted = (*writer)->note(each); !noted) return noted;
-  }
   writer_ = std::move(*writer);
+  {
+    const std::scoped_lock lock(mutex_);
+    ++status_.files;
+    status_.file = writer_->path();
+  }
   schemas_.clear();
   in_file_.assign(known_.size(), {});
   retry_at_.reset();
+  for (const mcap::Metadata& each : options_.notes) {
+    if (auto noted = writer_->note(each); !noted) return noted;
+  }
   if (auto repeated = repeat_latched(now); !repeated) return repeated;
   const std::scoped_lock lock(mutex_);
-  ++status_.files;
-  status_.file = writer_->path();
   status_.failing = false;
   return {};
+}
+
+// Whoever else writes on the disk, as a journal does without which no robot works, needs its room more.
+Expected<void> Recorder::leave_room() {
+  if (options_.keep_free_bytes == 0) return {};
+  while (true) {
+    const auto free = options_.free_bytes(rotation_.folder());
+    if (!free || *free >= options_.keep_free_bytes) return {};
+    if (!options_.quota_bytes || rotation_.empty())
+      return fail(fmt::format("its disk has {} MiB free, and {} MiB are left to others", *free >> 20U,
+                              options_.keep_free_bytes >> 20U),
+                  rotation_.folder().string(), "free some space, or choose a path on another disk");
+    if (auto removed = rotation_.remove_oldest(); !removed) return removed;
+  }
 }
 
 Expected<void> Recorder::repeat_latched(Timestamp now) {
@@ -306,7 +341,7 @@ Expected<void> Recorder::tell_drops() {
   return writer_->note(metadata);
 }
 
-void Recorder::end_file() {
+void Recorder::end_file(Empty empty) {
   if (!writer_) return;
   auto ended = tell_drops();
   auto finished = writer_->finish();
@@ -319,16 +354,22 @@ void Recorder::end_file() {
     const auto& [channel, handed, repeated] = in_file_[i];
     if (handed + repeated > held) lose(static_cast<TopicId>(i), std::min(handed, handed + repeated - held));
   }
-  if (ended) told_before_ = told_;
-  rotation_.add(writer_->path(), writer_->bytes());
+  const bool removed = empty == Empty::kRemoved && writer_->empty();
+  if (removed) {
+    ::unlink(writer_->path().c_str());
+  } else {
+    if (ended) told_before_ = told_;
+    rotation_.add(writer_->path(), writer_->bytes());
+  }
   writer_.reset();
   const std::scoped_lock lock(mutex_);
+  if (removed) --status_.files;
   status_.bytes = rotation_.bytes();
   if (!ended) status_.error = ended.error();
 }
 
 void Recorder::failed(const Error& error, Timestamp now) {
-  end_file();
+  end_file(Empty::kRemoved);
   retry_at_ = now + static_cast<Timestamp>(options_.retry_after.count());
   const std::scoped_lock lock(mutex_);
   status_.error = error;

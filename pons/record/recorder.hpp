@@ -13,6 +13,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -34,6 +35,9 @@ namespace pons::record {
 // The metadata with which a file says what it lacks: a topic, and how many of its messages. The last in a file counts.
 inline constexpr std::string_view kDropsName = "pons.drops";
 
+// What the disk of a folder has free; nothing: it does not say.
+[[nodiscard]] std::optional<std::uint64_t> free_bytes_of_disk(const std::filesystem::path& folder);
+
 struct RecorderOptions {
   std::filesystem::path folder;
   std::string name;                                  // of NAME_0.mcap, NAME_1.mcap, …
@@ -41,7 +45,11 @@ struct RecorderOptions {
   std::size_t queue_bytes = std::size_t{64} << 20U;  // taken at once; half of it fills while the other half is written
   std::uint64_t file_bytes = std::uint64_t{1} << 30U;  // at most, but for a single message that is longer
   std::optional<std::uint64_t> quota_bytes;            // of all files of that name; the oldest are removed
-  Duration retry_after = std::chrono::seconds(10);     // log time from an error to the next try, with a new file
+  // So much of the disk is left to others: what would take more of it is not written, as if the disk were full; with a
+  // quota the oldest files go first.
+  std::uint64_t keep_free_bytes = 0;
+  std::function<std::optional<std::uint64_t>(const std::filesystem::path& folder)> free_bytes = &free_bytes_of_disk;
+  Duration retry_after = std::chrono::seconds(10);  // log time from an error to the next try, with a new file
   WriterOptions writer;
   std::vector<mcap::Metadata> notes;  // at the beginning of each file
 };
@@ -91,7 +99,7 @@ struct RecorderStatus {
 class Recorder {
  public:
   // Errors: those of Rotation::open and McapWriter::create; the quota is less than two files', the queue less than 4
-  // KiB.
+  // KiB; the disk has less free than is to be left.
   [[nodiscard]] static Expected<std::unique_ptr<Recorder>> open(RecorderOptions options);
   // After close(), and when work() has returned: what is queued would be lost.
   ~Recorder();
@@ -170,6 +178,7 @@ class Recorder {
   void write_half(Half& half);
   void write_one(const Item& item, std::span<const std::byte> data);
   [[nodiscard]] Expected<void> begin_file(mcap::Timestamp now);
+  [[nodiscard]] Expected<void> leave_room();
   [[nodiscard]] Expected<void> repeat_latched(mcap::Timestamp now);
   void write_attachment(const mcap::Attachment& attachment);
   void write_note(const mcap::Metadata& metadata, mcap::Timestamp now);
@@ -177,7 +186,8 @@ class Recorder {
   [[nodiscard]] bool is_full(std::size_t size) const;
   [[nodiscard]] Expected<std::uint16_t> channel_of(TopicId topic);
   [[nodiscard]] Expected<void> tell_drops();
-  void end_file();
+  enum class Empty : std::uint8_t { kKept, kRemoved };
+  void end_file(Empty empty = Empty::kKept);
   void failed(const Error& error, mcap::Timestamp now);
   void lose(TopicId topic, std::uint64_t count);
 
@@ -209,6 +219,7 @@ class Recorder {
   std::vector<std::uint64_t> told_before_;  // drops that earlier files tell of, by TopicId
   std::vector<std::uint64_t> told_;         // and with this one
   std::optional<mcap::Timestamp> retry_at_;
+  mcap::Timestamp looks_at_disk_at_ = 0;
 };
 
 }  // namespace pons::record

@@ -331,6 +331,123 @@ TEST_F(RecorderTest, AFullDiskIsSaidCountedAndLeavesAFileThatCanBeRead) {
   EXPECT_EQ(last_drops(files()[1]), (mcap::Texts{{"/a", std::to_string(status.topics.at(a).dropped)}}));
 }
 
+// A file that holds nothing is none: a disk that stays full is tried again and again.
+TEST_F(RecorderTest, WhatCannotBeBegunLeavesNoFile) {
+  RecorderOptions told = options();
+  told.notes = {{"pons.run", {{"world", "parcel_cell"}, {"manifest", std::string(500, 'x')}}}};
+  told.writer.chunk_bytes = 2000;
+  auto recorder = Recorder::open(told);
+  ASSERT_TRUE(recorder);
+  Topic standing = plain("/standing");
+  standing.latched = true;
+  const auto said = (*recorder)->add_topic(standing), a = (*recorder)->add_topic(plain("/a"));
+  const auto record = [&](TopicId topic, mcap::Timestamp at) {
+    ASSERT_TRUE((*recorder)->record(topic, at, at, bytes_of(std::string(500, 'x'))));
+    EXPECT_TRUE((*recorder)->work_off());
+  };
+  record(said, 0);
+  {
+    const FullDisk full(9000);
+    while (!(*recorder)->status().failing) record(a, 0);
+  }
+  mcap::Timestamp now = 0;
+  // No room for the first bytes, for the notes behind them, for the first chunk behind those.
+  for (const rlim_t room : {10U, 200U, 1500U}) {
+    const FullDisk full(room);
+    for (int i = 0; i < 12; ++i) record(a, now += kSecond);
+    EXPECT_TRUE((*recorder)->status().failing);
+    EXPECT_THAT(files(), SizeIs(1)) << room;
+    EXPECT_EQ((*recorder)->status().files, 1U);
+    told.name = "other";
+    EXPECT_EQ(Recorder::open(told).has_value(), room == 1500);
+    EXPECT_EQ(std::filesystem::exists(folder_ / "other_0.mcap"), room == 1500);
+  }
+  record(a, now + 10 * kSecond);
+  EXPECT_FALSE((*recorder)->status().failing);
+  finish(**recorder);
+  ASSERT_THAT(files(), SizeIs(2));
+  EXPECT_EQ(all_kept().size() + (*recorder)->status().topics.at(a).dropped,
+            (*recorder)->status().topics.at(a).offered + 2)
+      << "what stands is in both";
+}
+
+// What a disk has free is as the test says.
+class ScarceDisk : public RecorderTest {
+ protected:
+  void open(RecorderOptions told) {
+    told.keep_free_bytes = 1000;
+    told.free_bytes = [this](const std::filesystem::path& folder) {
+      EXPECT_EQ(folder, folder_.path());
+      ++looks_;
+      return free_();
+    };
+    auto opened = Recorder::open(std::move(told));
+    ASSERT_TRUE(opened) << opened.error().line();
+    recorder_ = std::move(*opened);
+    topic_ = recorder_->add_topic(plain("/a"));
+  }
+  void record(mcap::Timestamp at) {
+    ASSERT_TRUE(recorder_->record(topic_, at, at, bytes_of(std::string(500, 'x'))));
+    EXPECT_TRUE(recorder_->work_off());
+  }
+
+  std::function<std::optional<std::uint64_t>()> free_ = [] { return 1000; };
+  int looks_ = 0;
+  std::unique_ptr<Recorder> recorder_;
+  TopicId topic_ = 0;
+};
+
+TEST_F(ScarceDisk, IsLeftToOthersAndTheDropsAreCounted) {
+  open(options());
+  for (int i = 0; i < 10; ++i) record(kSecond);
+  EXPECT_EQ(looks_, 2) << "when the file was begun, and then once a second";
+  free_ = [] { return 999; };
+  record(2 * kSecond - 1);
+  EXPECT_FALSE(recorder_->status().failing);
+  record(2 * kSecond);
+  ASSERT_TRUE(recorder_->status().failing);
+  EXPECT_THAT(recorder_->status().error->line(), HasSubstr("its disk has 0 MiB free, and 0 MiB are left to others"));
+  record(12 * kSecond);
+  EXPECT_TRUE(recorder_->status().failing) << "it was tried again";
+  EXPECT_EQ(recorder_->status().topics.at(topic_).dropped, 2U);
+  free_ = [] { return std::nullopt; };
+  record(22 * kSecond);
+  EXPECT_FALSE(recorder_->status().failing) << "nobody knows, and it is tried";
+  finish(*recorder_);
+  ASSERT_THAT(files(), SizeIs(2));
+  EXPECT_THAT(all_kept(), SizeIs(12));
+  EXPECT_EQ(last_drops(files()[1]), (mcap::Texts{{"/a", "2"}}));
+}
+
+TEST_F(ScarceDisk, WithAQuotaTheOldestFilesGo) {
+  RecorderOptions told = options();
+  told.file_bytes = 10'000;
+  told.quota_bytes = 100'000;
+  open(told);
+  for (int i = 0; i < 50; ++i) record(1);
+  ASSERT_GT(files().size(), 3U);
+  const auto before = files().size();
+  free_ = [this, before] { return files().size() + 2 > before ? 0 : 1000; };
+  record(2 * kSecond);
+  EXPECT_THAT(files(), SizeIs(before - 2));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run_1.mcap"));
+  EXPECT_FALSE(recorder_->status().failing);
+  EXPECT_EQ(recorder_->status().removed, 2U);
+  EXPECT_EQ(recorder_->status().topics.at(topic_).dropped, 0U);
+  free_ = [] { return 0; };
+  record(4 * kSecond);
+  EXPECT_TRUE(recorder_->status().failing) << "of itself nothing is left to be removed";
+  finish(*recorder_);
+}
+
+TEST_F(ScarceDisk, NoneIsBegunThere) {
+  RecorderOptions told = options();
+  told.keep_free_bytes = std::uint64_t{3} << 20U;
+  told.free_bytes = [](const std::filesystem::path&) { return std::uint64_t{2} << 20U; };
+  EXPECT_THAT(Recorder::open(told).error().line(), HasSubstr("its disk has 2 MiB free, and 3 MiB are left to others"));
+  EXPECT_THAT(files(), testing::IsEmpty());
+}
+
 TEST_F(RecorderTest, WhatCannotBeIsRefusedByName) {
   RecorderOptions told = options();
   told.folder = folder_ / "no";

@@ -68,12 +68,17 @@ void Rotation::add(const fs::path& path, std::uint64_t bytes) {
 
 Expected<void> Rotation::make_room(std::uint64_t needed, std::uint64_t quota) {
   while (!files_.empty() && bytes_ + needed > quota) {
-    const File& oldest = files_.front();
-    if (::unlink(oldest.path.c_str()) != 0 && errno != ENOENT) return cannot("remove the file", oldest.path, errno);
-    bytes_ -= oldest.bytes;
-    files_.pop_front();
-    ++removed_;
+    if (auto removed = remove_oldest(); !removed) return removed;
   }
+  return {};
+}
+
+Expected<void> Rotation::remove_oldest() {
+  const File& oldest = files_.front();
+  if (::unlink(oldest.path.c_str()) != 0 && errno != ENOENT) return cannot("remove the file", oldest.path, errno);
+  bytes_ -= oldest.bytes;
+  files_.pop_front();
+  ++removed_;
   return {};
 }
 

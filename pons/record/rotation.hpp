@@ -28,7 +28,10 @@ class Rotation {
   void add(const std::filesystem::path& path, std::uint64_t bytes);
   // Removes the oldest until they and `needed` bytes more take no more than `quota`. Errors: one cannot be removed.
   [[nodiscard]] Expected<void> make_room(std::uint64_t needed, std::uint64_t quota);
+  // Of those that there are, for it must not be empty(). Errors: it cannot be removed.
+  [[nodiscard]] Expected<void> remove_oldest();
 
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] bool empty() const { return files_.empty(); }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t removed() const { return removed_; }  // files

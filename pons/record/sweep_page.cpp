@@ -147,9 +147,8 @@ struct Reason {
 Json reasons(const Sum& all) {
   std::vector<Reason> found;
   for (const auto& [text, counts] : all.parcels.exceptions.reasons) found.push_back({text, counts});
-  std::ranges::sort(found, [](const Reason& a, const Reason& b) {
-    return a.all() != b.all() ? a.all() > b.all() : a.text < b.text;
-  });
+  std::ranges::sort(
+      found, [](const Reason& a, const Reason& b) { return a.all() != b.all() ? a.all() > b.all() : a.text < b.text; });
   if (found.size() > kReasons) {
     Reason others{fmt::format("{} others", found.size() - kReasons + 1), {}};
     for (std::size_t i = kReasons - 1; i < found.size(); ++i) {

@@ -60,6 +60,14 @@ TEST_F(Recording, WhatCannotBeRecordedIsRefusedByName) {
   expect_run_refused({"--record", file("closed/a.mcap")}, {"closed/a.mcap: cannot create the file"});
 }
 
+// Twice of what the journal keeps.
+TEST_F(Recording, ADiskWithLittleRoomIsLeftToTheJournal) {
+  if (fs::space(folder_.path()).available >= std::uintmax_t{2'000'000} << 20U) GTEST_SKIP() << "it has more room";
+  expect_run_refused({"--record", file("a.mcap"), "--keep-free", "1000000"},
+                     {folder_.path().string() + ": its disk has ", " MiB free, and 2000000 MiB are left to others"});
+  EXPECT_FALSE(fs::exists(folder_ / "a.mcap"));
+}
+
 // Nothing is left of a recording whose run could not begin.
 TEST_F(Recording, ARunThatIsRefusedLeavesNone) {
   const std::vector<std::string> words{"--journal", file("j.db")};

@@ -64,7 +64,7 @@ class ComparisonTest : public testing::Test {
   // A file of it; `file_mib`: see RecordOptions.
   std::filesystem::path recorded(const Course& run) {
     const auto file = folder_ / fmt::format("{}.mcap", ++files_);
-    auto recorder = RunRecorder::open({.file = file}, Earlier::kRefused, runner::Pace::kLockstep, {});
+    auto recorder = RunRecorder::open({.file = file}, Earlier::kRefused, runner::Pace::kLockstep, 0, {});
     EXPECT_TRUE(recorder) << recorder.error().line();
     run.show(**recorder);
     (*recorder)->end("complete", Time(kPeriod * run.periods));
@@ -185,7 +185,7 @@ TEST_F(ComparisonTest, FieldsOfFieldsHaveTheirWholeWay) {
 TEST_F(ComparisonTest, ALogTimeNeverGoesBack) {
   const auto file = folder_ / "follows.mcap";
   {
-    auto recorder = RunRecorder::open({.file = file}, Earlier::kRefused, runner::Pace::kLockstep, {});
+    auto recorder = RunRecorder::open({.file = file}, Earlier::kRefused, runner::Pace::kLockstep, 0, {});
     ASSERT_TRUE(recorder);
     Course{.periods = 3}.show(**recorder);
     Course{.periods = 1}.show(**recorder);
