@@ -124,12 +124,13 @@ Expected<std::size_t> RunRecorder::add(const ShownTopic& topic) {
   }
   const record::TopicId id = recorder_->add_topic(topic_of(topic, *name));
   topics_.emplace(*std::move(name), Known{type, id});
+  ahead_.push_back(topic.is_ahead());
   return id;
 }
 
 void RunRecorder::put(std::size_t topic, Time now, std::span<const std::byte> message) {
   if (topic == kNotRecorded) return;
-  latest_ = std::max(latest_, now);
+  if (!ahead_[topic]) latest_ = std::max(latest_, now);
   (void)recorder_->record(static_cast<record::TopicId>(topic), stamp(latest_), stamp(now), message);
   if (pace_ == runner::Pace::kLockstep) (void)recorder_->work_off();
 }

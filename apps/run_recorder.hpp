@@ -52,7 +52,7 @@ class RunRecorder final : public Sink {
   [[nodiscard]] Expected<std::size_t> add(const ShownTopic& topic) override;
   [[nodiscard]] bool wants(std::size_t topic) const override { return topic != kNotRecorded; }
   // What comes with a time before that of an earlier message, as from a bridge that follows another, is logged with
-  // that one's; its own is its publish time.
+  // that one's, and so is what is made ahead of its time; its own is its publish time.
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
 
   [[nodiscard]] std::string_view name() const override { return "recording"; }
@@ -84,6 +84,7 @@ class RunRecorder final : public Sink {
   std::filesystem::path file_;
   runner::Pace pace_;
   std::map<std::string, Known> topics_;  // by name
+  std::vector<bool> ahead_;              // by TopicId
   Time latest_;
   std::optional<Time> interrupted_;
   Time looks_at_;         // when it is next asked how the recorder fares

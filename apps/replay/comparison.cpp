@@ -83,13 +83,12 @@ Expected<std::size_t> Comparison::add(const ShownTopic& topic) {
   if (!name) return std::unexpected(name.error());
   const auto known = std::ranges::find(topics_, *name, &Topic::name);
   if (known != topics_.end()) return static_cast<std::size_t>(known - topics_.begin());
-  topics_.push_back({*std::move(name), std::string(topic.type)});
+  topics_.push_back({*std::move(name), std::string(topic.type), topic.is_ahead()});
   return topics_.size() - 1;
 }
 
 void Comparison::put(std::size_t topic, Time now, std::span<const std::byte> message) {
   if (topic == kNotRecorded) return;
-  latest_ = std::max(latest_, now);
   if (over_) return;
   const Topic& of = topics_[topic];
   const RecordedMessage* const recorded = recorded_.front();
@@ -108,6 +107,7 @@ void Comparison::put(std::size_t topic, Time now, std::span<const std::byte> mes
     differ(fmt::format("{}: {}", named(*recorded), first_difference(of.type, recorded->bytes, message)));
   } else {
     ++equal_;
+    if (!of.is_ahead) latest_ = std::max(latest_, now);
     recorded_.pop();
   }
 }

@@ -39,12 +39,13 @@ class Comparison final : public Sink {
   // Why the recording ends before the run; empty: it does not.
   [[nodiscard]] std::string cut() { return cut_ ? recorded_.cut() : std::string(); }
   [[nodiscard]] std::uint64_t equal() const { return equal_; }  // messages
-  [[nodiscard]] Time latest() const { return latest_; }         // time of what was put
+  [[nodiscard]] Time latest() const { return latest_; }         // so far: by log time
 
  private:
   static constexpr std::size_t kNotRecorded = ~std::size_t{0};
   struct Topic {
     std::string name, type;  // type: as it is here
+    bool is_ahead = false;   // as ShownTopic has it
   };
   void differ(const std::string& text);
 

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "apps/run_recorder.hpp"
 #include "pons/record/mcap_reader.hpp"
 
 namespace pons::apps {
@@ -58,11 +60,11 @@ std::string RecordedMessages::cut() {
 }
 
 void RecordedMessages::read(const std::vector<fs::path>& files) {
-  for (const fs::path& file : files) {
-    if (!read_one(file)) break;
-  }
+  const bool goes_on = std::ranges::all_of(files, [this](const fs::path& file) { return read_one(file); });
   {
     const std::scoped_lock lock(mutex_);
+    // As what was repaired, or finished because the disk was full.
+    if (goes_on) cut_ = fmt::format("{}: its run did not end there", files.back().string());
     ended_ = true;
   }
   changed_.notify_all();
@@ -80,7 +82,7 @@ bool RecordedMessages::read_one(const fs::path& file) {
   std::string gap;
   const auto read = (*reader)->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
     // What stands, said again: a run begins with what is new.
-    if (next_.empty() && message.publish_time != message.log_time)
+    if (next_.empty() && message.publish_time < message.log_time)
       gap = fmt::format("{}: begins in the middle of its run", file.string());
     std::uint32_t& next = next_[channel.topic];
     if (message.sequence < next) return true;
@@ -100,7 +102,9 @@ bool RecordedMessages::read_one(const fs::path& file) {
   if (!gap.empty()) return cut(gap);
   if (*read) return cut((*read)->error(file.string()).line());
   if (!(*reader)->contents().finished) return cut(fmt::format("{}: was not finished", file.string()));
-  return goes_on;
+  // What follows by its name is another run's.
+  return goes_on && std::ranges::none_of((*reader)->contents().metadata,
+                                         [](const mcap::MetadataIndex& each) { return each.name == kEndName; });
 }
 
 bool RecordedMessages::push(RecordedMessage message) {

@@ -27,7 +27,8 @@ struct RecordedMessage {
 
 class RecordedMessages {
  public:
-  // `file`, and those that follow it: NAME.mcap, NAME_1.mcap, and so on. A thread of its own reads them ahead.
+  // `file`, and those that follow it, up to the one in which its run ends: NAME.mcap, NAME_1.mcap, and so on. A thread
+  // of its own reads them ahead.
   explicit RecordedMessages(const std::filesystem::path& file);
   ~RecordedMessages();
   RecordedMessages(const RecordedMessages&) = delete;
@@ -37,11 +38,12 @@ class RecordedMessages {
   // out. Null: there is none.
   [[nodiscard]] const RecordedMessage* front();
   void pop();
-  // After the last: why it ends there though the run did not; empty: its last file is finished and whole.
+  // After the last: why it ends there though the run did not; empty: the run did.
   [[nodiscard]] std::string cut();
 
  private:
   void read(const std::vector<std::filesystem::path>& files);
+  // False: what follows is not wanted.
   [[nodiscard]] bool read_one(const std::filesystem::path& file);
   // False: nobody wants any more.
   [[nodiscard]] bool push(RecordedMessage message);

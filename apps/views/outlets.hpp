@@ -31,6 +31,7 @@ struct ShownTopic {
   gate::ros::Qos qos;     // transient local: who comes later is shown the last one, too
   Audience audience = Audience::kAll;
   Duration apart = {};  // made some ahead of their time: who hears at once is sent them so far apart
+  [[nodiscard]] bool is_ahead() const { return apart > Duration{}; }
 };
 
 class Sink {

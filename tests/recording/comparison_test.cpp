@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "apps/run_recorder.hpp"
+#include "pons/record/mcap_check.hpp"
 #include "pons/record/test_recording.hpp"
 #include "pons/wire/types/geometry_msgs/msg/point.hpp"
 #include "pons/wire/types/pons_msgs/msg/object_belief_array.hpp"
@@ -128,7 +129,65 @@ TEST_F(ComparisonTest, AFileThatWasCutGoesAsFarAsItGoes) {
   EXPECT_THAT(comparison.cut(), HasSubstr("cut.mcap: byte "));
   EXPECT_GT(comparison.equal(), 300U);
   EXPECT_LT(comparison.equal(), 900U);
+  EXPECT_EQ(comparison.latest(), Time(kPeriod * static_cast<std::int64_t>(comparison.equal() - 2)))
+      << "of the last of them, for the first is text";
   EXPECT_THAT(difference(folder_ / "cut.mcap", {.periods = 1000, .odd = 100}), HasSubstr("number 100"));
+  // Finished by whoever repaired it: the run did not end there, either.
+  const auto source = record::open_file(folder_ / "cut.mcap");
+  ASSERT_TRUE(source);
+  ASSERT_TRUE(record::repair(**source, folder_ / "repaired.mcap", record::Overwrite::kNever));
+  Comparison repaired(folder_ / "repaired.mcap");
+  Course{.periods = 1000}.show(repaired);
+  repaired.end();
+  EXPECT_EQ(repaired.difference(), "");
+  EXPECT_THAT(repaired.cut(), HasSubstr("repaired.mcap: its run did not end there"));
+  EXPECT_EQ(repaired.equal(), comparison.equal());
+}
+
+// Whose name is that of a file that would follow.
+TEST_F(ComparisonTest, AnotherRunIsNotFollowed) {
+  const auto file = recorded({});
+  std::filesystem::rename(recorded({.periods = 20}), folder_ / "1_1.mcap");
+  ASSERT_EQ(file, folder_ / "1.mcap");
+  EXPECT_EQ(difference(file, {}), "");
+  EXPECT_EQ(difference(file, {.periods = 20}), "the recording has ended; the run shows /pons/points at 0.100 s");
+}
+
+// As set-points are. Nothing else is logged ahead of its time, nor is a run broken off ahead of it.
+TEST_F(ComparisonTest, WhatIsMadeAheadOfItsTimeIsLoggedWhenItIsShown) {
+  const auto show = [](Sink& sink) {
+    auto shown = topic<Point>("~/set_points");
+    shown.apart = kPeriod / 5;
+    const auto points = sink.add(topic<Point>("~/points")), set_points = sink.add(shown);
+    ASSERT_TRUE(points && set_points);
+    for (int i = 0; i < 10; ++i) {
+      sink.put(*set_points, Time(kPeriod * (i + 6)), bytes_of(Point{}));
+      sink.put(*points, Time(kPeriod * i), bytes_of(Point{}));
+    }
+  };
+  const auto file = folder_ / "ahead.mcap";
+  auto recorder = RunRecorder::open({.file = file}, Earlier::kRefused, runner::Pace::kLockstep, 0, {});
+  ASSERT_TRUE(recorder);
+  show(**recorder);
+  (*recorder)->end("complete", Time(kPeriod * 10));
+  record::mcap::Timestamp before = 0;
+  for (const auto& each : record::read_all(**record::McapReader::open(file)).messages) {
+    EXPECT_GE(each.log_time, before);
+    before = each.log_time;
+    const auto period = static_cast<record::mcap::Timestamp>(kPeriod.count());
+    if (each.topic == "/pons/points") {
+      EXPECT_EQ(each.log_time, each.publish_time);
+    } else {
+      EXPECT_EQ(each.publish_time, (each.sequence + 6) * period);
+      EXPECT_LE(each.log_time, each.sequence * period);
+    }
+  }
+  Comparison comparison(file);
+  show(comparison);
+  comparison.end();
+  EXPECT_EQ(comparison.difference(), "");
+  EXPECT_EQ(comparison.equal(), 20U);
+  EXPECT_EQ(comparison.latest(), Time(kPeriod * 9));
 }
 
 TEST_F(ComparisonTest, WhereMessagesAreMissingItEnds) {
