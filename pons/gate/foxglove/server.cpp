@@ -78,7 +78,7 @@ class Server::Work final : public Host {
   }
 
   void put(std::size_t channel, Time now, std::span<const std::byte> message) {
-    newest_ns_ = now.ns();
+    newest_ns_ = std::max(newest_ns_.load(), now.ns());  // of whoever shows something there is one thread
     if (wanted(channel)) {
       auto payload = std::make_shared<const std::vector<std::byte>>(message.begin(), message.end());
       const std::scoped_lock lock(mutex_);

@@ -67,7 +67,8 @@ class Server final : public Visitors {
   [[nodiscard]] Expected<std::size_t> add_channel(Channel channel);
   // Whether a client takes it now, or may take it later.
   [[nodiscard]] bool wanted(std::size_t channel) const;
-  // Leaves a message to the thread. Waits for nothing; what finds no room is dropped and counted.
+  // Leaves a message of that time to the thread; the newest time of all is the time that viewers are told. Waits for
+  // nothing; what finds no room is dropped and counted.
   void put(std::size_t channel, Time now, std::span<const std::byte> message);
 
   // ---- on any thread ----

@@ -196,6 +196,9 @@ TEST_F(FoxgloveServer, SendsWhatIsPutToWhoSubscribed) {
   server_->put(a_, Time(Duration(4)), bytes("text"));
   EXPECT_EQ(first->hear(std::string("\2\4")), std::string_view("\2\4\0\0\0\0\0\0\0", 9));
   EXPECT_EQ(first->hear(kOfA), std::string_view("\1\1\0\0\0\4\0\0\0\0\0\0\0text", 17));
+  // Of an earlier time than what was told ahead: the time does not go back.
+  server_->put(a_, Time(Duration(2)), bytes("late"));
+  EXPECT_EQ(first->hear(), std::string_view("\1\1\0\0\0\2\0\0\0\0\0\0\0late", 17));
   EXPECT_EQ(second->hear(), std::string_view("\2\3\0\0\0\0\0\0\0", 9));  // as it came
   EXPECT_EQ(second->hear(), std::string_view("\2\4\0\0\0\0\0\0\0", 9));
   first->say(R"({"op":"unsubscribe","subscriptionIds":[1,2]})");
