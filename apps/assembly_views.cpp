@@ -97,6 +97,7 @@ HealthView::Sources BridgeHalf::health_sources(const world::World& world, const 
     sources.loops.emplace_back(arms.size() > 1 ? arm->cell.world.arm : std::string(),
                                [&cell = arm->cell]() -> const link::State& { return cell.arm.state(); });
   sources.dropped = outlets.ways_out();
+  if (cameras) sources.dropped.emplace_back("pictures", [made = cameras.get()] { return made->left_out(); });
   return sources;
 }
 

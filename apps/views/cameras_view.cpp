@@ -90,7 +90,8 @@ Expected<std::unique_ptr<CamerasView>> CamerasView::open(Outlets& outlets, const
     if (!compressed) return std::unexpected(compressed.error());
     auto info = outlets.outlet<CameraInfo>(name + "/camera_info");
     if (!info) return std::unexpected(info.error());
-    auto depth_info = outlets.outlet<CameraInfo>(name + "/depth/camera_info");
+    // Comes with depth alone: a recording would hold it where somebody looked on.
+    auto depth_info = outlets.outlet<CameraInfo>(name + "/depth/camera_info", gate::ros::kTopicQos, Audience::kLive);
     if (!depth_info) return std::unexpected(depth_info.error());
     view->cameras_.push_back({&camera, *raw, *depth, *compressed, *info, *depth_info});
     view->wanted_.emplace_back();
@@ -150,7 +151,7 @@ void CamerasView::process(const RgbdFrame& frame, const perception::Moment& mome
   const Task task{number, wanted_[number].raw, wanted_[number].compressed, wanted_[number].depth};
   if (!aside_ || !task.any()) return make(task, frame);
   // The place that the picture lies in is given back.
-  (void)aside_->put([this, task, kept = frame] { make(task, kept); });
+  if (!aside_->put([this, task, kept = frame] { make(task, kept); })) ++left_out_;
 }
 
 void CamerasView::make(const Task& task, const RgbdFrame& frame) {

@@ -34,7 +34,7 @@ namespace pons::apps {
 // Where perception gets its frames, with a look at each on its way. Whatever else is asked of it, `sight` answers.
 class CamerasView final : public View, public perception::Sight {
  public:
-  // Pictures that wait to be made into messages, in real time; more are left out.
+  // Pictures that wait to be made into messages, in real time; more are left out, and counted.
   static constexpr std::size_t kWaitingMost = 4;
 
   // All outlive it. Errors: those of the outlets; a camera's name is no part of a topic's.
@@ -45,6 +45,7 @@ class CamerasView final : public View, public perception::Sight {
 
   // On the bridge's thread.
   void show(Time now) override;
+  [[nodiscard]] std::uint64_t left_out() const { return left_out_; }
 
   // On the thread that perceives.
   void process(const RgbdFrame& frame, const perception::Moment& moment) override;
@@ -95,7 +96,8 @@ class CamerasView final : public View, public perception::Sight {
   std::vector<Camera> cameras_;
   std::deque<Wanted> wanted_;  // a camera
   std::mutex mutex_;
-  std::deque<Made> made_;               // under mutex_
+  std::deque<Made> made_;  // under mutex_
+  std::atomic<std::uint64_t> left_out_ = 0;
   std::optional<runner::Aside> aside_;  // in real time. Last: it uses the others
 };
 

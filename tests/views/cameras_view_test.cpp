@@ -8,6 +8,8 @@
 #include <memory>
 
 #include "apps/jpeg.hpp"
+#include "apps/run_recorder.hpp"
+#include "pons/record/test_recording.hpp"
 #include "tests/views/shown.hpp"
 
 namespace pons::apps {
@@ -137,6 +139,29 @@ TEST_F(CamerasViewTest, TheCompressedPictureIsThePicture) {
   EXPECT_LT(jpeg.size(), rgb.size() / 5);
 }
 
+TEST_F(CamerasViewTest, ARecordingIsTheSameWhoeverLooksOn) {
+  const record::TestFolder folder;
+  const auto recorded = [&](const std::string& name, std::vector<std::string> unwanted) {
+    const RecordOptions options{.file = folder / name};
+    auto recorder = RunRecorder::open(options, Earlier::kRefused, runner::Pace::kLockstep, 0, {});
+    EXPECT_TRUE(recorder) << recorder.error().line();
+    Shown viewer;
+    viewer.unwanted = std::move(unwanted);
+    Outlets outlets;
+    outlets.add(**recorder);
+    outlets.add(viewer);
+    const auto view = CamerasView::open(outlets, world_, looks_, runner::Pace::kLockstep);
+    EXPECT_TRUE(view) << view.error().line();
+    (*view)->process(frame_of(world_.cameras[0], at_), {});
+    (*view)->show(at_ + from_s(1));
+    (*recorder)->end("complete", at_ + from_s(1));
+    return record::read_bytes(options.file);
+  };
+  const std::string alone = recorded("a.mcap", {"top/image_raw", "top/depth/image_rect_raw"});
+  EXPECT_GT(alone.size(), 1000U);
+  EXPECT_TRUE(recorded("b.mcap", {}) == alone);
+}
+
 TEST_F(CamerasViewTest, MakesNothingForNobody) {
   shown_.unwanted = {"top/image_raw", "top/depth/image_rect_raw", "top/image_raw/compressed"};
   for (const auto pace : {runner::Pace::kLockstep, runner::Pace::kRealTime}) {
@@ -170,6 +195,18 @@ TEST_F(CamerasViewTest, InRealTimeItIsMadeBeside) {
     raw = take<Image>("top/image_raw");
   }
   EXPECT_EQ(raw[0].data.at(4), 100);
+}
+
+TEST_F(CamerasViewTest, InRealTimeEachPictureIsShownOrCounted) {
+  open(runner::Pace::kRealTime);
+  constexpr std::uint64_t kPictures = 300;
+  for (std::uint64_t i = 0; i < kPictures; ++i) view_->process(frame_of(world_.cameras[0], at_), {});
+  std::uint64_t shown = 0;
+  while (shown + view_->left_out() < kPictures) {
+    view_->show(at_ + from_s(1));
+    shown += take<Image>("top/image_raw").size();
+  }
+  EXPECT_EQ(shown + view_->left_out(), kPictures);
 }
 
 TEST_F(CamerasViewTest, EachCameraHasItsFrameAndPerceptionIsAskedThrough) {
