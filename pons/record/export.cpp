@@ -103,7 +103,8 @@ void flatten(const Json& json, const std::string& way, std::string& names, std::
 
 class Tables {
  public:
-  Tables(fs::path folder, Overwrite overwrite) : folder_(std::move(folder)), overwrite_(overwrite) {}
+  Tables(fs::path recording, fs::path folder, Overwrite overwrite)
+      : recording_(std::move(recording)), folder_(std::move(folder)), overwrite_(overwrite) {}
 
   Expected<void> put(const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
     std::string names, cells;
@@ -114,7 +115,9 @@ class Tables {
       flatten(json, "", names, cells);
     auto there = tables_.find(std::pair(channel.topic, channel.schema));
     if (there == tables_.end()) {
-      auto file = NewText::create(folder_ / name_for(channel.topic), overwrite_);
+      const fs::path path = folder_ / name_for(channel.topic);
+      if (auto another = check_is_not(recording_, path); !another) return another;
+      auto file = NewText::create(path, overwrite_);
       if (!file) return std::unexpected(file.error());
       there = tables_.emplace(std::pair(channel.topic, channel.schema), std::move(*file)).first;
       auto headed = there->second.add("log_time_ns,publish_time_ns,sequence" + names + "\r\n");
@@ -144,7 +147,7 @@ class Tables {
     return times == 1 ? name + ".csv" : fmt::format("{}_{}.csv", name, times);
   }
 
-  fs::path folder_;
+  fs::path recording_, folder_;
   Overwrite overwrite_;
   std::map<std::pair<std::string, std::uint16_t>, NewText> tables_;  // by topic and schema
   std::map<std::string, int> names_;
@@ -154,6 +157,7 @@ class Tables {
 
 Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, const fs::path& path,
                                 Overwrite overwrite) {
+  if (auto another = check_is_not(reader.source().name(), path); !another) return std::unexpected(another.error());
   auto file = NewText::create(path, overwrite);
   if (!file) return std::unexpected(file.error());
   auto exported =
@@ -175,7 +179,7 @@ Expected<Exported> export_csv(const McapReader& reader, const Query& query, cons
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return cannot("make the folder", folder, error.value());
-  Tables tables(folder, overwrite);
+  Tables tables(reader.source().name(), folder, overwrite);
   auto exported =
       each_json(reader, query, [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
         return tables.put(message, channel, json);

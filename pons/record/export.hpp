@@ -23,8 +23,8 @@ struct Exported {
 
 // Messages that `query` asks for, one JSON object a line: topic, log_time_ns, publish_time_ns, sequence, message; what
 // Pons has a type for, and what is JSON already. There is a whole file at `path` afterwards, or what was there before.
-// Errors: a topic that was asked for is not in the recording; `path` exists and may not be overwritten; those of
-// writing.
+// Errors: a topic that was asked for is not in the recording; `path` is the recording, or exists and may not be
+// overwritten; those of writing.
 [[nodiscard]] Expected<Exported> export_jsonl(const McapReader& reader, const Query& query,
                                               const std::filesystem::path& path, Overwrite overwrite);
 

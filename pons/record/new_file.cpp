@@ -43,6 +43,12 @@ Expected<fs::path> begin_file(const fs::path& path, Overwrite overwrite) {
   return part;
 }
 
+Expected<void> check_is_not(const fs::path& recording, const fs::path& path) {
+  std::error_code not_there;
+  if (!fs::equivalent(recording, path, not_there)) return {};
+  return fail("is the recording itself, which would be lost", path.string(), "choose another name");
+}
+
 Expected<void> end_file(const fs::path& part, const fs::path& path, Overwrite overwrite) {
   if (const int error = rename_to(part, path, overwrite); error != 0) {
     ::unlink(part.c_str());

@@ -16,6 +16,8 @@ enum class Overwrite { kNever, kAllowed };
 // The name under which a file is written that shall become `path`. Errors: those of check_writable; `path` exists and
 // may not be overwritten.
 [[nodiscard]] Expected<std::filesystem::path> begin_file(const std::filesystem::path& path, Overwrite overwrite);
+// For what is made of a recording. Error: `path` is that file, under whatever name.
+[[nodiscard]] Expected<void> check_is_not(const std::filesystem::path& recording, const std::filesystem::path& path);
 // It gets its name, which nobody loses who made such a file meanwhile; or, where that fails, is removed.
 [[nodiscard]] Expected<void> end_file(const std::filesystem::path& part, const std::filesystem::path& path,
                                       Overwrite overwrite);

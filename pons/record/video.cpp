@@ -32,7 +32,8 @@ class Film {
     posix_spawn_file_actions_t actions{};
     ::posix_spawn_file_actions_init(&actions);
     ::posix_spawn_file_actions_adddup2(&actions, theirs.number(), STDIN_FILENO);
-    // H.264 wants even sides.
+    // H.264 wants even sides. A path is a name, whatever is in it: no option, and of no other protocol.
+    const std::string file = "file:" + path.string();
     std::vector<std::string> words{"ffmpeg",     "-loglevel",
                                    "error",      "-y",
                                    "-f",         "image2pipe",
@@ -42,7 +43,7 @@ class Film {
                                    "-vf",        "pad=ceil(iw/2)*2:ceil(ih/2)*2",
                                    "-pix_fmt",   "yuv420p",
                                    "-f",         "mp4",
-                                   path.string()};
+                                   file};
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -136,6 +137,7 @@ Expected<Filmed> export_mp4(const McapReader& reader, const std::string& topic, 
   const auto filmed = look(reader, query);
   if (!filmed) return filmed;
   if (filmed->pictures == 0) return fail("it has no pictures", topic, "name a topic that has some");
+  if (auto another = check_is_not(reader.source().name(), path); !another) return std::unexpected(another.error());
   const auto part = begin_file(path, overwrite);
   if (!part) return std::unexpected(part.error());
 

@@ -21,7 +21,7 @@ struct Filmed {
 
 // The messages of a topic of sensor_msgs/msg/CompressedImage, JPEG or PNG all of them. There is a whole file at `path`
 // afterwards, or what was there before. Errors: there is no such topic, it has no pictures or other ones, one of them
-// cannot be read; ffmpeg is not installed, or fails; `path` exists and may not be overwritten.
+// cannot be read; ffmpeg is not installed, or fails; `path` is the recording, or exists and may not be overwritten.
 [[nodiscard]] Expected<Filmed> export_mp4(const McapReader& reader, const std::string& topic,
                                           const std::filesystem::path& path, Overwrite overwrite);
 
