@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "apps/commands.hpp"
+#include "apps/run_facts.hpp"
 #include "pons/record/export.hpp"
 #include "pons/record/mcap_check.hpp"
 #include "pons/record/mcap_reader.hpp"
@@ -108,6 +109,32 @@ std::string moment(mcap::Timestamp time) {
   return fmt::format("{:%F %T} UTC", fmt::gmtime(seconds));
 }
 
+// Nothing: it is of no run of Pons, or does not say so in words that this Pons knows.
+std::optional<RecordedRun> run_of(const McapReader& reader) {
+  auto run = recorded_run(reader);
+  return run ? std::optional(*std::move(run)) : std::nullopt;
+}
+
+std::string_view pace_of(const RunFacts& facts) {
+  return facts.pace == runner::Pace::kRealTime ? "by the clock" : "in virtual time";
+}
+
+// "run of parcel_cell, seed 1, 20 parcels, in virtual time: complete"
+std::string run_line(const RecordedRun& run) {
+  const RunFacts& facts = run.facts;
+  const std::string parcels = facts.parcels ? fmt::format(", {} parcels", *facts.parcels) : "";
+  return plain(fmt::format("run of {}, seed {}{}, {}: {}", facts.world, facts.seed, parcels, pace_of(facts),
+                           run.ended.empty() ? "its end is not in this file" : run.ended));
+}
+
+wire::Json run_json(const RecordedRun& run) {
+  const RunFacts& facts = run.facts;
+  wire::Json json{{"world", facts.world}, {"seed", facts.seed}, {"pace", pace_of(facts)}};
+  json["parcels"] = facts.parcels ? wire::Json(*facts.parcels) : wire::Json();
+  json["ended"] = run.ended.empty() ? wire::Json() : wire::Json(run.ended);
+  return json;
+}
+
 // Where it is not whole, what is shown is what can be read.
 void show_damage(const record::Contents& contents, const std::string& file) {
   if (contents.damage) say(stderr, fmt::format("pons: {}\n", contents.damage->error(file).line()));
@@ -119,11 +146,13 @@ int show_json(const McapReader& reader, const Rows& rows) {
   for (const auto& [key, row] : rows)
     topics.push_back(
         {{"topic", key.first}, {"type", key.second}, {"messages", row.messages}, {"dropped", row.dropped}});
+  const auto run = run_of(reader);
   const wire::Json json{{"file", reader.source().name()},
                         {"bytes", reader.source().size()},
                         {"finished", contents.finished},
                         {"profile", contents.header.profile},
                         {"library", contents.header.library},
+                        {"run", run ? run_json(*run) : wire::Json()},
                         {"start_ns", contents.statistics.start},
                         {"end_ns", contents.statistics.end},
                         {"messages", contents.statistics.messages},
@@ -145,6 +174,7 @@ int info(const RecordingOptions& options) {
   const auto& statistics = contents.statistics;
   say(stdout, fmt::format("{}: {}, {}\n", options.file.string(), contents.finished ? "finished" : "not finished",
                           megabytes((*reader)->source().size())));
+  if (const auto run = run_of(**reader)) say(stdout, run_line(*run) + "\n");
   if (statistics.messages > 0)
     say(stdout,
         fmt::format("{} to {}, {:.3f} s\n", moment(statistics.start), moment(statistics.end), span_s(statistics)));

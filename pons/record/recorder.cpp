@@ -27,7 +27,7 @@ constexpr std::size_t aligned(std::size_t size) { return (size + 7) / 8 * 8; }
 std::optional<std::uint64_t> free_bytes_of_disk(const std::filesystem::path& folder) {
   std::error_code unknown;
   const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
-  return unknown ? std::nullopt : std::optional<std::uint64_t>(space.available);
+  return unknown || space.capacity == 0 ? std::nullopt : std::optional<std::uint64_t>(space.available);
 }
 
 Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {

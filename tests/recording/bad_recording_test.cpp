@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <csignal>
 
@@ -54,10 +53,10 @@ TEST_F(Recording, WhatCannotBeRecordedIsRefusedByName) {
                      {"--record-quota 9: is less than two files take; ask for 10 at least"});
   expect_run_refused({"--record", file("a.mcap"), "--journal", file("a.mcap")}, {"--journal", "--record"});
   EXPECT_FALSE(fs::exists(folder_ / "a.mcap"));
-  if (::geteuid() == 0) return;  // whom no permission keeps out
-  fs::create_directory(folder_ / "closed");
-  fs::permissions(folder_ / "closed", fs::perms::owner_read | fs::perms::owner_exec);
-  expect_run_refused({"--record", file("closed/a.mcap")}, {"closed/a.mcap: cannot create the file"});
+  // Where nobody can make a file, whatever he may.
+  expect_run_refused({"--record", "/proc/self/a.mcap"}, {"/proc/self/a.mcap: cannot create the file"});
+  write_text(folder_ / "file", "no folder");
+  expect_run_refused({"--record", file("file/a.mcap")}, {"file: "});
 }
 
 // Twice of what the journal keeps.

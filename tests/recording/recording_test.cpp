@@ -128,6 +128,7 @@ TEST_F(RecordingCommand, InfoShowsWhatOneHolds) {
   const Finished json = recording({"info", "--json", (folder_ / "a.mcap").string()});
   const auto told = nlohmann::json::parse(json.out);
   EXPECT_EQ(told["messages"], 12);
+  EXPECT_TRUE(told["run"].is_null()) << "of no run";
   EXPECT_EQ(told["topics"][0]["type"], "test_msgs/msg/Text");
 }
 
@@ -162,6 +163,19 @@ TEST_F(RecordingCommand, ExportWritesTablesOrSaysWhyNot) {
   EXPECT_EQ(recording({"export", (folder_ / "none.mcap").string(), "--jsonl", out}).code, 2);
 }
 
+// Under whatever name.
+TEST_F(RecordingCommand, ExportDoesNotOverwriteWhatItReads) {
+  const std::string file = (folder_ / "a.mcap").string(), whole = record::read_bytes(file);
+  std::filesystem::create_hard_link(file, folder_ / "same.mcap");
+  const std::string other = (folder_.path() / "." / "same.mcap").string();
+  for (const auto& [option, output] : {std::pair<std::string, std::string>{"--jsonl", file}, {"--jsonl", other}}) {
+    const Finished refused = recording({"export", file, option, output, "--overwrite"});
+    EXPECT_EQ(refused.code, 2) << refused.out;
+    EXPECT_THAT(refused.err, HasSubstr(output + ": is the recording itself"));
+  }
+  EXPECT_EQ(record::read_bytes(file), whole);
+}
+
 // A program named ffmpeg that keeps what it is given: what it makes of it is not ours.
 class RecordingFilm : public RecordingCommand {
  protected:
@@ -186,7 +200,7 @@ class RecordingFilm : public RecordingCommand {
     ASSERT_TRUE((*writer)->finish());
   }
   void ffmpeg(const std::string& does) {
-    record::write_bytes(folder_ / "ffmpeg", "#!/bin/sh\nfor last; do :; done\n" + does);
+    record::write_bytes(folder_ / "ffmpeg", "#!/bin/sh\nfor last; do :; done\nlast=\"${last#file:}\"\n" + does);
     std::filesystem::permissions(folder_ / "ffmpeg", std::filesystem::perms::owner_all);
   }
   [[nodiscard]] Finished film(const std::string& topic) const {
@@ -205,7 +219,22 @@ TEST_F(RecordingFilm, PicturesGoToFfmpegOneBehindTheOther) {
   for (const char each : {'a', 'b', 'c', 'd', 'e'}) expected += std::string("\xFF\xD8\xFF\xE0") + each;
   EXPECT_EQ(record::read_bytes(out()), expected);
   EXPECT_THAT(record::read_bytes(folder_ / "words"), HasSubstr("-c:v mjpeg -framerate 4.000000 -i -"));
+  // As ffmpeg takes names, "12:30.mp4" were of a protocol 12, and "-f.mp4" an option.
+  EXPECT_THAT(record::read_bytes(folder_ / "words"), HasSubstr(" -f mp4 file:" + out()));
   EXPECT_EQ(film("/camera").code, 2) << "there is such a file already";
+  const std::string film_file = (folder_ / "film.mcap").string(), whole = record::read_bytes(film_file);
+  const Finished itself =
+      run_pons({"recording", "export", film_file, "--mp4", film_file, "--topic", "/camera", "--overwrite"},
+               {"PATH=" + folder_.path().string()});
+  EXPECT_EQ(itself.code, 2);
+  EXPECT_THAT(itself.err, HasSubstr("film.mcap: is the recording itself"));
+  // A table of its name, as well.
+  std::filesystem::rename(film_file, folder_ / "camera.csv");
+  const Finished table = recording({"export", (folder_ / "camera.csv").string(), "--csv", folder_.path().string(),
+                                    "--topic", "/camera", "--overwrite"});
+  EXPECT_EQ(table.code, 2);
+  EXPECT_THAT(table.err, HasSubstr("camera.csv: is the recording itself"));
+  EXPECT_EQ(record::read_bytes(folder_ / "camera.csv"), whole);
 }
 
 TEST_F(RecordingFilm, WhatCannotBeFilmedIsNamedAndLeavesNothing) {

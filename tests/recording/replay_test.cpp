@@ -8,14 +8,21 @@
 #include <functional>
 #include <map>
 #include <set>
+#include <tuple>
 
+#include "pons/bridge/journal/journal.hpp"
 #include "pons/record/mcap_check.hpp"
 #include "pons/record/recorder.hpp"
 #include "pons/record/test_recording.hpp"
 #include "pons/wire/cdr.hpp"
+#include "pons/wire/types/bridge_layer/msg/low_level_command.hpp"
+#include "pons/wire/types/diagnostic_msgs/msg/diagnostic_array.hpp"
 #include "pons/wire/types/pons_msgs/msg/link_command.hpp"
 #include "pons/wire/types/pons_msgs/msg/object_belief_array.hpp"
 #include "pons/wire/types/pons_msgs/msg/robot_state.hpp"
+#include "pons/wire/types/pons_msgs/msg/task_event.hpp"
+#include "pons/wire/types/pons_msgs/msg/task_status_array.hpp"
+#include "pons/wire/types/sensor_msgs/msg/compressed_image.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
@@ -132,6 +139,12 @@ TEST_F(Replay, RecordingsOfOneRunAndItsReplaysAreTheSameToTheByte) {
 
 TEST_F(Replay, ARecordingHoldsWhatTheRunShows) {
   ASSERT_EQ(record("a.mcap").code, 0);
+  const auto told = nlohmann::json::parse(run_pons({"recording", "info", file("a.mcap"), "--json"}).out);
+  const nlohmann::json run{
+      {"world", "small_cell"}, {"seed", 1}, {"pace", "in virtual time"}, {"parcels", 2}, {"ended", "complete"}};
+  EXPECT_EQ(told["run"], run);
+  EXPECT_THAT(run_pons({"recording", "info", file("a.mcap")}).out,
+              HasSubstr("\nrun of small_cell, seed 1, 2 parcels, in virtual time: complete\n"));
   const auto reader = opened(folder_ / "a.mcap");
   const auto counts = counts_of(folder_ / "a.mcap");
   std::set<std::string> topics;
@@ -163,6 +176,64 @@ TEST_F(Replay, ARecordingHoldsWhatTheRunShows) {
   EXPECT_EQ(header.profile, "ros2");
   EXPECT_TRUE(
       std::ranges::all_of(reader->contents().chunks, [](const auto& each) { return each.compression == "zstd"; }));
+}
+
+TEST_F(Replay, ARecordingHoldsThePicturesOfEachCamera) {
+  ASSERT_EQ(record("a.mcap").code, 0);
+  const auto counts = counts_of(folder_ / "a.mcap");
+  for (const std::string camera : {"/overhead", "/label", "/tray"}) {
+    EXPECT_GT(counts.at(camera + "/image_raw/compressed"), 0U);
+    EXPECT_EQ(counts.at(camera + "/image_raw/compressed"), counts.at(camera + "/camera_info"));
+    for (const char* live : {"/image_raw", "/depth/image_rect_raw", "/depth/camera_info"})
+      EXPECT_FALSE(counts.contains(camera + live)) << live;
+  }
+  bool pictures = true, counted = false;
+  (void)opened(folder_ / "a.mcap")->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
+    wire::sensor_msgs::msg::CompressedImage picture;
+    wire::diagnostic_msgs::msg::DiagnosticArray health;
+    if (channel.topic.ends_with("/compressed"))
+      pictures = pictures && wire::decode(message.data, picture) && picture.data.size() > 100;
+    if (channel.topic == "/diagnostics" && wire::decode(message.data, health))
+      counted =
+          counted || std::ranges::any_of(health.status, [](const auto& each) { return each.name == "pons: pictures"; });
+    return true;
+  });
+  EXPECT_TRUE(pictures);
+  EXPECT_TRUE(counted);
+}
+
+// Of one run: the journal tells the same of its tasks.
+TEST_F(Replay, ARecordingHoldsWhatTheJournalTellsOfTasks) {
+  ASSERT_EQ(record("a.mcap", {"--parcels", "2", "--journal", file("j.db")}).code, 0);
+  using Told = std::tuple<std::int64_t, std::string, std::string>;  // sequence, task, kind
+  std::vector<Told> recorded, journaled;
+  std::map<std::string, std::uint8_t> outcomes;
+  (void)opened(folder_ / "a.mcap")->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
+    wire::pons_msgs::msg::TaskEvent event;
+    wire::pons_msgs::msg::TaskStatusArray statuses;
+    wire::bridge_layer::msg::LowLevelCommand command;
+    if (channel.topic == "/pons/task_events" && wire::decode(message.data, event) && !event.task.empty())
+      recorded.emplace_back(event.sequence, event.task, event.kind);
+    if (channel.topic == "/pons/task_status" && wire::decode(message.data, statuses))
+      for (const auto& each : statuses.tasks) outcomes[each.id] = each.outcome;
+    if (channel.topic == "/low_level_command") EXPECT_TRUE(wire::decode(message.data, command));
+    return true;
+  });
+  const auto journal = bridge::Journal::open_to_read(file("j.db"));
+  ASSERT_TRUE(journal) << journal.error().line();
+  const auto tasks = (*journal)->tasks();
+  ASSERT_TRUE(tasks && !tasks->empty());
+  for (const bridge::TaskRecord& task : *tasks) {
+    const auto events = (*journal)->history(task.task.id);
+    ASSERT_TRUE(events);
+    for (const bridge::Event& event : *events) {
+      if (event.task == task.task.id) journaled.emplace_back(event.sequence, event.task, event.kind);
+    }
+    EXPECT_EQ(outcomes.at(task.task.id), wire::pons_msgs::msg::TaskStatus::OUTCOME_SUCCEEDED) << task.task.id;
+  }
+  std::ranges::sort(journaled);
+  EXPECT_EQ(recorded, journaled);
+  EXPECT_GT(counts_of(folder_ / "a.mcap").at("/low_level_command"), tasks->size()) << "several motions a task";
 }
 
 TEST_F(Replay, WhatIsAnotherIsFoundAndNamed) {
@@ -254,8 +325,16 @@ TEST_F(Replay, ARunThatIsKilledLeavesEachFinishedChunk) {
   EXPECT_GT(kept.size(), 500U);
   const Finished again = replay("a.mcap");
   EXPECT_EQ(again.code, 0) << again.out;
-  EXPECT_THAT(again.out, AllOf(HasSubstr(fmt::format("equal as far as it goes: {} messages", kept.size())),
-                               HasSubstr("a.mcap: ")));
+  const std::string so_far = fmt::format("equal as far as it goes: {} messages, {:.3f} s; ", kept.size(),
+                                         1e-9 * static_cast<double>(kept.back().log_time));
+  EXPECT_THAT(again.out, AllOf(HasSubstr(so_far), HasSubstr("a.mcap: ")));
+  // What has become a whole file is as little of its run.
+  ASSERT_EQ(run_pons({"recording", "repair", file("a.mcap")}).code, 0);
+  EXPECT_THAT(run_pons({"recording", "info", file("a_repaired.mcap")}).out,
+              HasSubstr("200 parcels, in virtual time: its end is not in this file\n"));
+  const Finished repaired = replay("a_repaired.mcap");
+  EXPECT_EQ(repaired.code, 0) << repaired.out;
+  EXPECT_THAT(repaired.out, AllOf(HasSubstr(so_far), HasSubstr("a_repaired.mcap: its run did not end there")));
 }
 
 class ReplayOfABreak : public Replay, public testing::WithParamInterface<std::vector<std::string>> {};
