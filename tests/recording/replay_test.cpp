@@ -208,15 +208,17 @@ TEST_F(Replay, ARecordingHoldsWhatTheJournalTellsOfTasks) {
   using Told = std::tuple<std::int64_t, std::string, std::string>;  // sequence, task, kind
   std::vector<Told> recorded, journaled;
   std::map<std::string, std::uint8_t> outcomes;
+  std::size_t motions = 0;
   (void)opened(folder_ / "a.mcap")->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
     wire::pons_msgs::msg::TaskEvent event;
     wire::pons_msgs::msg::TaskStatusArray statuses;
     wire::bridge_layer::msg::LowLevelCommand command;
     if (channel.topic == "/pons/task_events" && wire::decode(message.data, event) && !event.task.empty())
       recorded.emplace_back(event.sequence, event.task, event.kind);
-    if (channel.topic == "/pons/task_status" && wire::decode(message.data, statuses))
+    if (channel.topic == "/pons/task_status" && wire::decode(message.data, statuses)) {
       for (const auto& each : statuses.tasks) outcomes[each.id] = each.outcome;
-    if (channel.topic == "/low_level_command") EXPECT_TRUE(wire::decode(message.data, command));
+    }
+    if (channel.topic == "/low_level_command") motions += wire::decode(message.data, command) ? 1U : 0U;
     return true;
   });
   const auto journal = bridge::Journal::open_to_read(file("j.db"));
@@ -233,7 +235,7 @@ TEST_F(Replay, ARecordingHoldsWhatTheJournalTellsOfTasks) {
   }
   std::ranges::sort(journaled);
   EXPECT_EQ(recorded, journaled);
-  EXPECT_GT(counts_of(folder_ / "a.mcap").at("/low_level_command"), tasks->size()) << "several motions a task";
+  EXPECT_GT(motions, tasks->size()) << "several a task";
 }
 
 TEST_F(Replay, WhatIsAnotherIsFoundAndNamed) {
