@@ -97,6 +97,7 @@ Expected<void> RosNode::serve_parameters(std::string_view world) {
 }
 
 Expected<std::size_t> RosNode::add(const ShownTopic& topic) {
+  const rt::KeptOff off(rt::loop_cpu());  // the first that is large has a thread started that sends it
   auto number = gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos, topic.apart);
   if (!number) return number;
   paced_.resize(*number + 1);

@@ -19,7 +19,7 @@ using wire::sensor_msgs::msg::CompressedImage;
 using wire::sensor_msgs::msg::Image;
 
 // Pictures are large: who does not keep up gets the newest.
-constexpr gate::ros::Qos kPicturesQos{.depth = 2};
+constexpr gate::ros::Qos kPicturesQos{.depth = 2, .publish_mode = gate::ros::Qos::PublishMode::kFlowControlled};
 
 std::string optical_frame(const std::string& camera) { return camera + "_optical_frame"; }
 

@@ -2,8 +2,8 @@
 // identities of services, and when a service counts as there. Transports are the library's own choice. What it hears it
 // prints, a line each.
 //
-// usage: fast_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, client, or the JSON of a task to
-// submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input does
+// usage: fast_peer DOMAIN NODE ROLE    ROLE: talker, listener, viewer, described, server, client, or the JSON of a task
+// to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input does
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <poll.h>
@@ -229,9 +229,11 @@ class Peer {
   }
   template <typename T>
   dds::DataReader* reader(const char* name, const char* type,
-                          dds::DurabilityQosPolicyKind durability = dds::VOLATILE_DURABILITY_QOS) {
-    auto* const made =
-        checked(subscriber_->create_datareader(topic<T>(name, type), qos<dds::DataReaderQos>(10, durability)), name);
+                          dds::DurabilityQosPolicyKind durability = dds::VOLATILE_DURABILITY_QOS,
+                          dds::ReliabilityQosPolicyKind reliability = dds::RELIABLE_RELIABILITY_QOS) {
+    auto wanted = qos<dds::DataReaderQos>(10, durability);
+    wanted.reliability().kind = reliability;
+    auto* const made = checked(subscriber_->create_datareader(topic<T>(name, type), wanted), name);
     info_.readers.push_back(gid_of(made->guid()));
     info_writer_->write(&info_);
     return made;
@@ -296,8 +298,9 @@ class Talker final : public Role {
 
 class Listener final : public Role {
  public:
-  Listener(Peer& peer, const char* topic, dds::DurabilityQosPolicyKind durability)
-      : reader_(peer.reader<String>(topic, kStringType, durability)) {}
+  Listener(Peer& peer, const char* topic, dds::DurabilityQosPolicyKind durability,
+           dds::ReliabilityQosPolicyKind reliability = dds::RELIABLE_RELIABILITY_QOS)
+      : reader_(peer.reader<String>(topic, kStringType, durability, reliability)) {}
   void step() override {
     String message;
     for (dds::SampleInfo info; take(*reader_, message, info);) std::printf("heard %.60s\n", message.data.c_str());
@@ -469,6 +472,9 @@ int main(int count, char** words) {
   if (wanted == "talker") role = std::make_unique<Talker>(peer);
   if (wanted == "listener")
     role = std::make_unique<Listener>(peer, "rt/chatter", eprosima::fastdds::dds::VOLATILE_DURABILITY_QOS);
+  if (wanted == "viewer")
+    role = std::make_unique<Listener>(peer, "rt/chatter", eprosima::fastdds::dds::VOLATILE_DURABILITY_QOS,
+                                      eprosima::fastdds::dds::BEST_EFFORT_RELIABILITY_QOS);
   if (wanted == "described")
     role = std::make_unique<Listener>(peer, "rt/robot_description",
                                       eprosima::fastdds::dds::TRANSIENT_LOCAL_DURABILITY_QOS);

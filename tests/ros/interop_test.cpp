@@ -119,6 +119,31 @@ TEST_P(Interop, AServerThatDiesIsNamed) {
 
 INSTANTIATE_TEST_SUITE_P(, Interop, ::testing::ValuesIn(kMakes), [](const auto& each) { return each.param.name; });
 
+// Who hears as sensors are heard, on a socket with the system's room, is sent again nothing that it has lost.
+TEST(InteropOfPictures, ArriveOnASocketOfTheSystemsOwnSize) {
+  constexpr int kPictures = 20;
+  const auto node = test_node("pons");
+  auto publisher = node->advertise<String>("chatter", {.depth = 2, .publish_mode = Qos::PublishMode::kFlowControlled});
+  ASSERT_TRUE(publisher);
+  PeerProcess reliable(PONS_FAST_PEER, test_domain(), "reliable", "listener");
+  PeerProcess viewer(PONS_FAST_PEER, test_domain(), "viewer", "viewer");
+  // Each side finds the other by itself.
+  ASSERT_TRUE(spin_until({node.get()}, [&] {
+    return publisher->publish({"first"}) && reliable.said("heard first") && viewer.said("heard first");
+  }));
+  const auto name = [](int picture) { return std::to_string(picture) + " "; };
+  for (int i = 0; i < kPictures; ++i) {
+    ASSERT_TRUE(publisher->publish({name(i) + std::string(1 << 20, '.')}));
+    ASSERT_TRUE(spin_until({node.get()}, [&] { return reliable.said("heard " + name(i)); })) << i;
+  }
+  // The viewer may have been kept from its CPU now and then.
+  EXPECT_TRUE(spin_until({node.get()}, [&] {
+    int seen = 0;
+    for (int i = 0; i < kPictures; ++i) seen += viewer.said("heard " + name(i)) ? 1 : 0;
+    return seen > kPictures / 2;
+  })) << ::testing::PrintToString(viewer.lines());
+}
+
 TEST(InteropOfBoth, OneServerAnswersClientsOfEither) {
   const auto node = test_node("pons");
   int asked = 0;

@@ -17,8 +17,6 @@ namespace {
 namespace dds = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
-constexpr std::uint32_t kSocketBytes = 4U << 20;
-
 class BytesType final : public dds::TopicDataType {
  public:
   explicit BytesType(const std::string& name) {
@@ -73,7 +71,6 @@ PlainDds::PlainDds(const Settings& settings) {
   qos.name("/");
   const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
-  udp->sendBufferSize = udp->receiveBufferSize = kSocketBytes;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports = {udp};
   std::ranges::copy(settings.prefix, qos.wire_protocol().prefix.value);

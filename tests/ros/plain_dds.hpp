@@ -1,6 +1,6 @@
 // Fast DDS by its own interface, as somebody uses it who knows nothing of Pons: a participant on loopback over UDP,
-// writers and readers of bytes as they are, reliable unless told otherwise. What Pons' node is measured beside, and
-// what sends it things that no node would.
+// sockets of the system's default size, writers and readers of bytes as they are, reliable unless told otherwise. What
+// Pons' node is measured beside, and what sends it things that no node would.
 #pragma once
 
 #include <array>

@@ -24,6 +24,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
+#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <mutex>
 #include <string_view>
 #include <utility>
@@ -45,6 +46,11 @@ constexpr std::uint32_t kParticipantsOnOneComputer =
 constexpr std::uint32_t kSocketBytes = 4U << 20;
 // What is lost is sent again after so long without a word of it; the library's 3 s are a long time for a task.
 constexpr std::uint32_t kRepeatAfterNs = 100'000'000;
+// Of what is large, of all such topics together: two pieces at a time, of which a socket's default room, 212,992 bytes,
+// holds three.
+constexpr const char* kFlow = "large";
+constexpr std::int32_t kFlowBytes = 128 << 10;
+constexpr std::uint64_t kFlowPeriod_ms = 1;
 constexpr std::uint32_t kTypicalBytes = 256;  // of a sample's first room, which grows
 
 Guid to_guid(const rtps::GUID_t& from) {
@@ -315,6 +321,10 @@ class FastParticipant final : public Participant, dds::DomainParticipantListener
     wanted.representation().m_value = {dds::XCDR_DATA_REPRESENTATION};
     wanted.writer_data_lifecycle().autodispose_unregistered_instances = false;
     wanted.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+    if (qos.publish_mode == Qos::PublishMode::kFlowControlled) {
+      wanted.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
+      wanted.publish_mode().flow_controller_name = kFlow;
+    }
     wanted.reliable_writer_qos().times.heartbeatPeriod = Duration_t(0, kRepeatAfterNs);
     auto writer = std::make_unique<FastWriter>(*publisher_, **topic, wanted, inbox_);
     if (!writer->made()) return not_made(name);
@@ -426,6 +436,11 @@ dds::DomainParticipantQos settings_for(const std::string& address, std::uint32_t
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports = {udp};
   if (address == kLoopbackAddress) qos.transport().user_transports = {std::make_shared<SameComputer>(udp)};
+  auto flow = std::make_shared<eprosima::fastdds::rtps::FlowControllerDescriptor>();
+  flow->name = kFlow;
+  flow->max_bytes_per_period = kFlowBytes;
+  flow->period_ms = kFlowPeriod_ms;
+  qos.flow_controllers().push_back(std::move(flow));
   auto& builtin = qos.wire_protocol().builtin;
   builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   builtin.avoid_builtin_multicast = false;

@@ -29,9 +29,14 @@ enum class Vendor : std::uint8_t { kFastDds, kCyclone, kOther };
 struct Qos {
   enum class Reliability : std::uint8_t { kReliable, kBestEffort };
   enum class Durability : std::uint8_t { kVolatile, kTransientLocal };
+  // Ours alone, which no reader hears of. kFlowControlled is for what is large: Writer::write() leaves it to a thread,
+  // which sends it piece by piece, no faster than whoever hears can take it from a socket that has the system's default
+  // room; and meanwhile what is small goes between.
+  enum class PublishMode : std::uint8_t { kSynchronous, kFlowControlled };
   Reliability reliability = Reliability::kReliable;
   Durability durability = Durability::kVolatile;
   int depth = 10;  // samples kept; 0: all
+  PublishMode publish_mode = PublishMode::kSynchronous;
   bool operator==(const Qos&) const = default;
 };
 
