@@ -200,19 +200,22 @@ INSTANTIATE_TEST_SUITE_P(, RosRunOfBoth, ::testing::Values(PONS_FAST_PEER, PONS_
 
 TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
   const tests::Folder folder;
-  tests::Running run(folder.path(), "run",
-                     {"run", "small_cell", "--parcels", "100", "--realtime", "--quiet", "--socket", folder / "s",
-                      "--ros", "--ros-domain", std::to_string(test_domain()), "--ros-namespace", "/hall", "--ros-node",
-                      "cell", "--ros-remap", "robot_description:=/urdf"});
+  tests::Running run(
+      folder.path(), "run",
+      {"run", "small_cell", "--parcels", "100", "--realtime", "--quiet", "--socket", folder / "s", "--ros",
+       "--ros-domain", std::to_string(test_domain()), "--ros-namespace", "/hall", "--ros-node", "cell",
+       "--ros-remap=robot_description:=/urdf", "--ros-remap=~/execute_task:=/work", "--ros-remap=scan:=/left/scan"});
   const auto node = test_node("test");
   const auto there = [&](const std::string& topic) {
     return std::ranges::any_of(node->graph().endpoints(), [&](const auto& each) { return each.second.topic == topic; });
   };
   EXPECT_TRUE(spin_until({node.get()}, [&] {
     return there("rt/hall/joint_states") && there("rt/urdf") && there("rt/tf") && there("rt/clock") &&
-           there("rq/hall/cell/submit_taskRequest") && !node->graph().nodes().empty();
+           there("rq/hall/cell/submit_taskRequest") && there("rq/work/_action/send_goalRequest") &&
+           there("rt/work/_action/feedback") && !node->graph().nodes().empty();
   }));
   EXPECT_THAT(node->graph().nodes(), Contains("/hall/cell"));
+  EXPECT_TRUE(spin_until({node.get()}, [&] { return run.err().contains("called /hall/scan"); })) << run.err();
   run.signal(SIGINT);
   (void)run.wait();
 }

@@ -111,7 +111,7 @@ class ActionServer final : public Part {
 
   // Errors: those of serve() and Node::advertise().
   [[nodiscard]] Expected<void> open(std::string_view name) {
-    const std::string under = std::string(name) + "/_action/";
+    const std::string under = std::string(name) + std::string(kActionPart);
     auto feedback = node_.advertise<typename A::FeedbackMessage>(under + "feedback");
     if (!feedback) return std::unexpected(feedback.error());
     feedback_.emplace(*std::move(feedback));

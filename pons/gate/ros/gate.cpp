@@ -73,6 +73,7 @@ Gate::Gate(std::unique_ptr<Node> node)
 Gate::~Gate() { stop(); }
 
 void Gate::start() {
+  node_->warn_of_idle_remaps();
   thread_ = std::thread([this] { run(); });
 }
 

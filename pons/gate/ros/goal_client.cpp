@@ -43,7 +43,7 @@ GoalId new_goal_id() {
 
 Expected<std::unique_ptr<GoalClient>> GoalClient::open(Node& node, std::string name, const ActionTypes& types) {
   std::unique_ptr<GoalClient> self(new GoalClient(node, std::move(name)));
-  const std::string under = self->name_ + "/_action/";
+  const std::string under = self->name_ + std::string(kActionPart);
   const auto open = [&](const char* service, const ServiceTypes& of, std::unique_ptr<ByteClient>& client) {
     auto opened = ByteClient::open(node, under + service, of);
     if (!opened) return Expected<void>(std::unexpected(opened.error()));

@@ -49,6 +49,7 @@ class Graph {
   // That of the others; where there are both, of those that came last; Jazzy's while there is nobody.
   [[nodiscard]] Form form() const { return form_; }
 
+  [[nodiscard]] const std::vector<Endpoint>& own() const { return own_; }
   // By identifier; of others.
   [[nodiscard]] const std::map<Guid, Endpoint>& endpoints() const { return others_; }
   // Full names, of others; several of one name are told as often.

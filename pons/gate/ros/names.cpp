@@ -88,8 +88,11 @@ Expected<std::string> expanded(std::string_view name, const NodeName& node, cons
     full = under(node.space, full);
   }
   if (!is_absolute(full)) return no_name(name);
-  const auto remapped = remaps.find(full);
-  return remapped == remaps.end() ? full : remapped->second;
+  if (const auto whole = remaps.find(full); whole != remaps.end()) return whole->second;
+  const std::size_t action_end = std::min(full.find(kActionPart), full.size());
+  if (const auto action = remaps.find(std::string_view(full).substr(0, action_end)); action != remaps.end())
+    full.replace(0, action_end, action->second);
+  return full;
 }
 
 Expected<void> add_remap(std::string_view rule, const NodeName& node, Remaps& remaps) {

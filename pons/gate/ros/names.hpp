@@ -24,7 +24,11 @@ struct NodeName {
 // letters, digits and underscores.
 [[nodiscard]] Expected<NodeName> node_name(std::string space, std::string name);
 
-// Absolute names by absolute names: what is asked for under the one is called by the other.
+// What stands between an action's name and those of its services and topics.
+inline constexpr std::string_view kActionPart = "/_action/";
+
+// Absolute names by absolute names: what is asked for under the one is called by the other. An action's is that of all
+// that it is made of.
 using Remaps = std::map<std::string, std::string, std::less<>>;
 
 // The absolute name of "scan", "/scan", "~/scan", "{node}/scan" or "{ns}/scan" for that node, remapped. Error: no such

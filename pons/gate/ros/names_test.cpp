@@ -36,6 +36,13 @@ TEST(RosNames, RulesRemap) {
   EXPECT_EQ(expanded("scan", kNode, remaps), "/left/scan");
   EXPECT_EQ(expanded("/scan", kNode, remaps), "/scan");
   EXPECT_EQ(expanded("/odom", kNode, remaps), "/cell/odometry");
+  // An action's name is that of its services and topics; one of these may have a rule of its own.
+  ASSERT_TRUE(add_remap("/arm/follow:=/hand/follow", kNode, remaps));
+  ASSERT_TRUE(add_remap("/arm/follow/_action/status:=/status", kNode, remaps));
+  EXPECT_EQ(expanded("/arm/follow", kNode, remaps), "/hand/follow");
+  EXPECT_EQ(expanded("/arm/follow/_action/send_goal", kNode, remaps), "/hand/follow/_action/send_goal");
+  EXPECT_EQ(expanded("/arm/follow/_action/status", kNode, remaps), "/status");
+  EXPECT_EQ(expanded("/arm/follow/state", kNode, remaps), "/arm/follow/state");
   for (const std::string_view rule : {"scan", "scan:=", ":=scan", "scan:=/other", "a b:=c"})
     EXPECT_FALSE(add_remap(rule, kNode, remaps)) << rule;
 }

@@ -87,6 +87,18 @@ void Node::spin_for(std::chrono::milliseconds at_most) {
   spin();
 }
 
+void Node::warn_of_idle_remaps() {
+  for (const auto& [from, to] : settings_.remaps) {
+    const auto is_called_so = [&called = to](const Endpoint& own) {
+      const std::string name = ros_name(own.topic).name;
+      return name == called || name.starts_with(called + std::string(kActionPart));
+    };
+    if (std::ranges::none_of(graph_.own(), is_called_so))
+      warn(fmt::format("remapping {}:={}: no topic, service or action here is called {}; ros2 node info tells of all",
+                       from, to, from));
+  }
+}
+
 std::vector<std::string> Node::take_warnings() {
   std::vector<std::string> lines = graph_.take_warnings();
   std::ranges::move(std::exchange(warnings_, {}), std::back_inserter(lines));

@@ -129,6 +129,8 @@ class Node {
           node_.unreadable(read.error(), sample_.id.writer);
         } else {
           heard_(message_);
+  // Rules that rename nothing of what there is by now become lines for people.
+  void warn_of_idle_remaps();
         }
         if (taken + 1 == kTakenAtOnce) return node_.wake();
       }
