@@ -158,7 +158,7 @@ void RosLifecycle::end(bool success, std::uint8_t state) {
 void RosLifecycle::become(std::uint8_t state, std::uint8_t transition) {
   const std::uint8_t from = std::exchange(state_, state);
   const Way* const way = way_of(transition);
-  Event event{.timestamp = static_cast<std::uint64_t>(gate::ros::stamp_now_ns()),
+  Event event{.timestamp = static_cast<std::uint64_t>(gate_.node().stamp_ns()),
               .transition = {.id = transition, .label = way == nullptr ? "" : std::string(way->label)},
               .start_state = state_message(from),
               .goal_state = state_message(state)};

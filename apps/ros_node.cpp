@@ -39,6 +39,7 @@ Expected<std::unique_ptr<RosNode>> RosNode::open(const gate::ros::NodeSettings& 
   auto gate = gate::ros::Gate::open(settings);
   if (!gate) return std::unexpected(gate.error());
   std::unique_ptr<RosNode> node(new RosNode(std::move(*gate)));
+  node->gate_->node().set_time(Time{});
   node->tasks_ = std::make_unique<RosTasks>(*node->gate_);
   if (auto served = node->tasks_->serve(); !served) return std::unexpected(served.error());
   node->robot_ = std::make_unique<RosRobot>(*node->gate_);
@@ -124,7 +125,7 @@ bool RosNode::is_due(std::size_t topic, Time now) {
 }
 
 void RosNode::put(std::size_t topic, Time now, std::span<const std::byte> message) {
-  if (parameters_) parameters_->now(now);
+  gate_->node().set_time(now);
   if (is_due(topic, now)) gate_->put(topic, {message.begin(), message.end()});
 }
 

@@ -177,7 +177,7 @@ RosParameters::Result RosParameters::set_all(const std::vector<Parameter>& param
 }
 
 void RosParameters::set(const std::vector<Parameter>& parameters) {
-  Event event{.stamp = gate::ros::ros_stamp(now_ns_), .node = gate_.node().name().full()};
+  Event event{.stamp = gate::ros::ros_stamp(gate_.node().stamp_ns()), .node = gate_.node().name().full()};
   for (const Parameter& each : parameters) {
     One& one = *find(each.name);
     one.value.double_value = each.value.double_value;

@@ -1,9 +1,8 @@
 // The node's parameters, as ROS 2's tools list, read and set them (rcl_interfaces). Everything happens on the node's
-// thread, but for what value() and now() hand to and from others.
+// thread, but that any may ask what a number is now.
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -12,7 +11,6 @@
 #include <vector>
 
 #include "pons/core/error.hpp"
-#include "pons/core/time.hpp"
 #include "pons/gate/ros/gate.hpp"
 #include "pons/wire/types/rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "pons/wire/types/rcl_interfaces/msg/parameter_event.hpp"
@@ -41,9 +39,6 @@ class RosParameters {
   // After them. Errors: those of serve() and Node::advertise().
   [[nodiscard]] Expected<void> serve();
 
-  // The run's time, for events; any thread.
-  void now(Time time) { now_ns_ = time.ns(); }
-
  private:
   struct One {
     Descriptor descriptor;
@@ -61,7 +56,6 @@ class RosParameters {
   gate::ros::Gate& gate_;
   std::deque<One> all_;
   std::optional<gate::ros::Publisher<Event>> events_;
-  std::atomic<std::int64_t> now_ns_ = 0;
 };
 
 [[nodiscard]] RosParameters::Value parameter_value(bool value);

@@ -296,6 +296,7 @@ TEST_F(RosRun, IsDeactivatedActivatedAndShutDown) {
   std::vector<std::string> went;
   ASSERT_TRUE(node_->subscribe<TransitionEvent>("/pons/transition_event", kTopicQos, [&](const TransitionEvent& event) {
     went.push_back(event.goal_state.label);
+    EXPECT_LT(event.timestamp, 3'600'000'000'000) << "the run's time";
   }));
   EXPECT_EQ(state(), "active");
   EXPECT_FALSE(change(Transition::TRANSITION_CLEANUP)) << "a run is configured as long as it lives";

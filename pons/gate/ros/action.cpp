@@ -89,11 +89,6 @@ std::vector<GoalId> Goals::forget(Clock::time_point now) {
   return gone;
 }
 
-std::int64_t stamp_now_ns() {
-  const auto since = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
-}
-
 wire::builtin_interfaces::msg::Time ros_stamp(std::int64_t ns) {
   return {static_cast<std::int32_t>(ns / kNsInS), static_cast<std::uint32_t>(ns % kNsInS)};
 }

@@ -62,8 +62,6 @@ class Goals {
   std::vector<GoalId> ended_;  // in the order of their ends
 };
 
-// Since 1970, as goals are stamped.
-[[nodiscard]] std::int64_t stamp_now_ns();
 [[nodiscard]] wire::builtin_interfaces::msg::Time ros_stamp(std::int64_t ns);
 
 template <Action A>
@@ -79,7 +77,7 @@ class ActionServer final : public Part {
       : node_(node), asked_(std::move(asked)), cancelled_(std::move(cancelled)) {}
 
   void accept(const GoalId& id) {
-    const std::int64_t stamp = stamp_now_ns();
+    const std::int64_t stamp = node_.stamp_ns();
     const auto open = take_open(id);
     if (!open) return;
     if (!goals_.add(id, Clock::now(), stamp)) return (*open)({.accepted = false});

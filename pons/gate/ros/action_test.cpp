@@ -139,6 +139,17 @@ TEST_F(RosAction, GoesItsWay) {
   EXPECT_THAT(feedback_, ElementsAre("half"));
 }
 
+TEST_F(RosAction, GoalsAreStampedByTheRunsTime) {
+  std::int32_t stamp_s = -1;
+  ASSERT_TRUE(there_->subscribe<wire::action_msgs::msg::GoalStatusArray>(
+      "work/_action/status", kLatchedQos,
+      [&](const auto& all) { stamp_s = all.status_list.at(0).goal_info.stamp.sec; }));
+  here_->set_time(Time(std::chrono::seconds(7)));
+  send("good");
+  ASSERT_TRUE(spun([&] { return stamp_s != -1; }));
+  EXPECT_EQ(stamp_s, 7);
+}
+
 TEST_F(RosAction, WhatIsRejectedSaysSo) {
   send("bad");
   ASSERT_TRUE(spun([&] { return end_.has_value(); }));

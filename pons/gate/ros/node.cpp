@@ -50,6 +50,11 @@ Expected<void> Node::join(const Join& join) {
 
 void Node::wake() const { (void)::eventfd_write(wake_.get(), 1); }
 
+std::int64_t Node::stamp_ns() const {
+  if (const std::int64_t time_ns = time_ns_; time_ns != kNeverTold) return time_ns;
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
 void Node::announce() {
   while (graph_.take_changed()) {
     if (const auto written = discovery_writer_->write(graph_.announcement()); !written)

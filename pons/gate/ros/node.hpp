@@ -2,6 +2,8 @@
 // makes all calls; what came is handled in spin().
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -14,6 +16,7 @@
 #include <vector>
 
 #include "pons/core/error.hpp"
+#include "pons/core/time.hpp"
 #include "pons/gate/ros/graph.hpp"
 #include "pons/gate/ros/names.hpp"
 #include "pons/gate/ros/participant.hpp"
@@ -104,6 +107,11 @@ class Node {
                                                              std::string_view hash, const Qos& qos,
                                                              std::string_view user_data = {});
   [[nodiscard]] Expected<std::unique_ptr<Reader>> add_reader(std::string_view name, Use use, std::string_view type,
+  // The run's time, by which goals and events are stamped. Any thread.
+  void set_time(Time now) { time_ns_ = now.ns(); }
+  // That or, of a node that was never told it, the computer's, since 1970. Any thread.
+  [[nodiscard]] std::int64_t stamp_ns() const;
+
                                                              std::string_view hash, const Qos& qos,
                                                              std::string_view user_data = {});
   void add_part(std::unique_ptr<Part> part) { parts_.push_back(std::move(part)); }
@@ -132,6 +140,7 @@ class Node {
   // Rules that rename nothing of what there is by now become lines for people.
   void warn_of_idle_remaps();
         }
+  static constexpr std::int64_t kNeverTold = -1;
         if (taken + 1 == kTakenAtOnce) return node_.wake();
       }
     }
@@ -164,3 +173,4 @@ class Node {
 };
 
 }  // namespace pons::gate::ros
+  std::atomic<std::int64_t> time_ns_ = kNeverTold;
