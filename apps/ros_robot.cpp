@@ -36,7 +36,7 @@ Expected<void> RosRobot::serve() {
                                   });
     if (!served) return served;
   }
-  return gate_.node().subscribe<Bool>("/emergency_stop", gate::ros::kTopicQos, [this](const Bool& button) {
+  return gate_.node().subscribe_to_all<Bool>("/emergency_stop", [this](const Bool& button) {
     if (button.data) pressed(Clock::now());
     is_pressed_ = button.data;
   });

@@ -19,9 +19,10 @@ class RosRobot {
  public:
   // `gate` is outlived by it, and has not been started.
   explicit RosRobot(gate::ros::Gate& gate) : gate_(gate) {}
-  // The services ~/emergency_stop, ~/stop, ~/reset and ~/arm; and the topic /emergency_stop, on which true is an
-  // emergency stop and false nothing: as with a button on a wall, letting go of it moves nothing and resets nothing,
-  // for others may have pressed theirs. Errors: those of serve() and Node::subscribe().
+  // The services ~/emergency_stop, ~/stop, ~/reset and ~/arm; and the topic /emergency_stop, heard from whoever
+  // publishes, reliably or not, on which true is an emergency stop and false nothing: as with a button on a wall,
+  // letting go of it moves nothing and resets nothing, for others may have pressed theirs. Errors: those of serve() and
+  // Node::subscribe_to_all().
   [[nodiscard]] Expected<void> serve();
 
  private:

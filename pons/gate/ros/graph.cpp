@@ -75,6 +75,7 @@ void Graph::heard(const Heard& heard) {
       return;
     case Heard::Kind::kIncompatible: {
       const auto own = std::ranges::find(own_, heard.guid, &Endpoint::guid);
+      if (own != own_.end() && is_heard_otherwise(*own, heard.policy)) return;
       const char* const what =
           own != own_.end() && own->writes ? "a reader wants more than we offer" : "a writer offers less than we want";
       const std::string ours = own == own_.end() ? "" : fmt::format(" (ours: {})", qualities(own->qos));
@@ -93,6 +94,13 @@ void Graph::heard(const Heard& heard) {
       for (const Endpoint& own : own_) compare(own, other);
       others_.insert_or_assign(heard.guid, std::move(other));
   }
+}
+
+// Who is not reliable enough for one reader of ours is heard by another of the same topic, which asks for less.
+bool Graph::is_heard_otherwise(const Endpoint& own, std::string_view policy) const {
+  return policy == "reliability" && !own.writes && std::ranges::any_of(own_, [&](const Endpoint& each) {
+           return !each.writes && each.topic == own.topic && each.qos.reliability == Qos::Reliability::kBestEffort;
+         });
 }
 
 void Graph::compare(const Endpoint& own, const Endpoint& other) {

@@ -69,6 +69,7 @@ class Graph {
   };
 
   void compare(const Endpoint& own, const Endpoint& other);
+  [[nodiscard]] bool is_heard_otherwise(const Endpoint& own, std::string_view policy) const;
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);
   void warn(std::string_view text);

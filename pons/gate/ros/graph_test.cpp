@@ -171,6 +171,22 @@ TEST(Graph, QualitiesThatDoNotFitAreNamed) {
               ElementsAre(AllOf(HasSubstr("rt/scan"), HasSubstr("durability"), HasSubstr("reliable, volatile"))));
 }
 
+TEST(Graph, WhoIsHeardByAnotherReaderIsNotNamed) {
+  Graph graph(kNode, kOurs);
+  const Endpoint reliable{.guid = guid(1, 6), .topic = "rt/stop", .type = kWriter.type};
+  Endpoint others = reliable;
+  others.guid = guid(1, 7);
+  others.qos.reliability = Qos::Reliability::kBestEffort;
+  const auto hear = [&](const char* policy) {
+    graph.heard({.kind = Heard::Kind::kIncompatible, .guid = reliable.guid, .topic = reliable.topic, .policy = policy});
+    return graph.take_warnings();
+  };
+  graph.add_own(reliable);
+  graph.add_own(others);
+  EXPECT_THAT(hear("reliability"), IsEmpty());
+  EXPECT_THAT(hear("durability"), ElementsAre(HasSubstr("durability")));
+}
+
 TEST(Graph, ASecondNodeOfOurNameIsTold) {
   Graph graph(kNode, kOurs);
   ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "pons", {}), {guid(2, 9), 1}));

@@ -86,6 +86,18 @@ class Node {
     add_part(std::make_unique<Subscription<T>>(*this, std::move(*reader), std::move(heard)));
     return {};
   }
+  // Likewise, for what must come from whoever says it: who publishes reliably is heard so, who does not as best he can.
+  template <wire::Message T>
+  [[nodiscard]] Expected<void> subscribe_to_all(std::string_view topic, std::function<void(const T&)> heard) {
+    auto reliable = add_reader(topic, Use::kTopic, T::kName, T::kHash, kTopicQos);
+    if (!reliable) return std::unexpected(reliable.error());
+    auto others = add_reader(topic, Use::kTopic, T::kName, T::kHash, kSensorQos);
+    if (!others) return std::unexpected(others.error());
+    const Reader* const first = reliable->get();
+    add_part(std::make_unique<Subscription<T>>(*this, std::move(*reliable), heard));
+    add_part(std::make_unique<Subscription<T>>(*this, std::move(*others), std::move(heard), first));
+    return {};
+  }
 
   // Readable when spin() has something to do.
   [[nodiscard]] int descriptor() const { return wake_.get(); }
@@ -94,6 +106,11 @@ class Node {
   void spin_for(std::chrono::milliseconds at_most);
   // Makes it readable. Any thread.
   void wake() const;
+
+  // The run's time, by which goals and events are stamped. Any thread.
+  void set_time(Time now) { time_ns_ = now.ns(); }
+  // That or, of a node that was never told it, the computer's, since 1970. Any thread.
+  [[nodiscard]] std::int64_t stamp_ns() const;
 
   [[nodiscard]] const Graph& graph() const { return graph_; }
   [[nodiscard]] const NodeName& name() const { return settings_.name; }
@@ -107,16 +124,13 @@ class Node {
                                                              std::string_view hash, const Qos& qos,
                                                              std::string_view user_data = {});
   [[nodiscard]] Expected<std::unique_ptr<Reader>> add_reader(std::string_view name, Use use, std::string_view type,
-  // The run's time, by which goals and events are stamped. Any thread.
-  void set_time(Time now) { time_ns_ = now.ns(); }
-  // That or, of a node that was never told it, the computer's, since 1970. Any thread.
-  [[nodiscard]] std::int64_t stamp_ns() const;
-
                                                              std::string_view hash, const Qos& qos,
                                                              std::string_view user_data = {});
   void add_part(std::unique_ptr<Part> part) { parts_.push_back(std::move(part)); }
   // As a topic or service of that name is called on the wire. Error: no name.
   [[nodiscard]] Expected<std::string> wire_name(std::string_view name, Use use) const;
+  // Rules that rename nothing of what there is by now become lines for people.
+  void warn_of_idle_remaps();
   // A line for people.
   void warn(std::string line) { warnings_.push_back(std::move(line)); }
   // Something that came could not be read.
@@ -126,29 +140,37 @@ class Node {
   [[nodiscard]] Guid guid() const { return participant_->guid(); }
 
  private:
+  static constexpr std::int64_t kNeverTold = -1;
   template <wire::Message T>
   class Subscription final : public Part {
    public:
-    Subscription(Node& node, std::unique_ptr<Reader> reader, std::function<void(const T&)> heard)
-        : node_(node), reader_(std::move(reader)), heard_(std::move(heard)) {}
+    // What reaches `first`, which may be null and lives as long as this, is heard there.
+    Subscription(Node& node, std::unique_ptr<Reader> reader, std::function<void(const T&)> heard,
+                 const Reader* first = nullptr)
+        : node_(node), reader_(std::move(reader)), heard_(std::move(heard)), first_(first) {}
     void spin(Clock::time_point) override {
       for (int taken = 0; reader_->take(sample_); ++taken) {
-        if (const auto read = wire::decode(sample_.bytes, message_); !read) {
-          node_.unreadable(read.error(), sample_.id.writer);
-        } else {
-          heard_(message_);
-  // Rules that rename nothing of what there is by now become lines for people.
-  void warn_of_idle_remaps();
-        }
-  static constexpr std::int64_t kNeverTold = -1;
+        if (!is_heard_by_first()) hear();
         if (taken + 1 == kTakenAtOnce) return node_.wake();
       }
     }
 
    private:
+    void hear() {
+      if (const auto read = wire::decode(sample_.bytes, message_); !read)
+        return node_.unreadable(read.error(), sample_.id.writer);
+      heard_(message_);
+    }
+    [[nodiscard]] bool is_heard_by_first() const {
+      if (first_ == nullptr) return false;
+      const std::vector<Guid> writers = first_->matched();
+      return std::ranges::find(writers, sample_.id.writer) != writers.end();
+    }
+
     Node& node_;
     std::unique_ptr<Reader> reader_;
     std::function<void(const T&)> heard_;
+    const Reader* first_;
     Sample sample_;
     T message_;
   };
@@ -170,7 +192,7 @@ class Node {
   std::vector<std::string> warnings_;
   std::uint64_t unreadable_ = 0;
   std::uint32_t numbers_ = 0;
+  std::atomic<std::int64_t> time_ns_ = kNeverTold;
 };
 
 }  // namespace pons::gate::ros
-  std::atomic<std::int64_t> time_ns_ = kNeverTold;

@@ -6,11 +6,13 @@
 #include <sys/inotify.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using wire::std_msgs::msg::Int64;
 using wire::std_msgs::msg::String;
 using Image = wire::sensor_msgs::msg::Image;
@@ -92,6 +95,41 @@ TEST(RosNode, QualitiesThatDoNotFitAreToldOnBothSides) {
   }));
   EXPECT_THAT(here_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("wants more"))));
   EXPECT_THAT(there_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("offers less"))));
+}
+
+TEST(RosNode, AllWhoPublishAreHeardOnceAndWithoutAWord) {
+  const auto here = test_node("here"), there = test_node("there");
+  auto reliable = here->advertise<Int64>("stop"), best_effort = here->advertise<Int64>("stop", kSensorQos);
+  ASSERT_TRUE(reliable && best_effort);
+  std::vector<std::int64_t> heard;
+  ASSERT_TRUE(there->subscribe_to_all<Int64>("stop", [&](const Int64& each) { heard.push_back(each.data); }));
+  const auto spun = [&](const std::function<bool()>& done) { return spin_until({here.get(), there.get()}, done); };
+  // Each side finds the other by itself: what is said before both have, is not heard.
+  const auto says_until_heard = [&](Publisher<Int64>& publisher, std::int64_t number) {
+    return spun([&] { return publisher.publish({number}) && std::ranges::find(heard, number) != heard.end(); });
+  };
+  ASSERT_TRUE(spun([&] { return reliable->matched() == 2 && best_effort->matched() == 1; }));
+  ASSERT_TRUE(says_until_heard(*best_effort, 1));
+  ASSERT_TRUE(says_until_heard(*reliable, 2));
+  const std::int64_t last = 2 + kTopicQos.depth;
+  for (std::int64_t number = 3; number <= last; ++number) ASSERT_TRUE(reliable->publish({number}));
+  ASSERT_TRUE(spun([&] { return heard.back() == last; }));
+  ASSERT_TRUE(says_until_heard(*best_effort, last + 1)) << "what had been said before is behind it";
+  for (std::int64_t number = 3; number <= last; ++number) EXPECT_EQ(std::ranges::count(heard, number), 1) << number;
+  EXPECT_THAT(there->take_warnings(), IsEmpty());
+}
+
+TEST(RosNode, RulesThatRenameNothingAreNamed) {
+  const NodeName name{"/", "here"};
+  Remaps remaps;
+  for (const char* const rule : {"chatter:=/talk", "work:=/labour", "scan:=/left/scan"})
+    ASSERT_TRUE(add_remap(rule, name, remaps));
+  const auto here = Node::open({.participant = {.domain = test_domain()}, .name = name, .remaps = remaps});
+  ASSERT_TRUE(here);
+  const auto text = (*here)->advertise<String>("chatter"), status = (*here)->advertise<String>("work/_action/status");
+  ASSERT_TRUE(text && status);
+  (*here)->warn_of_idle_remaps();
+  EXPECT_THAT((*here)->take_warnings(), ElementsAre(HasSubstr("/scan:=/left/scan")));
 }
 
 TEST(RosNode, WhatCannotBeReadIsToldAndTheNextIsHeard) {
