@@ -86,7 +86,7 @@ Expected<void> RosNode::serve_parameters(std::string_view world) {
   parameters_ = std::make_unique<RosParameters>(*gate_);
   parameters_->add("use_sim_time", "Its stamps are of the run's time, which it tells on /clock",
                    parameter_value(false));
-  parameters_->add("version", "Of Pons", parameter_value(PONS_VERSION));
+  parameters_->add("version", "Of Pons", parameter_value(std::string_view(PONS_VERSION)));
   parameters_->add("world", "That the run is in", parameter_value(world));
   states_hz_ = &parameters_->add("states_rate_hz",
                                  "How often joint_states and /tf come at most; 0: whenever there is something new", 0,

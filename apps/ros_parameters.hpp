@@ -61,5 +61,6 @@ class RosParameters {
 [[nodiscard]] RosParameters::Value parameter_value(bool value);
 [[nodiscard]] RosParameters::Value parameter_value(double value);
 [[nodiscard]] RosParameters::Value parameter_value(std::string_view value);
+RosParameters::Value parameter_value(const char* value) = delete;  // it would be taken for a bool
 
 }  // namespace pons::apps

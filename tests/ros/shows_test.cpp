@@ -231,12 +231,16 @@ TEST_F(RosRun, HasParametersThatToolsReadAndSet) {
   const auto names = asked<ListParameters>("/pons/list_parameters", {});
   ASSERT_TRUE(names);
   EXPECT_THAT(names->result.names, ElementsAre("use_sim_time", "version", "world", "states_rate_hz", "images_rate_hz"));
-  const auto values = asked<GetParameters>("/pons/get_parameters", {.names = {"world", "states_rate_hz", "nothing"}});
+  const auto values =
+      asked<GetParameters>("/pons/get_parameters", {.names = {"world", "states_rate_hz", "nothing", "version"}});
   ASSERT_TRUE(values);
-  ASSERT_EQ(values->values.size(), 3U);
+  ASSERT_EQ(values->values.size(), 4U);
   EXPECT_EQ(values->values[0].string_value, "small_cell");
   EXPECT_EQ(values->values[1].type, ParameterType::PARAMETER_DOUBLE);
   EXPECT_EQ(values->values[2].type, ParameterType::PARAMETER_NOT_SET);
+  EXPECT_EQ(values->values[3].type, ParameterType::PARAMETER_STRING);
+  EXPECT_THAT(tests::run_pons({"--version"}).out, HasSubstr(values->values[3].string_value));
+  EXPECT_FALSE(values->values[3].string_value.empty());
   const auto types = asked<GetParameterTypes>("/pons/get_parameter_types", {.names = {"use_sim_time"}});
   ASSERT_TRUE(types);
   EXPECT_EQ(types->types, std::vector<std::uint8_t>{ParameterType::PARAMETER_BOOL});
