@@ -32,6 +32,9 @@ Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& 
     if (!id) return std::unexpected(id.error());
     settings.participant.domain = *id;
   }
+  if (const char* const server = std::getenv("ROS_DISCOVERY_SERVER"); server != nullptr && *server != '\0')
+    return fail(fmt::format("'{}' would be asked who is there, and Pons asks no server", server),
+                "ROS_DISCOVERY_SERVER", "unset it, for Pons and for all whom it shall meet");
   settings.participant.interface = options.interface;
   auto name = gate::ros::node_name(options.space, options.name);
   if (!name) return std::unexpected(name.error());

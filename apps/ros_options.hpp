@@ -18,7 +18,8 @@ struct RosOptions {
 };
 void add_ros_options(CLI::App& command, RosOptions& options);
 
-// Nothing: not asked for. Errors: no domain (of the option or, without, of ROS_DOMAIN_ID), no name, no remapping.
+// Nothing: not asked for. Errors: no domain (of the option or, without, of ROS_DOMAIN_ID), no name, no remapping;
+// a discovery server is named.
 [[nodiscard]] Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& options);
 
 // For people, at once, --quiet or not.

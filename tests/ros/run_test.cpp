@@ -255,10 +255,10 @@ TEST(RosOptions, OfTwoRunsOnOneDomainEachIsWholeAndWhoHasTheNameOfTheOtherSaysSo
 }
 
 TEST(RosOptions, WhatCannotBeIsRefused) {
-  const auto refused = [](const std::vector<std::string>& more) {
+  const auto refused = [](const std::vector<std::string>& more, const std::vector<std::string>& environment = {}) {
     std::vector<std::string> line{"run", "small_cell", "--parcels", "1", "--quiet"};
     line.insert(line.end(), more.begin(), more.end());
-    const tests::Finished run = tests::run_pons(line);
+    const tests::Finished run = tests::run_pons(line, environment);
     EXPECT_EQ(run.code, 2) << run.out;
     return run.err;
   };
@@ -267,6 +267,8 @@ TEST(RosOptions, WhatCannotBeIsRefused) {
   EXPECT_THAT(refused({"--ros", "--ros-interface", "no_such0"}), HasSubstr("'no_such0' is no network interface"));
   EXPECT_THAT(refused({"--ros", "--ros-node", "my-node"}), HasSubstr("'my-node' is no name"));
   EXPECT_THAT(refused({"--ros", "--ros-remap", "a"}), HasSubstr("'a' is no remapping"));
+  EXPECT_THAT(refused({"--ros"}, {"ROS_DISCOVERY_SERVER=127.0.0.1:11811"}),
+              AllOf(HasSubstr("ROS_DISCOVERY_SERVER"), HasSubstr("'127.0.0.1:11811'"), HasSubstr("unset it")));
 }
 
 }  // namespace
