@@ -186,7 +186,7 @@ TEST_F(RosRounds, ShowsItsBase) {
   })) << odometries
       << " of odom, " << scans.size() << " scans, " << map.data.size() << " cells, " << hangs_.size();
   end_run();
-  EXPECT_THAT(description, HasSubstr("porter2"));
+  EXPECT_THAT(description, AllOf(HasSubstr("porter2"), HasSubstr("<visual>")));
   EXPECT_THAT(joints.name, ElementsAre("left_wheel_joint", "right_wheel_joint"));
 
   for (const auto& [frame, parent] : {std::pair{"odom", "map"},
