@@ -16,6 +16,7 @@
 #include "apps/ros_options.hpp"
 #include "apps/run_along.hpp"
 #include "apps/run_kit.hpp"
+#include "apps/run_watch.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
 
@@ -63,31 +64,21 @@ RunFacts facts_of(const BridgeCommandOptions& options) {
 // All outlive it.
 runner::Watch watch_of(const BridgeCommandOptions& options, BridgeHalf& half, const RunAlong& along,
                        link::Border& border, Progress& progress, std::int64_t total) {
-  return {.interrupted = [&along] { return along.asks_to_end(); },
-          .progress =
-              [&, total](Time now) {
-                for (const std::string& warning : along.take_warnings()) progress.put(alert_line(warning));
-                const auto& [sorted, settled] = half.dispatcher->tally();
-                if (half.ros) {
-                  for (const std::string& warning : half.ros->take_warnings()) {
-                    progress.put(ros_line(warning));
-                    half.say(LogView::Log::WARN, now, warning);
-                  }
-                }
-                if (options.quiet) return;
-                progress.show({now, std::min(settled, total), sorted, half.bridge->queue_length()});
-              },
-          .said = {},
-          .alerted =
-              [&](std::string_view alert) {
-                if (!options.quiet) progress.put(alert_line(alert));
-              },
-          .refused =
-              [&](std::string_view what) {
-                progress.put(degraded_line(what));
-                half.say(LogView::Log::WARN, border.clock.now(), degraded_line(what));
-              },
-          .limit = border.clock.now() + slowest(static_cast<std::size_t>(total))};
+  runner::Watch watch =
+      watch_for({.people = [&](std::string_view line) { progress.put(line); },
+                 .onlookers = [&](std::uint8_t level, Time at, std::string_view line) { half.say(level, at, line); },
+                 .ros = [&] { return half.ros.get(); },
+                 .log = nullptr,
+                 .alerts = options.quiet ? Alerts::kUntold : Alerts::kTold,
+                 .begin = border.clock.now()},
+                along);
+  watch.progress = [&, total, tell = std::move(watch.progress)](Time now) {
+    tell(now);
+    const auto& [sorted, settled] = half.dispatcher->tally();
+    if (!options.quiet) progress.show({now, std::min(settled, total), sorted, half.bridge->queue_length()});
+  };
+  watch.limit = border.clock.now() + slowest(static_cast<std::size_t>(total));
+  return watch;
 }
 
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,

@@ -12,6 +12,7 @@
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/rounds.hpp"
+#include "apps/run_watch.hpp"
 #include "apps/task_file.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/core/digest.hpp"
@@ -60,23 +61,16 @@ class Run {
     if (auto opened = log.open(options_.log); !opened) return bad_input(opened.error());
     runner::Parts parts = rounds_.parts();
     const bool ends = options_.ends == RoundsSetup::Ends::kWithItsTasks;
-    const runner::Watch watch{.interrupted = [this] { return along_.asks_to_end(); },
-                              .progress =
-                                  [this](Time) {
-                                    for (const std::string& warning : along_.take_warnings())
-                                      say(stderr, alert_line(warning));
-                                    if (!rounds_.ros) return;
-                                    for (const std::string& warning : rounds_.ros->take_warnings())
-                                      say(stderr, ros_line(warning));
-                                  },
-                              .said = [&log](Time at, std::string_view text) { log.say(at, text); },
-                              .alerted =
-                                  [this](std::string_view alert) {
-                                    if (options_.alerts == Alerts::kTold) say(stderr, alert_line(alert));
-                                  },
-                              .refused = [](std::string_view what) { say(stderr, degraded_line(what)); },
-                              .limit = ends ? Time(kSlowestTask) : Time{},
-                              .attended = rounds_.desk != nullptr};
+    runner::Watch watch = watch_for(
+        {.people = [](std::string_view line) { say(stderr, std::string(line)); },
+         .onlookers = [this](std::uint8_t level, Time at, std::string_view line) { rounds_.say(level, at, line); },
+         .ros = [this] { return rounds_.ros.get(); },
+         .log = &log,
+         .alerts = options_.alerts,
+         .begin = {}},
+        along_);
+    watch.limit = ends ? Time(kSlowestTask) : Time{};
+    watch.attended = rounds_.desk != nullptr;
     const auto began = std::chrono::steady_clock::now();
     const bool realtime = options_.pace == runner::Pace::kRealTime;
     const auto result = realtime ? runner::run_realtime(parts, watch) : runner::run_lockstep(parts, watch);

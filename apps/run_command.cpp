@@ -21,6 +21,7 @@
 #include "apps/ros_options.hpp"
 #include "apps/rounds_run.hpp"
 #include "apps/run_kit.hpp"
+#include "apps/run_watch.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/realtime.hpp"
 
@@ -49,44 +50,33 @@ Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
   return write_png(file, kPictureWidth, kPictureHeight, *rgb);
 }
 
-// Watches the run: Ctrl-C, the progress bar, the loop's events, and the moment for the picture.
+// Watches the run: what people are told, the progress bar, and the moment for the picture.
 runner::Watch watch(const RunOptions& options, Assembly& cell, const RunAlong& along, Progress& progress, LoopLog& log,
                     std::int64_t total, bool& pictured) {
-  return {.interrupted = [&along] { return along.asks_to_end(); },
-          .progress =
-              [&, total](Time now) {
-                for (const std::string& warning : along.take_warnings()) progress.put(alert_line(warning));
-                const auto& [sorted, settled] = cell.above->dispatcher->tally();
-                const std::int64_t done = std::min(settled, total);
-                if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
-                if (cell.above->ros) {
-                  for (const std::string& warning : cell.above->ros->take_warnings()) {
-                    progress.put(ros_line(warning));
-                    cell.above->say(LogView::Log::WARN, now, warning);
-                  }
-                }
-                // With something on the cups, halfway: that is what the cell looks like.
-                if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
-                    done * 2 >= total) {
-                  pictured = take_picture(cell, options.picture).has_value();
-                }
-              },
-          .said =
-              [&](Time at, std::string_view text) {
-                log.say(at, text);
-                if (cell.above) cell.above->say(LogView::Log::INFO, at, text);
-              },
-          .alerted =
-              [&](std::string_view alert) {
-                if (!options.quiet) progress.put(alert_line(alert));
-              },
-          .refused =
-              [&](std::string_view what) {
-                progress.put(degraded_line(what));
-                cell.above->say(LogView::Log::WARN, Time{}, degraded_line(what));
-              },
-          .limit = options.stay ? Time{} : Time(slowest(static_cast<std::size_t>(total))),
-          .attended = cell.above->desk != nullptr};
+  runner::Watch watch = watch_for({.people = [&](std::string_view line) { progress.put(line); },
+                                   .onlookers =
+                                       [&](std::uint8_t level, Time at, std::string_view line) {
+                                         if (cell.above) cell.above->say(level, at, line);
+                                       },
+                                   .ros = [&] { return cell.above->ros.get(); },
+                                   .log = &log,
+                                   .alerts = options.quiet ? Alerts::kUntold : Alerts::kTold,
+                                   .begin = {}},
+                                  along);
+  watch.progress = [&, total, tell = std::move(watch.progress)](Time now) {
+    tell(now);
+    const auto& [sorted, settled] = cell.above->dispatcher->tally();
+    const std::int64_t done = std::min(settled, total);
+    if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
+    // With something on the cups, halfway: that is what the cell looks like.
+    if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
+        done * 2 >= total) {
+      pictured = take_picture(cell, options.picture).has_value();
+    }
+  };
+  watch.limit = options.stay ? Time{} : Time(slowest(static_cast<std::size_t>(total)));
+  watch.attended = cell.above->desk != nullptr;
+  return watch;
 }
 
 int run_cell(const RunOptions& options, Assembly& cell, const RunAlong& along, std::int64_t total) {

@@ -23,6 +23,7 @@
 #include "pons/wire/types/nav_msgs/msg/occupancy_grid.hpp"
 #include "pons/wire/types/nav_msgs/msg/odometry.hpp"
 #include "pons/wire/types/pons_msgs/msg/task_event.hpp"
+#include "pons/wire/types/rcl_interfaces/msg/log.hpp"
 #include "pons/wire/types/rosgraph_msgs/msg/clock.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
 #include "pons/wire/types/sensor_msgs/msg/laser_scan.hpp"
@@ -44,6 +45,7 @@ using wire::nav2_msgs::action::NavigateToPose;
 using wire::nav_msgs::msg::OccupancyGrid;
 using wire::nav_msgs::msg::Odometry;
 using wire::pons_msgs::msg::TaskEvent;
+using wire::rcl_interfaces::msg::Log;
 using wire::rosgraph_msgs::msg::Clock;
 using wire::sensor_msgs::msg::JointState;
 using wire::sensor_msgs::msg::LaserScan;
@@ -234,8 +236,18 @@ TEST_F(RosRounds, DrivesWhereTheNewestGoalPoseSays) {
   ASSERT_TRUE(spun([&] { return ended == 2; })) << map_from_base().x << ", " << map_from_base().y;
   EXPECT_LT(off_m(1.0, 0.3), 0.05);
   EXPECT_NEAR(map_from_base().yaw, 0.5, 0.05);
+  std::vector<std::string> lines;
+  ASSERT_TRUE(node_->subscribe<Log>("/rosout", kRosoutQos, [&](const Log& line) { lines.push_back(line.msg); }));
   for (const auto& [goal, why] : bad_goals()) ASSERT_TRUE(poses->publish(goal));
   ASSERT_TRUE(spun([&] { return run_.err().find("no room") != std::string::npos; })) << run_.err();
+  // The log has them, and what the loop says.
+  for (const auto& [goal, why] : bad_goals())
+    EXPECT_TRUE(spun([&] {
+      return std::ranges::any_of(lines,
+                                 [&](const auto& line) { return line.contains("goal_pose: ") && line.contains(why); });
+    })) << why;
+  EXPECT_TRUE(spun(
+      [&] { return std::ranges::any_of(lines, [](const auto& line) { return line.contains("armed in epoch 1"); }); }));
   end_run();
   EXPECT_GT(driven_m, 0.2);
   EXPECT_THAT(out_, HasSubstr("1 of 2 succeeded"));
