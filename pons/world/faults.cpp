@@ -109,6 +109,8 @@ FaultPlan read_base(const YamlMap& map, const fs::path& file, const Plans& known
 
 FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlValue value = read_yaml(file);
+  if (file.stem() == FaultPlan{}.name)
+    value.refuse("a run without faults has this name", "call the plan otherwise");
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
                      kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name,

@@ -63,7 +63,8 @@ struct FaultCounts {
 [[nodiscard]] std::optional<std::filesystem::path> faults_file(const World& world, const std::string& named);
 
 // `named` is "none", a plan by its name, of the world's folder faults/ or else of the one beside the worlds, or a
-// file's path. Errors name file, line and key as those of world.yaml; no such plan, with the names that exist.
+// file's path. Errors name file, line and key as those of world.yaml; no such plan, with the names that exist; a file
+// none.yaml, whose runs nobody could tell from those without faults.
 [[nodiscard]] Expected<FaultPlan> load_faults(const World& world, const std::string& named);
 
 // A stream of random numbers for one fault, so that none reshuffles another, nor anything else that the run draws.

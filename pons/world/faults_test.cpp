@@ -113,6 +113,13 @@ TEST_F(FaultsTest, SharesBeyondOneAndBasesOfBasesAreRefused) {
   expect_says(refusal("base: second\n"), {"second", "base of its own"});
 }
 
+TEST_F(FaultsTest, APlanIsNotCalledAsIfThereWereNone) {
+  const auto plan = load_faults(world_, folder_.write("none.yaml", "drop: {a_pick: 0.5}\n").string());
+  ASSERT_FALSE(plan);
+  expect_says(plan.error().line(), {"none.yaml", "without faults", "otherwise"});
+  expect_says(refusal("base: none\n"), {"none.yaml", "without faults"});
+}
+
 TEST_F(FaultsTest, AnUnknownNameIsAnsweredWithThoseThereAre) {
   const auto plan = load_faults(world_, "hurricane");
   ASSERT_FALSE(plan);

@@ -133,6 +133,12 @@ TEST(Plan, NamesEachRunAndItsCommand) {
                                           "my faults/mine.yaml", "--visit", "aisle@1+2"));
 }
 
+TEST(Plan, RunsWithTheFaultsThatWereGivenWhateverTheirFileIsCalled) {
+  SweepPlan plan = example("/x");
+  plan.faults = {{"none", "my faults/none.yaml"}};
+  EXPECT_THAT(runs_of(plan).front().words, ::testing::IsSupersetOf({"--faults", "my faults/none.yaml"}));
+}
+
 TEST(Plan, IsReadAsItWasWritten) {
   const Folder folder;
   const SweepPlan plan = example(folder.path());
@@ -190,6 +196,14 @@ TEST(Plan, KnowsWhenWhatARunIsMadeOfHasChanged) {
              std::string(text).replace(text.find("a_pick: 0.0"), 11, "a_pick: 0.1"));
   EXPECT_EQ(digest("none"), none);
   EXPECT_NE(digest("robin"), robin);
+  for (const char* numbers :
+       {"an_hour: 6, lasts_s: [5, 9], share: 0.6", "an_hour: 7, lasts_s: [5, 9], share: 0.6",
+        "an_hour: 7, lasts_s: [4, 9], share: 0.6", "an_hour: 7, lasts_s: [4, 8], share: 0.6",
+        "an_hour: 7, lasts_s: [4, 8], share: 0.5"}) {
+    const std::string was = digest("robin");
+    write_text(folder / "worlds/faults/robin.yaml", text + "vacuum_weak: {" + numbers + "}\n");
+    EXPECT_NE(digest("robin"), was) << numbers;
+  }
   std::string before = none;
   for (const char* file : {"worlds/parcel_cell/world.yaml", "worlds/robots/suction4/gripper.xml", "orders.csv"}) {
     if (std::string(file).ends_with(".xml")) {
