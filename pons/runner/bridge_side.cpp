@@ -316,7 +316,9 @@ bool BridgeSide::fall_back(const std::vector<ObjectBelief>& objects, Time now) {
   belt.pick_x_max_m = taken_until_m().value_or(first().takes_until_m);
   bool waits = false;
   for (const ObjectBelief& object : objects) {
-    const bool asked = std::ranges::any_of(asked_, [&](const auto& task) { return task.second == object.code; });
+    // A visitor's task names no order, and what nobody has read is not its parcel.
+    const bool asked = !object.code.empty() &&
+                       std::ranges::any_of(asked_, [&](const auto& task) { return task.second == object.code; });
     const double x_m = object.world_from_top.translation().x();
     if (asked) {
       waits = waits || belt.must_wait_for(x_m, std::max(object.velocity_m_s.x(), 0.0));

@@ -19,8 +19,12 @@ using bridge::at;
 world::World load() {
   auto world = world::load("worlds", "small_cell");
   EXPECT_TRUE(world) << world.error().line();
+  world->fallback = {world::Fallback::Undecided::kRules, 0.3};
   return std::move(*world);
 }
+
+// The brain's, from now on.
+world::Spells silence() { return {{.often = 1e7, .shortest_s = 600, .longest_s = 600}, Random(1)}; }
 
 // Skills that take their time.
 task::SkillRegistry of(bridge::Actor& hand) {
@@ -134,6 +138,29 @@ TEST_F(TakeOverTest, TheBeltWaitsForWhatWasPutBackUnseen) {
   left_[0].world_from_top.translation().x() = world_.belt.waits_at_m() + 0.001;
   tick();
   EXPECT_EQ(belt_, link::Belt::kWaits);
+}
+
+// By the world's rules what was asked for gets its turn, and the rest rides. What a visitor asked for before the bridge
+// took over names no order; no more does what nobody has read.
+TEST_F(TakeOverTest, ByTheRulesNobodyWaitsForWhatNobodyHasRead) {
+  ASSERT_TRUE(journal_->accept({.id = "visitors", .steps = {{"pick", {{"object", "P1"}}}}}, now_));
+  ASSERT_TRUE(journal_->accept({.id = "P1", .order = "P1", .steps = {{"pick", {{"object", "P1"}}}}}, now_));
+  ASSERT_TRUE(journal_->commit());
+  ASSERT_TRUE(side_.take_over(*journal_, now_));
+  state_.safety = link::SafetyState::kOperational;
+  settled_ = true;
+  world::Spells silent = silence();
+  side_.stall_brain(silent);
+  ObjectBelief object;
+  object.track = 9;
+  object.size_m = {0.2, 0.15, 0.1};
+  object.world_from_top.translation() = Vector3(world_.belt.waits_at_m() + 0.001, world_.belt.y_center_m, 1.0);
+  left_ = {object};
+  for (int i = 0; i < 60; ++i) tick();  // and no longer than it may see nothing
+  EXPECT_EQ(belt_, link::Belt::kRuns) << "it has no code";
+  left_[0].code = "P1";
+  tick();
+  EXPECT_EQ(belt_, link::Belt::kWaits) << "this one was asked for";
 }
 
 TEST_F(TakeOverTest, AtRestNothingBeginsWhatRunsStandsAndTheBeltWaits) {
