@@ -46,7 +46,7 @@ constexpr std::size_t kMostJobs = 1000;
 
 // What the sweep says itself of each run, and what runs that go on at once would quarrel about.
 Expected<void> check_further(const SweepOptions& options) {
-  constexpr std::array<std::pair<const char*, const char*>, 14> kNot{
+  constexpr std::array<std::pair<const char*, const char*>, 17> kNot{
       {{"--seed", "name seeds with --seeds"},
        {"--parcels", "write it before --"},
        {"--faults", "write it before --"},
@@ -59,6 +59,9 @@ Expected<void> check_further(const SweepOptions& options) {
        {"--picture", "repeat a run by its command, with it"},
        {"--speech", "repeat a run by its command, with it"},
        {"--socket", "repeat a run by its command, with it"},
+       {"--ros", "repeat a run by its command, with it"},
+       {"--foxglove", "repeat a run by its command, with it"},
+       {"--stay", "it would never end; a run with it is pons run --stay"},
        {"--help", "write it before --"},
        {"-h", "write it before --"}}};
   for (const std::string& word : options.further) {

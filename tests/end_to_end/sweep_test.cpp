@@ -309,6 +309,9 @@ TEST_F(SweepTest, RefusesBadInputBeforeAnythingBegins) {
   expect_refused(sweep({"--seeds", "1", "--launch", "srun"}), "write {} there");
   expect_refused(sweep({"--seeds", "1", "--", "--seed", "3"}), "name seeds with --seeds");
   expect_refused(sweep({"--seeds", "1", "--", "--journal=x.db"}), "is not for runs of a sweep");
+  expect_refused(sweep({"--seeds", "1", "--", "--stay"}), "it would never end");
+  for (const char* shared : {"--ros", "--foxglove", "--foxglove=8766", "--record", "--socket"})
+    expect_refused(sweep({"--seeds", "1", "--", shared}), "is not for runs of a sweep");
   expect_refused(sweep({"--seeds", "1", "--jobs", "2", "--", "--realtime"}), "--jobs 1");
   expect_refused(sweep({"--seeds", "1", "--", "--fly"}), "--fly");
   expect_refused(sweep({"--seeds", "1", "--", "--visit", "roof@1+2"}), "there is no zone 'roof'");
