@@ -173,6 +173,7 @@ Expected<std::unique_ptr<BridgeHalf>> BridgeHalf::build(const world::World& worl
   self->bridge_side = std::make_unique<runner::BridgeSide>(*self->bridge, brain, self->skill_ports(), world,
                                                            options.recovery, visitors);
   self->bridge_side->keep_free(options.keep_free);
+  if (options.faults != nullptr && options.faults->stalls) self->bridge_side->stall_brain(*options.faults->stalls);
   if (self->outlets.needed()) {
     if (auto opened = self->open_views(world, options); !opened) return std::unexpected(opened.error());
   }
@@ -248,12 +249,12 @@ brain::Brain& BridgeHalf::add_brain(const world::World& world, const world::Mani
                                     const BridgeOptions& options) {
   dispatcher = std::make_unique<brain::Dispatcher>(orders_of(manifest), world);
   brain::Brain* brain = dispatcher.get();
-  if (options.network != nullptr) {
-    far_brain = std::make_unique<brain::FarBrain>(*brain, *options.network);
+  if (options.faults != nullptr && options.faults->network) {
+    far_brain = std::make_unique<brain::FarBrain>(*brain, *options.faults->network);
     brain = far_brain.get();
   }
-  if (options.lies != nullptr) {
-    liar = std::make_unique<brain::Liar>(*brain, *options.lies, world);
+  if (options.faults != nullptr && options.faults->lies) {
+    liar = std::make_unique<brain::Liar>(*brain, *options.faults->lies, world);
     brain = liar.get();
   }
   return *brain;
@@ -361,22 +362,15 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
   auto body = BodyHalf::build(self->world, manifest, options.body, self->meeting());
   if (!body) return std::unexpected(body.error());
   self->body = std::move(*body);
-  const auto spells = [&](world::Fault fault) {
-    return world::Spells(options.body.faults[fault], world::fault_stream(options.body.seed, fault));
-  };
-  const world::FaultPlan& plan = options.body.faults;
-  const auto stream = [&](world::Fault fault) { return world::fault_stream(options.body.seed, fault).fork(1); };
-  if (plan[world::Fault::kBrainStall].often > 0) self->stalls_ = spells(world::Fault::kBrainStall);
-  if (plan[world::Fault::kBrainLie].often > 0)
-    self->lies_.emplace(plan[world::Fault::kBrainLie], stream(world::Fault::kBrainLie));
-  if (plan[world::Fault::kNetworkLoss].often > 0)
-    self->network_.emplace(spells(world::Fault::kNetworkLoss), stream(world::Fault::kNetworkLoss));
+  constexpr auto kCrash = world::Fault::kBridgeCrash;
+  const world::FaultRate& crash = options.body.faults[kCrash];
   // By the clock, who wants that has two processes and kills one.
-  if (options.pace == runner::Pace::kLockstep && plan[world::Fault::kBridgeCrash].often > 0) {
+  if (options.pace == runner::Pace::kLockstep && crash.often > 0) {
     if (options.journal == ":memory:")
       return fail("a journal in memory dies with its bridge", "bridge_crash", "name a file for the journal");
     self->crashes_.emplace(
-        spells(world::Fault::kBridgeCrash), [cell = self.get()] { cell->kill_above(); },
+        world::Spells(crash, world::fault_stream(options.body.seed, kCrash)),
+        [cell = self.get()] { cell->kill_above(); },
         [cell = self.get()](Time now) { return cell->replace_above(now); });
   }
   if (auto built = self->build_above(BridgeOptions::Comes::kFirst); !built) return std::unexpected(built.error());
@@ -392,14 +386,12 @@ Expected<void> Assembly::build_above(BridgeOptions::Comes comes) {
                        .recovery = options_.recovery,
                        .keep_free = options_.keep_free,
                        .comes = comes,
-                       .lies = lies_ ? &*lies_ : nullptr,
-                       .network = network_ ? &*network_ : nullptr};
+                       .faults = &faults_};
   // Equal runs write equal journals.
   if (crashes_) bridge.body = options_.body.seed;
   auto built = BridgeHalf::build(world, manifest_, bridge, meeting());
   if (!built) return std::unexpected(built.error());
   above = std::move(*built);
-  if (stalls_) above->bridge_side->stall_brain(*stalls_);
   return {};
 }
 
@@ -417,9 +409,7 @@ Expected<runner::Above> Assembly::replace_above(Time now) {
 }
 
 void Assembly::count_injected(world::FaultCounts& counts) const {
-  if (stalls_) counts[world::Fault::kBrainStall] = stalls_->begun();
-  if (lies_) counts[world::Fault::kBrainLie] = lies_->count();
-  if (network_) counts[world::Fault::kNetworkLoss] = network_->spells();
+  faults_.count(counts);
   if (crashes_) counts[world::Fault::kBridgeCrash] = crashes_->count();
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/brain_faults.hpp"
 #include "apps/by_hand.hpp"
 #include "apps/desk.hpp"
 #include "apps/ros_node.hpp"
@@ -104,8 +105,7 @@ struct BridgeOptions {
   std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
   enum class Comes : std::uint8_t { kFirst, kFirstOrLater };
   Comes comes = Comes::kFirstOrLater;  // to its body; the first takes up no journal
-  brain::Lies* lies = nullptr;         // a fault of the brain's; it outlives bridge and brain
-  brain::Network* network = nullptr;   // likewise, between the two
+  BrainFaults* faults = nullptr;       // they outlive bridge and brain
 };
 
 class BridgeHalf {
@@ -208,7 +208,10 @@ class Assembly {
 
  private:
   Assembly(world::World w, world::Manifest manifest, AssemblyOptions options)
-      : world(std::move(w)), manifest_(std::move(manifest)), options_(std::move(options)) {}
+      : world(std::move(w)),
+        manifest_(std::move(manifest)),
+        options_(std::move(options)),
+        faults_(options_.body.faults, options_.body.seed) {}
   [[nodiscard]] Meeting meeting();
   [[nodiscard]] Expected<void> build_above(BridgeOptions::Comes comes);
   void kill_above();
@@ -216,9 +219,7 @@ class Assembly {
 
   const world::Manifest manifest_;
   const AssemblyOptions options_;
-  std::optional<world::Spells> stalls_;  // of the brain
-  std::optional<brain::Lies> lies_;
-  std::optional<brain::Network> network_;
+  BrainFaults faults_;
   std::optional<runner::Crashes> crashes_;
   runner::BridgeSide::Account account_;  // of the bridges that were killed
 };

@@ -8,6 +8,7 @@
 #include "apps/body_setup.hpp"
 #include "apps/commands.hpp"
 #include "apps/meeting.hpp"
+#include "apps/memory.hpp"
 #include "apps/run_kit.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/runner/processes.hpp"
@@ -29,7 +30,7 @@ constexpr Duration kBridgeLeaves = std::chrono::seconds(20);  // after it has cl
 
 // The run has ended: what its bridge wrote is held against what really happened.
 int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& body, const MeetingPlace& place,
-              const runner::RunResult& result, double wall_s) {
+              const runner::RunResult& result, double wall_s, const record::Report::Memory& memory) {
   const link::Border& border = place.border();
   const std::string file = journal_of(border);
   if (file.empty()) {
@@ -40,9 +41,13 @@ int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& b
     return bad_run({"the bridge does not leave the journal", bridge::shown(file), "end it; the journal is whole"});
   const auto journal = bridge::Journal::open_to_read(file);
   if (!journal) return bad_run(journal.error());
-  const auto reckoning = reckon(
-      world, body, **journal,
-      {options.parcels.seed, result, Time(Duration(border.last_outcome_ns.load())), border.retries.load(), wall_s});
+  const auto reckoning = reckon(world, body, **journal,
+                                {.seed = options.parcels.seed,
+                                 .result = result,
+                                 .last_outcome = Time(Duration(border.last_outcome_ns.load())),
+                                 .retries = border.retries.load(),
+                                 .wall_s = wall_s,
+                                 .memory = memory});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
@@ -53,8 +58,10 @@ int reckon_up(const BodyOptions& options, const world::World& world, BodyHalf& b
 }
 
 int run_body(const BodyOptions& options, const world::World& world, const world::Manifest& manifest) {
-  const auto setup = body_setup(options.setup, options.parcels.seed, world);
+  auto setup = body_setup(options.setup, options.parcels.seed, world);
   if (!setup) return bad_input(setup.error());
+  setup->faults.leave_out(world::Strikes::kBrain);
+  setup->faults.leave_out(world::Strikes::kBridge);
   const std::string name = options.link.empty() ? default_link(world.name) : options.link;
   const auto identity = identity_of(world, manifest);
   if (!identity) return bad_input(identity.error());
@@ -64,6 +71,7 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   if (!body) return bad_input(body.error());
   LoopLog log;
   if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
+  say(stderr, left_out_line(setup->faults, "give pons bridge the plan, too, and kill one to have it crash"));
 
   const auto tell_people = [&](std::string_view what) {
     if (!options.quiet) say(stderr, fmt::format("{}: {}\n", name, what));
@@ -80,7 +88,7 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
                                 .limit = Time{}});
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   if (!result) return bad_run(result.error());
-  return reckon_up(options, world, **body, *place, *result, wall_s);
+  return reckon_up(options, world, **body, *place, *result, wall_s, MemoryWatch().end());
 }
 
 int body(const BodyOptions& options) {

@@ -64,8 +64,11 @@ void add_body_setup_options(CLI::App& command, BodySetupOptions& options) {
   command.add_option("--visit", options.visits,
                      "ZONE@FROM+FOR: somebody is in that zone from then on, for so long (s)");
   command.add_option("--arm-at", options.arm_at, "Where the arm is found: an angle an axis, rad, with commas (home)");
-  command.add_option("--faults", options.faults,
-                     "What goes wrong: a plan in the world's folder faults, or a file (none)");
+  add_faults_option(command, options.faults);
+}
+
+void add_faults_option(CLI::App& command, std::string& faults) {
+  command.add_option("--faults", faults, "What goes wrong: a plan in the world's folder faults, or a file (none)");
 }
 
 Expected<BodySetup> body_setup(const BodySetupOptions& options, std::uint64_t seed, const world::World& world) {

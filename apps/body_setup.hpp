@@ -18,6 +18,8 @@ struct BodySetupOptions {
   std::string arm_at;               // Q1,Q2,…, one number an axis, rad; empty: at home
   std::string faults = "none";      // a plan of the world's, or a file
 };
+// --faults, which bridges take, too.
+void add_faults_option(CLI::App& command, std::string& faults);
 void add_body_setup_options(CLI::App& command, BodySetupOptions& options);
 
 // Errors: another form, no such zone in this world, another number of axes, no such plan of faults or a bad one.

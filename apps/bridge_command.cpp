@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "apps/assembly.hpp"
+#include "apps/body_setup.hpp"
+#include "apps/brain_faults.hpp"
 #include "apps/commands.hpp"
 #include "apps/foxglove_sink.hpp"
 #include "apps/meeting.hpp"
@@ -28,7 +30,7 @@ namespace fs = std::filesystem;
 struct BridgeCommandOptions {
   std::string world, link;
   ParcelOptions parcels;
-  std::string journal;
+  std::string journal, faults = "none";
   fs::path socket;
   std::uint64_t keep_free_mib = runner::kKeptFree >> 20;
   RosOptions ros;
@@ -81,14 +83,26 @@ runner::Watch watch_of(const BridgeCommandOptions& options, BridgeHalf& half, co
   return watch;
 }
 
+// In all, and of the bridge's own.
+void tell(const runner::RunResult& result, const brain::Tally& tally, std::int64_t total, const std::string& journal,
+          const std::vector<std::pair<std::string, std::int64_t>>& faults) {
+  say(stdout, fmt::format("{}: {} of {} parcels settled, {} sorted; a tick takes {:.2f} ms, {:.1f} ms at worst; "
+                          "journal: {}\n",
+                          result.complete ? "complete" : "broken off", std::min(tally.settled, total), total,
+                          tally.sorted, result.bridge->p50_ms, result.bridge->max_ms, bridge::shown(journal)));
+  for (const auto& [fault, times] : faults) say(stdout, fmt::format("fault: {} {}\n", times, fault));
+}
+
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
-               const MeetingPlace& place) {
+               const world::FaultPlan& plan, const MeetingPlace& place) {
   link::Border& border = place.border();
   auto ros = ros_settings(options.ros);
   if (!ros) return bad_input(ros.error());
-  const auto along =
-      RunAlong::begin(options.record, options.foxglove, Earlier::kFollowed, facts_of(options), world, nullptr);
+  auto facts = facts_of(options);
+  if (auto kept = keep_faults(facts, world, options.faults); !kept) return bad_input(kept.error());
+  const auto along = RunAlong::begin(options.record, options.foxglove, Earlier::kFollowed, facts, world, nullptr);
   if (!along) return bad_input(along.error());
+  BrainFaults faults(plan, options.parcels.seed);
   const BridgeOptions half_options{
       .journal = options.journal,
       .socket = options.socket.empty() ? default_socket() : options.socket,
@@ -97,12 +111,14 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
       .visitors = along->visitors(),
       .body = border.body,
       .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused,
-      .keep_free = bytes_of(options.keep_free_mib)};
+      .keep_free = bytes_of(options.keep_free_mib),
+      .faults = &faults};
   auto half = BridgeHalf::build(world, manifest, half_options, place.meeting());
   if (!half) {
     along->withdraw();
     return bad_input(half.error());
   }
+  say(stderr, left_out_line(plan, "give pons body the plan, too, and kill this bridge to have it crash"));
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
   const runner::Crossing crossing = place.crossing({});
   if (auto begun = runner::await_begin(crossing, interrupted); !begun) return failed(begun.error());
@@ -125,11 +141,9 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   half->reset();  // the journal is closed: the body may read it
   if (!result) return code;
   const bool asked = border.now_at() == link::Stage::kEnding;
-  say(stdout,
-      fmt::format("{}: {} of {} parcels settled, {} sorted; a tick takes {:.2f} ms, {:.1f} ms at worst; "
-                  "journal: {}\n",
-                  result->complete ? "complete" : "broken off", std::min(tally.settled, total), total, tally.sorted,
-                  result->bridge->p50_ms, result->bridge->max_ms, bridge::shown(options.journal)));
+  world::FaultCounts counts;
+  faults.count(counts);
+  tell(*result, tally, total, options.journal, injected(plan, counts));
   say(stdout, along->line());
   if (!result->degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->degraded));
   // A bridge that a person ends leaves its body to the next one.
@@ -157,6 +171,10 @@ int bridge(const BridgeCommandOptions& options) {
     return bad_input(served.error());
   const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
   if (!manifest) return bad_input(manifest.error());
+  auto plan = world::load_faults(*world, options.faults);
+  if (!plan) return bad_input(plan.error());
+  plan->leave_out(world::Strikes::kBody);
+  plan->leave_out(world::Strikes::kBridge);
   // Before it waits: the files may have changed by then.
   const auto identity = identity_of(*world, *manifest);
   if (!identity) return bad_input(identity.error());
@@ -171,7 +189,7 @@ int bridge(const BridgeCommandOptions& options) {
   if (!place) return bad_input(place.error());
   auto named = options;
   named.journal = bridge::named(options.journal, world->name);
-  return run_bridge(named, *world, *manifest, *place);
+  return run_bridge(named, *world, *manifest, *plan, *place);
 }
 
 }  // namespace
@@ -189,6 +207,7 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
                       "of the same body is "
                       "taken up");
   command->add_option("--socket", options->socket, "Where `pons task` reaches this bridge");
+  add_faults_option(*command, options->faults);
   add_ros_options(*command, options->ros);
   add_record_options(*command, options->record);
   add_foxglove_options(*command, options->foxglove);

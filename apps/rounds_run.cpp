@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "apps/commands.hpp"
+#include "apps/memory.hpp"
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
 #include "apps/rounds.hpp"
@@ -94,6 +95,7 @@ class Run {
     const auto verdict = referee::judge_rounds(truth, *rounds_.journal, rules);
     if (!verdict) return bad_run(verdict.error());
     record::Report report = report_of(*verdict, result);
+    report.memory = MemoryWatch().end();
     report.wall_seconds = wall_s;
     if (auto told = tell(report, verdict->findings, options_.explain, options_.report); !told)
       return bad_run(told.error());

@@ -14,6 +14,7 @@
 #include "apps/assembly.hpp"
 #include "apps/body_setup.hpp"
 #include "apps/commands.hpp"
+#include "apps/memory.hpp"
 #include "apps/outside.hpp"
 #include "apps/paths.hpp"
 #include "apps/png.hpp"
@@ -52,7 +53,7 @@ Expected<void> take_picture(const Assembly& cell, const fs::path& file) {
 
 // Watches the run: what people are told, the progress bar, and the moment for the picture.
 runner::Watch watch(const RunOptions& options, Assembly& cell, const RunAlong& along, Progress& progress, LoopLog& log,
-                    std::int64_t total, bool& pictured) {
+                    MemoryWatch& memory, std::int64_t total, bool& pictured) {
   runner::Watch watch = watch_for({.people = [&](std::string_view line) { progress.put(line); },
                                    .onlookers =
                                        [&](std::uint8_t level, Time at, std::string_view line) {
@@ -67,6 +68,7 @@ runner::Watch watch(const RunOptions& options, Assembly& cell, const RunAlong& a
     tell(now);
     const auto& [sorted, settled] = cell.above->dispatcher->tally();
     const std::int64_t done = std::min(settled, total);
+    memory.settled(settled);
     if (!options.quiet) progress.show({now, done, sorted, cell.above->bridge->queue_length()});
     // With something on the cups, halfway: that is what the cell looks like.
     if (!options.realtime && !options.picture.empty() && !pictured && cell.above->holds_something() &&
@@ -83,14 +85,16 @@ int run_cell(const RunOptions& options, Assembly& cell, const RunAlong& along, s
   Progress progress(stderr, total);
   LoopLog log;
   if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
+  MemoryWatch memory;
   bool pictured = false;
   runner::Parts parts = cell.parts();
-  const runner::Watch watcher = watch(options, cell, along, progress, log, total, pictured);
+  const runner::Watch watcher = watch(options, cell, along, progress, log, memory, total, pictured);
   const auto began = std::chrono::steady_clock::now();
   const auto result = options.realtime ? runner::run_realtime(parts, watcher) : runner::run_lockstep(parts, watcher);
   const double wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   progress.finish();
   if (!result) return bad_run(result.error());
+  const record::Report::Memory memory_mib = memory.end();
   cell.above->show(result->end);
   along.end(*result);
   if (along.onlooker() != nullptr) return kExitGood;
@@ -100,7 +104,7 @@ int run_cell(const RunOptions& options, Assembly& cell, const RunAlong& along, s
   cell.count_injected(injected);
   const auto reckoning = reckon(cell.world, *cell.body, *cell.above->journal,
                                 {options.parcels.seed, *result, bridge_side.last_outcome(), bridge_side.retries(),
-                                 wall_s, injected, bridge_side.interventions(), &bridge_side.health()});
+                                 wall_s, injected, bridge_side.interventions(), &bridge_side.health(), memory_mib});
   if (!reckoning) return bad_run(reckoning.error());
   if (auto told = tell(*reckoning, options.explain ? Explain::kFindings : Explain::kNothing, options.report); !told)
     return bad_run(told.error());
@@ -136,7 +140,7 @@ Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world
   facts.keep_free_mib = options.keep_free_mib;
   const bool whole = !options.parcels.manifest.empty() && !options.parcels.parcels_given;
   if (!whole) facts.parcels = has_parcels(options) ? options.parcels.parcels : 0;
-  facts.faults = options.body.faults;
+  facts.faults = options.body.faults;  // of a file its name is kept below
   facts.visits = options.body.visits;
   facts.arm_at = options.body.arm_at;
   facts.recovers = options.recover;
@@ -147,12 +151,7 @@ Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world
     if (!text) return std::unexpected(text.error());
     facts.manifest = *std::move(text);
   }
-  if (const auto file = world::faults_file(world, options.body.faults); file && *file == options.body.faults) {
-    auto text = text_in(*file);
-    if (!text) return std::unexpected(text.error());
-    facts.faults = file->filename().string();
-    facts.faults_file = *std::move(text);
-  }
+  if (auto kept = keep_faults(facts, world, options.body.faults); !kept) return std::unexpected(kept.error());
   return facts;
 }
 
@@ -207,6 +206,7 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
   auto setup = body_setup(options.body, options.parcels.seed, world);
   if (!setup) return std::unexpected(setup.error());
   setup->stays = options.stay;
+  if (options.realtime) setup->faults.leave_out(world::Strikes::kBridge);
   return CellInputs{std::move(*manifest), std::move(*setup)};
 }
 
@@ -284,6 +284,7 @@ int run(const RunOptions& options) {
     along->withdraw();
     return bad_input(cell.error());
   }
+  say(stderr, left_out_line((*cell)->body->faults, "by the clock a bridge is a process to kill: tools/kill_processes"));
   return run_cell(options, **cell, *along, static_cast<std::int64_t>(manifest.size()));
 }
 

@@ -14,6 +14,7 @@
 #include "apps/run_recorder.hpp"
 #include "apps/sweep/plan.hpp"
 #include "pons/core/digest.hpp"
+#include "pons/world/faults.hpp"
 
 namespace pons::apps {
 namespace {
@@ -166,6 +167,17 @@ Expected<std::string> text_in(const fs::path& path) {
   std::string text((std::istreambuf_iterator<char>(file)), {});
   if (!file) return fail("cannot be read", path.string(), "see that it is there and may be read");
   return text;
+}
+
+Expected<void> keep_faults(RunFacts& facts, const world::World& world, const std::string& given) {
+  facts.faults = given;
+  const auto file = world::faults_file(world, given);
+  if (!file || *file != given) return {};
+  auto text = text_in(*file);
+  if (!text) return std::unexpected(text.error());
+  facts.faults = file->filename().string();
+  facts.faults_file = *std::move(text);
+  return {};
 }
 
 Expected<std::vector<mcap::Metadata>> notes_of(const RunFacts& facts, const world::World& world) {

@@ -38,6 +38,10 @@ struct RunFacts {
 // What a file holds. Error: it cannot be read.
 [[nodiscard]] Expected<std::string> text_in(const std::filesystem::path& file);
 
+// Which plan of faults was `given`: its name or, of a file that no world has, the file and what it holds. Error: that
+// cannot be read.
+[[nodiscard]] Expected<void> keep_faults(RunFacts& facts, const world::World& world, const std::string& given);
+
 // At the beginning of each file of a recording: the facts, this program, and a digest of each file of the world.
 // Errors: a file of the world, or this program's own, cannot be read.
 [[nodiscard]] Expected<std::vector<record::mcap::Metadata>> notes_of(const RunFacts& facts, const world::World& world);

@@ -53,17 +53,6 @@ std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) 
   return digest.value();
 }
 
-// Of those that the plan has.
-std::vector<std::pair<std::string, std::int64_t>> injected(const BodyHalf& body, const RunFigures& figures) {
-  std::vector<std::pair<std::string, std::int64_t>> faults;
-  world::FaultCounts counts = body.simulation->faults();
-  for (std::size_t i = 0; i < world::kFaults; ++i) {
-    counts.of[i] += figures.injected.of[i];
-    if (body.faults.rates[i].often > 0) faults.emplace_back(world::name(static_cast<world::Fault>(i)), counts.of[i]);
-  }
-  return faults;
-}
-
 const CLI::Validator not_empty([](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
 
 }  // namespace
@@ -190,6 +179,22 @@ std::string degraded_line(std::string_view refused) { return fmt::format("pons: 
 
 std::string alert_line(std::string_view alert) { return fmt::format("pons: {}\n", alert); }
 
+std::string left_out_line(const world::FaultPlan& plan, std::string_view instead) {
+  if (plan.left_out.empty()) return {};
+  std::vector<std::string_view> names;
+  for (const world::Fault fault : plan.left_out) names.push_back(world::name(fault));
+  return fmt::format("pons: faults of {} that never come here: {}; {}\n", plan.name, fmt::join(names, ", "), instead);
+}
+
+std::vector<std::pair<std::string, std::int64_t>> injected(const world::FaultPlan& plan,
+                                                           const world::FaultCounts& counts) {
+  std::vector<std::pair<std::string, std::int64_t>> faults;
+  for (std::size_t i = 0; i < world::kFaults; ++i) {
+    if (plan.rates[i].often > 0) faults.emplace_back(world::name(static_cast<world::Fault>(i)), counts.of[i]);
+  }
+  return faults;
+}
+
 record::Report::Health health_of(const runner::Health& health) {
   record::Report::Health parts;
   for (const auto& [part, fares] : health.parts())
@@ -232,7 +237,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                     .missorted = verdict->missorted,
                     .lost = verdict->lost,
                     .duplicated = verdict->duplicated,
-                    .exceptions = {verdict->deserved, verdict->undeserved, {}},
+                    .exceptions = {verdict->deserved, verdict->undeserved, verdict->astray, {}},
                     .damaged = verdict->damaged};
   for (const auto& [reason, counts] : verdict->reasons)
     report.parcels.exceptions.reasons[reason] = {counts.deserved, counts.undeserved};
@@ -249,7 +254,10 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   report.throughput = record::throughput(to_s(figures.last_outcome - first), verdict->sorted);
   report.retries = figures.retries;
   report.fault_plan = body.faults.name;
-  report.faults = injected(body, figures);
+  world::FaultCounts counts = body.simulation->faults();
+  for (std::size_t i = 0; i < world::kFaults; ++i) counts.of[i] += figures.injected.of[i];
+  report.faults = injected(body.faults, counts);
+  for (const world::Fault fault : body.faults.left_out) report.faults_left_out.emplace_back(world::name(fault));
   report.limits = {.violations = static_cast<std::int64_t>(verdict->violations), .worst_ratio = verdict->worst_ratio};
   for (const auto& arm : body.arms) {
     const cerebellum::Statistics& loop = arm->cerebellum.statistics();
@@ -259,6 +267,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
                                           loop.commanded.jerk, loop.commanded.torque});
   }
   put_loop(result, report);
+  report.memory = figures.memory;
   report.wall_seconds = figures.wall_s;
   report.state_hash = state_hash(body, *verdict);
   return Reckoning{std::move(*verdict), std::move(report)};

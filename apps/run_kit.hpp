@@ -106,6 +106,10 @@ class LoopLog {
 enum class Alerts : std::uint8_t { kTold, kUntold };
 [[nodiscard]] std::string alert_line(std::string_view alert);
 
+// For people, at once, --quiet or not: faults of the plan that never come, and who injects them `instead`. Empty where
+// none was left out.
+[[nodiscard]] std::string left_out_line(const world::FaultPlan& plan, std::string_view instead);
+
 // ---- the end ----
 
 enum class Explain : std::uint8_t { kNothing, kFindings };
@@ -120,6 +124,7 @@ struct RunFigures {
   world::FaultCounts injected = {};  // above the link
   std::optional<std::int64_t> interventions = std::nullopt;
   const runner::Health* health = nullptr;
+  record::Report::Memory memory = {};
 };
 
 struct Reckoning {
@@ -132,6 +137,10 @@ struct Reckoning {
 // Holds the simulation's truth against the journal. Error: the journal cannot be read.
 [[nodiscard]] Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const bridge::Journal& journal,
                                          const RunFigures& figures);
+
+// Of those faults that the plan has, how often each was injected.
+[[nodiscard]] std::vector<std::pair<std::string, std::int64_t>> injected(const world::FaultPlan& plan,
+                                                                         const world::FaultCounts& counts);
 
 // How each part fares at the end, and how often it came to be worse.
 [[nodiscard]] record::Report::Health health_of(const runner::Health& health);

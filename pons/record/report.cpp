@@ -1,6 +1,7 @@
 #include "pons/record/report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <functional>
@@ -22,6 +23,7 @@ using Json = nlohmann::ordered_json;
   std::string text = report.fault_plan;
   for (const auto& [fault, times] : report.faults)
     text += fmt::format("{} {} {}", &fault == &report.faults.front().first ? ":" : ",", times, fault);
+  if (!report.faults_left_out.empty()) text += fmt::format("; left out: {}", fmt::join(report.faults_left_out, ", "));
   return text;
 }
 
@@ -51,6 +53,7 @@ Json to_json(const Report::Parcels& parcels) {
           {"exceptions",
            {{"deserved", parcels.exceptions.deserved},
             {"undeserved", parcels.exceptions.undeserved},
+            {"astray", parcels.exceptions.astray},
             {"reasons", std::move(reasons)}}},
           {"damaged", parcels.damaged}};
 }
@@ -102,6 +105,7 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["fault_plan"] = report.fault_plan;
   json["faults"] = Json::object();
   for (const auto& [fault, times] : report.faults) json["faults"][fault] = times;
+  json["faults_left_out"] = report.faults_left_out;
   json["limits"] = {{"violations", report.limits.violations},
                     {"worst_ratio", number(report.limits.worst_ratio)},
                     {"saturated", report.limits.saturated}};
@@ -116,6 +120,10 @@ nlohmann::ordered_json to_json(const Report& report) {
   json["bridge"] = {{"p50_ms", number(report.bridge.p50_ms)},
                     {"p99_ms", number(report.bridge.p99_ms)},
                     {"max_ms", number(report.bridge.max_ms)}};
+  json["memory"] = {{"at_500_mib", number(report.memory.at_500_mib)},
+                    {"least_mib", number(report.memory.least_mib)},
+                    {"most_mib", number(report.memory.most_mib)},
+                    {"end_mib", number(report.memory.end_mib)}};
   json["sim_seconds"] = number(report.sim_seconds);
   json["wall_seconds"] = number(report.wall_seconds);
   json["state_hash"] = hex(report.state_hash);
@@ -141,7 +149,9 @@ void tell_parcels(const Line& line, const Report& report) {
   line("sorted", fmt::format("{} of {} parcels offered", parcels.sorted, parcels.offered));
   if (report.arms.sorted.size() > 1) line("by", arms_text(report.arms));
   line("exceptions",
-       fmt::format("{} deserved, {} undeserved", parcels.exceptions.deserved, parcels.exceptions.undeserved));
+       fmt::format("{} deserved, {} undeserved{}", parcels.exceptions.deserved, parcels.exceptions.undeserved,
+                   parcels.exceptions.astray == 0 ? std::string()
+                                                  : fmt::format(" ({} of them astray)", parcels.exceptions.astray)));
   line("missorted", fmt::format("{}", parcels.missorted));
   line("lost", fmt::format("{}", parcels.lost));
   line("duplicated", fmt::format("{}", parcels.duplicated));

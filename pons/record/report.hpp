@@ -25,12 +25,13 @@ struct Report {
   struct Exceptions {
     std::int64_t deserved = 0;    // unreadable, unknown, overweight, too large: nothing could have sorted them
     std::int64_t undeserved = 0;  // sortable, yet not sorted
+    std::int64_t astray = 0;      // of those, in another chute, on floor or tray, as the journal says
     std::map<std::string, Counts> reasons{};  // of both, by what the journal says, its numbers left out
   };
   struct Parcels {
     std::int64_t offered = 0;
     std::int64_t sorted = 0;
-    std::int64_t missorted = 0;   // in another chute than the order's
+    std::int64_t missorted = 0;   // in another chute than the order's, of which the journal says nothing
     std::int64_t lost = 0;        // no outcome, or not where the outcome says, or on the floor or tray without an entry
     std::int64_t duplicated = 0;  // more than one outcome
     Exceptions exceptions{};
@@ -83,6 +84,13 @@ struct Report {
     double driven_m = 0;
   };
 
+  // Resident in the run's process, MiB; NaN where it is not known. Until its 500th parcel a run's caches fill.
+  struct Memory {
+    double at_500_mib = std::numeric_limits<double>::quiet_NaN();
+    double least_mib = at_500_mib, most_mib = at_500_mib;  // from then on, as each parcel is settled
+    double end_mib = at_500_mib;
+  };
+
   // How a part fares at the end: "good", "poor" or "bad", and why; and how often it came to be worse.
   struct Part {
     std::string condition = "good", why{};
@@ -102,16 +110,18 @@ struct Report {
   std::optional<Health> health{};               // by part; unknown to pons body
   std::string fault_plan = "none";              // what was injected on purpose; of each fault of the plan, how often
   std::vector<std::pair<std::string, std::int64_t>> faults{};
+  std::vector<std::string> faults_left_out{};  // of the plan, what this process cannot inject
   Limits limits{};
   Loop loop{};
   Bridge bridge{};
+  Memory memory{};
   double sim_seconds = 0;
   double wall_seconds = 0;
   std::uint64_t state_hash = 0;         // sixteen hexadecimal digits in the file; equal for equal runs of one seed
   std::vector<std::string> findings{};  // the referee's, a line each; the file has the first kMostFindings
 };
 
-inline constexpr int kReportVersion = 1;  // grows when a field changes its meaning or goes
+inline constexpr int kReportVersion = 2;  // grows when a field changes its meaning or goes
 inline constexpr std::size_t kMostFindings = 100;
 
 // `span_s` from the first parcel offered to the last outcome; nothing sorted gives NaN and 0.

@@ -14,13 +14,14 @@ using Json = nlohmann::ordered_json;
 
 Report::Parcels parcels_of(const Fields& json) {
   const Fields exceptions = json.of("exceptions"), reasons = exceptions.of("reasons");
-  Report::Parcels parcels{.offered = json.count("offered"),
-                          .sorted = json.count("sorted"),
-                          .missorted = json.count("missorted"),
-                          .lost = json.count("lost"),
-                          .duplicated = json.count("duplicated"),
-                          .exceptions = {exceptions.count("deserved"), exceptions.count("undeserved"), {}},
-                          .damaged = json.count("damaged")};
+  Report::Parcels parcels{
+      .offered = json.count("offered"),
+      .sorted = json.count("sorted"),
+      .missorted = json.count("missorted"),
+      .lost = json.count("lost"),
+      .duplicated = json.count("duplicated"),
+      .exceptions = {exceptions.count("deserved"), exceptions.count("undeserved"), exceptions.count("astray"), {}},
+      .damaged = json.count("damaged")};
   for (const auto& [reason, counts] : reasons.all().items()) {
     const Fields fields(counts, reasons.place(reason));
     parcels.exceptions.reasons[reason] = {fields.count("deserved"), fields.count("undeserved")};
@@ -99,10 +100,14 @@ Report report_of(const Fields& json) {
   const Fields faults = json.of("faults");
   for (const auto& fault : faults.all().items())
     report.faults.emplace_back(fault.key(), faults.count(fault.key().c_str()));
+  report.faults_left_out = json.texts("faults_left_out");
   const Fields limits = json.of("limits"), bridge = json.of("bridge");
   report.limits = {limits.count("violations"), limits.number("worst_ratio"), limits.count("saturated")};
   report.loop = loop_of(json.of("loop"));
   report.bridge = {bridge.number("p50_ms"), bridge.number("p99_ms"), bridge.number("max_ms")};
+  const Fields memory = json.of("memory");
+  report.memory = {memory.number("at_500_mib"), memory.number("least_mib"), memory.number("most_mib"),
+                   memory.number("end_mib")};
   report.sim_seconds = json.number("sim_seconds");
   report.wall_seconds = json.number("wall_seconds");
   report.state_hash = hash_of(json);

@@ -30,6 +30,7 @@ using Json = nlohmann::ordered_json;
                       .duplicated = 3,
                       .exceptions = {.deserved = 4,
                                      .undeserved = 5,
+                                     .astray = 2,
                                      .reasons = {{"label unreadable", {4, 1}}, {"lost from sight", {0, 4}}}},
                       .damaged = 6},
           .throughput = throughput(570, 190),
@@ -38,6 +39,7 @@ using Json = nlohmann::ordered_json;
           .health = Report::Health{{"arm", {}}, {"brain", {"bad", "silent for 2.0 s", 3}}},
           .fault_plan = "robin",
           .faults = {{"missed_grasp", 3}},
+          .faults_left_out = {"bridge_crash"},
           .limits = {.violations = 0, .worst_ratio = 0.985, .saturated = 12},
           .loop = {.ticks = 600000,
                    .missed = 0,
@@ -48,6 +50,7 @@ using Json = nlohmann::ordered_json;
                    .late_max_us = 880,
                    .degraded = "SCHED_FIFO refused"},
           .bridge = {.p50_ms = 0.25, .p99_ms = 9, .max_ms = 22.5},
+          .memory = {.at_500_mib = 250, .least_mib = 248.5, .most_mib = 260, .end_mib = 255},
           .sim_seconds = 600,
           .wall_seconds = 41.25,
           .state_hash = 0x00f0e0d0c0b0a090,
@@ -73,9 +76,9 @@ TEST(Report, SchemaRefusesWhatIsNotAReport) {
 
 TEST(Report, KeepsEveryFigure) {
   EXPECT_EQ(to_json(example()), Json::parse(R"({
-    "version": 1, "seed": 18446744073709551615, "world": "parcel_cell",
+    "version": 2, "seed": 18446744073709551615, "world": "parcel_cell",
     "parcels": {"offered": 200, "sorted": 190, "missorted": 1, "lost": 2, "duplicated": 3,
-                "exceptions": {"deserved": 4, "undeserved": 5,
+                "exceptions": {"deserved": 4, "undeserved": 5, "astray": 2,
                                "reasons": {"label unreadable": {"deserved": 4, "undeserved": 1},
                                            "lost from sight": {"deserved": 0, "undeserved": 4}}}, "damaged": 6},
     "arms": {"sorted": {}, "least_apart_m": null},
@@ -83,11 +86,12 @@ TEST(Report, KeepsEveryFigure) {
     "interventions": 2,
     "health": {"alerts": 3, "parts": {"arm": {"condition": "good", "why": "", "alerts": 0},
                                       "brain": {"condition": "bad", "why": "silent for 2.0 s", "alerts": 3}}},
-    "fault_plan": "robin", "faults": {"missed_grasp": 3},
+    "fault_plan": "robin", "faults": {"missed_grasp": 3}, "faults_left_out": ["bridge_crash"],
     "limits": {"violations": 0, "worst_ratio": 0.985, "saturated": 12},
     "loop": {"ticks": 600000, "missed": 0, "p50_us": 9.5, "p99_us": 21.0,
              "late_p50_us": 14.0, "late_p99_us": 60.0, "late_max_us": 880.0, "degraded": "SCHED_FIFO refused"},
     "bridge": {"p50_ms": 0.25, "p99_ms": 9.0, "max_ms": 22.5},
+    "memory": {"at_500_mib": 250.0, "least_mib": 248.5, "most_mib": 260.0, "end_mib": 255.0},
     "sim_seconds": 600.0, "wall_seconds": 41.25, "state_hash": "00f0e0d0c0b0a090",
     "findings": ["P000007: missorted"]})"));
 }
@@ -162,7 +166,7 @@ TEST_F(ReadReport, RefusesByNameWhatIsNone) {
     json[Json::json_pointer(pointer)] = value;
     return json.dump();
   };
-  expect_refused(changed("/version", 2), "is of version 2");
+  expect_refused(changed("/version", 3), "is of version 3");
   expect_refused(changed("/parcels/lost", "two"), "/parcels/lost");
   expect_refused(changed("/parcels/lost", -1), "/parcels/lost");
   expect_refused(changed("/parcels/lost", 1.5), "/parcels/lost");
@@ -185,7 +189,8 @@ TEST(Report, SummaryIsAligned) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 19);
   EXPECT_THAT(text, HasSubstr("  a person      needed 2 times\n"));
   EXPECT_THAT(text, HasSubstr("  alerts        brain 3 (and is bad)\n"));
-  EXPECT_THAT(text, HasSubstr("  faults        robin: 3 missed_grasp\n"));
+  EXPECT_THAT(text, HasSubstr("  faults        robin: 3 missed_grasp; left out: bridge_crash\n"));
+  EXPECT_THAT(text, HasSubstr("  exceptions    4 deserved, 5 undeserved (2 of them astray)\n"));
   EXPECT_THAT(text, HasSubstr("  sorted        190 of 200 parcels offered\n"));
   EXPECT_THAT(text, HasSubstr("  throughput    3.00 s a parcel, 1200 parcels an hour\n"));
   EXPECT_THAT(text, HasSubstr("  begins late   14 µs median, 60 µs p99, 880 µs at worst\n"));

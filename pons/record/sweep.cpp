@@ -24,6 +24,7 @@ void add(Report::Parcels& sum, const Report::Parcels& parcels) {
   sum.damaged += parcels.damaged;
   sum.exceptions.deserved += parcels.exceptions.deserved;
   sum.exceptions.undeserved += parcels.exceptions.undeserved;
+  sum.exceptions.astray += parcels.exceptions.astray;
   for (const auto& [reason, counts] : parcels.exceptions.reasons) {
     Report::Counts& total = sum.exceptions.reasons[reason];
     total.deserved += counts.deserved;

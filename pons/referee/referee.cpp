@@ -21,7 +21,9 @@ struct Entry {
   int tasks = 0, successes = 0;
   bool ended = false;  // every task of it has an outcome
   bool succeeded = false;
-  bool ride = false;                   // let go by on purpose
+  bool ride = false;                   // let go by on purpose, or never identified
+  bool unseen = false;                 // nobody has identified it: all that is said is that it was to come
+  bool strayed = false;                // an entry says that it is not where it should be
   bool rode_since = false;             // likewise, what bears its code, since a task of it succeeded
   std::pair<std::int64_t, Time> done;  // the last success: run and when
   std::string last_reason;
@@ -64,13 +66,15 @@ void take_in(Entry& entry, const std::string& place, const std::optional<bridge:
 
 void stray(Entry& entry, const std::string& place, const std::pair<std::int64_t, Time>& when) {
   entry.fell_into = place;
+  entry.strayed = true;
   entry.astray = entry.succeeded && when > entry.done;
 }
 
 // What it says of all of them.
 struct Story {
-  std::map<std::string, Entry> entries;           // by code
-  std::map<std::string, int> unread_strays = {};  // by the chute into which nobody knows whose parcels went
+  std::map<std::string, Entry> entries;     // by code
+  std::map<std::string, int> unread = {};   // by the place into which nobody knows whose parcels went
+  std::map<std::string, int> counted = {};  // by the place, how many a camera has seen there at once
 };
 
 Expected<Story> read(const bridge::Journal& journal) {
@@ -88,13 +92,18 @@ Expected<Story> read(const bridge::Journal& journal) {
     if (event.kind == "stray") {
       const std::string place = task::text_of(event.detail, "fell_into");
       if (code.empty())
-        ++story.unread_strays[place];
+        ++story.unread[place];
       else
         stray(entries[code], place, {event.run, event.stamp});
+    }
+    if (event.kind == "fell") {
+      int& most = story.counted[task::text_of(event.detail, "place")];
+      most = std::max(most, event.detail.value("things", 0));
     }
     if (event.kind != "ride") continue;
     Entry& entry = entries[code];
     entry.ride = true;
+    entry.unseen = !event.detail.value("seen", true);
     entry.rode_since = entry.succeeded && std::pair(event.run, event.stamp) > entry.done;
     if (entry.tasks == 0) entry.last_reason = task::text_of(event.detail, "reason");
   }
@@ -131,7 +140,29 @@ class Judge {
     }
   }
 
+  // After the last parcel. That one was never identified says nothing of where it lies: of those below, as many are
+  // accounted for as something without a code was told to have fallen there, or as a camera has counted there beside
+  // those that have an entry of their own.
+  void below_unread() {
+    for (const auto& [parcel, entry] : unread_) {
+      int& unread = story_.unread[parcel->place];
+      int& counted = story_.counted[parcel->place];
+      if (std::max(unread, counted - with_entry_[parcel->place]) > 0) {
+        --unread;
+        --counted;
+        astray(*parcel, entry, "fell, as the journal says of one that nobody has read");
+      } else {
+        lost(*parcel, entry, "fell, and was never identified");
+      }
+    }
+  }
+
  private:
+  struct Unread {
+    const ParcelTruth* parcel;
+    Entry entry;
+  };
+
   // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is
   // nobody's.
   [[nodiscard]] static bool is_given_up(const Entry& entry) {
@@ -140,12 +171,10 @@ class Judge {
 
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
     if ((!entry.succeeded || entry.astray) && parcel.place == entry.fell_into) {
-      undeserved(entry);
-      find(parcel, entry, "fell into another chute, which the journal names");
-    } else if (is_given_up(entry) && story_.unread_strays[parcel.place] > 0) {
-      --story_.unread_strays[parcel.place];
-      undeserved(entry);
-      find(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
+      astray(parcel, entry, "fell into another chute, which the journal names");
+    } else if (is_given_up(entry) && story_.unread[parcel.place] > 0) {
+      --story_.unread[parcel.place];
+      astray(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
     } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted");
@@ -173,10 +202,21 @@ class Judge {
   }
 
   void below(const ParcelTruth& parcel, const Entry& entry) {
-    const bool told = entry.succeeded ? entry.astray : entry.ride || entry.ended;
-    if (!told) return lost(parcel, entry, "fell without an entry");
+    const bool own = entry.succeeded ? entry.astray : (entry.ride && !entry.unseen) || entry.ended || entry.strayed;
+    if (own) {
+      ++with_entry_[parcel.place];
+      astray(parcel, entry, "fell, with an entry");
+    } else if (entry.unseen) {
+      unread_.push_back({&parcel, entry});
+    } else {
+      lost(parcel, entry, "fell without an entry");
+    }
+  }
+
+  void astray(const ParcelTruth& parcel, const Entry& entry, std::string_view how) {
+    ++verdict_.astray;
     undeserved(entry);
-    find(parcel, entry, "fell, with an entry");
+    find(parcel, entry, how);
   }
 
   void undeserved(const Entry& entry) {
@@ -201,6 +241,8 @@ class Judge {
   Verdict& verdict_;
   Story story_;
   RunEnd end_;
+  std::vector<Unread> unread_;             // below
+  std::map<std::string, int> with_entry_;  // below, by place
 };
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -240,6 +282,7 @@ Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const std::vect
                                              parcel.max_press_n, parcel.max_drop_m));
     }
   }
+  judge.below_unread();
   for (const sim::ArmTruth& arm : arms) {
     verdict.violations += arm.speed_violations + arm.torque_violations;
     verdict.worst_ratio = std::max({verdict.worst_ratio, arm.worst_speed_ratio, arm.worst_torque_ratio});

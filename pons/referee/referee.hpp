@@ -25,10 +25,12 @@ struct Verdict {
   int sorted = 0;              // in the ordered chute, and the journal says so
   std::vector<int> sorted_by;  // of those, each arm
   int missorted = 0;           // in another chute than the order's, and no entry accounts for it
-  int lost = 0;                // no outcome, or not where the outcome says, or on floor or tray without an entry
+  int lost = 0;                // no outcome, or not where the outcome says, or on floor or tray without an entry of it;
+                               // of one that was never identified: without one of something without a code, there
   int duplicated = 0;          // handled twice by the journal
   int deserved = 0;            // exceptions that had a reason: label, mass, size
-  int undeserved = 0;          // exceptions that had none, drops with an entry among them
+  int undeserved = 0;          // exceptions that had none, and whatever is astray
+  int astray = 0;              // of those: in another chute, on floor or tray, and an entry says so
   struct Counts {
     int deserved = 0, undeserved = 0;
   };

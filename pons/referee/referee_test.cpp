@@ -43,6 +43,13 @@ class RefereeTest : public ::testing::Test {
   void stray(const std::string& code, const std::string& place, Time now = {}) {
     ASSERT_TRUE(journal_->note(now, "stray", {{"code", code}, {"fell_into", place}}));
   }
+  void unseen(const std::string& code) {
+    const bridge::Json detail{{"code", code}, {"reason", "never identified"}, {"seen", false}};
+    ASSERT_TRUE(journal_->note(Time{}, "ride", detail));
+  }
+  void seen_at(const std::string& place, int things) {
+    ASSERT_TRUE(journal_->note(Time{}, "fell", {{"place", place}, {"things", things}}));
+  }
   void ride(const std::string& code, Time now = {}) {
     ASSERT_TRUE(journal_->note(now, "ride", {{"code", code}, {"reason", "r"}}));
   }
@@ -168,6 +175,7 @@ TEST_F(RefereeTest, AnotherChuteIsMissortedUnlessTheJournalNamesIt) {
              parcel("C", Whereabouts::kChute, "chute_2"), parcel("D", Whereabouts::kChute, "chute_2")});
   EXPECT_EQ(verdict.missorted, 3);
   EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.astray, 1);
   EXPECT_EQ(verdict.reasons.at("fell into chute_#").undeserved, 1);
 }
 
@@ -210,6 +218,7 @@ TEST_F(RefereeTest, OfThoseNobodyHasReadAsManyAreNamedAsTheJournalSays) {
       judge({parcel("C", Whereabouts::kChute, "chute_2"), parcel("A", Whereabouts::kChute, "chute_2"),
              parcel("B", Whereabouts::kChute, "chute_2")});
   EXPECT_EQ(verdict.undeserved, 1);
+  EXPECT_EQ(verdict.astray, 1);
   EXPECT_EQ(verdict.missorted, 2) << "two more";
 }
 
@@ -249,6 +258,35 @@ TEST_F(RefereeTest, AFallIsLostWithoutAnEntry) {
   const Verdict verdict = judge({parcel("A", Whereabouts::kTray, "tray"), parcel("B", Whereabouts::kFloor, "floor")});
   EXPECT_EQ(verdict.undeserved, 1);
   EXPECT_EQ(verdict.lost, 1);
+}
+
+// Whether one of them fell that nobody has read, the end of the run cannot know: only what told of it there and then.
+TEST_F(RefereeTest, ThatOneWasNeverIdentifiedDoesNotAccountForItsFall) {
+  for (const char* const code : {"A", "B", "C", "D"}) unseen(code);
+  stray("D", "");
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kFloor, "floor"), parcel("B", Whereabouts::kTray, "tray"),
+             parcel("C", Whereabouts::kException, "exception"), parcel("D", Whereabouts::kFloor, "floor")});
+  EXPECT_EQ(verdict.lost, 2) << "A and B";
+  EXPECT_EQ(verdict.undeserved, 2) << "C rode to where the unread ride; of D it is told, by its code";
+  EXPECT_EQ(verdict.astray, 1);
+}
+
+TEST_F(RefereeTest, OfTheUnreadBelowAsManyAreAccountedForAsACameraCountsBesideTheOthers) {
+  accept("A", "A");
+  end("A", Outcome::kFailed);
+  for (const char* const code : {"B", "C", "D"}) unseen(code);
+  seen_at("tray", 1);
+  seen_at("tray", 2);
+  stray("", "floor");
+  const std::vector<ParcelTruth> parcels{
+      parcel("B", Whereabouts::kTray, "tray"), parcel("C", Whereabouts::kTray, "tray"),
+      parcel("A", Whereabouts::kTray, "tray"), parcel("D", Whereabouts::kFloor, "floor")};
+  const Verdict verdict = judge(parcels);
+  EXPECT_EQ(verdict.lost, 1) << "one of two things on the tray is A";
+  EXPECT_EQ(verdict.astray, 3);
+  seen_at("tray", 3);
+  EXPECT_EQ(judge(parcels).lost, 0);
 }
 
 TEST_F(RefereeTest, OnTheBeltIsLostUnlessTheRunWasBrokenOff) {

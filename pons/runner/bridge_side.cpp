@@ -408,7 +408,9 @@ void BridgeSide::close(Time now) {
   const std::vector<std::string> unseen = brain_.unseen();
   for (const std::string& code : unseen) {
     bridge_.note("ride",
-                 {{"code", code}, {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"}},
+                 {{"code", code},
+                  {"reason", stopping_ ? "not seen before the run was stopped" : "never identified"},
+                  {"seen", false}},
                  now, code);
   }
   bridge_.note("closed",

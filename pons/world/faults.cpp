@@ -23,22 +23,23 @@ enum class Unit : std::uint8_t { kPick, kParcel, kHour, kMoment };  // kMoment: 
 struct Kind {
   std::string_view name;
   Unit unit;
+  Strikes strikes;
 };
 
-constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick},
-                                            {"weak_vacuum", Unit::kPick},
-                                            {"double_pick", Unit::kPick},
-                                            {"drop", Unit::kPick},
-                                            {"double_label", Unit::kParcel},
-                                            {"belt_jam", Unit::kHour},
-                                            {"occlusion", Unit::kHour},
-                                            {"blackout", Unit::kHour},
-                                            {"shifted_view", Unit::kHour},
-                                            {"brain_stall", Unit::kHour},
-                                            {"vacuum_weak", Unit::kHour},
-                                            {"bridge_crash", Unit::kHour},
-                                            {"brain_lie", Unit::kMoment},
-                                            {"network_loss", Unit::kHour}}};
+constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick, Strikes::kBody},
+                                            {"weak_vacuum", Unit::kPick, Strikes::kBody},
+                                            {"double_pick", Unit::kPick, Strikes::kBody},
+                                            {"drop", Unit::kPick, Strikes::kBody},
+                                            {"double_label", Unit::kParcel, Strikes::kBody},
+                                            {"belt_jam", Unit::kHour, Strikes::kBody},
+                                            {"occlusion", Unit::kHour, Strikes::kBody},
+                                            {"blackout", Unit::kHour, Strikes::kBody},
+                                            {"shifted_view", Unit::kHour, Strikes::kBody},
+                                            {"brain_stall", Unit::kHour, Strikes::kBrain},
+                                            {"vacuum_weak", Unit::kHour, Strikes::kBody},
+                                            {"bridge_crash", Unit::kHour, Strikes::kBridge},
+                                            {"brain_lie", Unit::kMoment, Strikes::kBrain},
+                                            {"network_loss", Unit::kHour, Strikes::kBrain}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;
@@ -109,8 +110,7 @@ FaultPlan read_base(const YamlMap& map, const fs::path& file, const Plans& known
 
 FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlValue value = read_yaml(file);
-  if (file.stem() == FaultPlan{}.name)
-    value.refuse("a run without faults has this name", "call the plan otherwise");
+  if (file.stem() == FaultPlan{}.name) value.refuse("a run without faults has this name", "call the plan otherwise");
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
                      kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name,
@@ -144,8 +144,19 @@ Plans plans_of(const World& world) {
 
 std::string_view name(Fault fault) { return kKinds[static_cast<std::size_t>(fault)].name; }
 
+Strikes strikes(Fault fault) { return kKinds[static_cast<std::size_t>(fault)].strikes; }
+
 bool FaultPlan::any() const {
   return std::ranges::any_of(rates, [](const FaultRate& rate) { return rate.often > 0; });
+}
+
+void FaultPlan::leave_out(Strikes where) {
+  for (std::size_t i = 0; i < kFaults; ++i) {
+    const auto fault = static_cast<Fault>(i);
+    if (strikes(fault) != where || !(rates[i].often > 0)) continue;
+    rates[i] = {};
+    left_out.push_back(fault);
+  }
 }
 
 std::optional<fs::path> faults_file(const World& world, const std::string& named) {

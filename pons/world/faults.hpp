@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "pons/core/error.hpp"
 #include "pons/core/random.hpp"
@@ -37,6 +38,14 @@ inline constexpr std::size_t kFaults = 14;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 
+// Where a fault strikes, and so which process can inject it.
+enum class Strikes : std::uint8_t {
+  kBody,    // the body, its cameras, its belt
+  kBrain,   // the brain, or between it and the bridge
+  kBridge,  // the whole bridge: in virtual time only; by the clock it is a process that can be killed
+};
+[[nodiscard]] Strikes strikes(Fault fault);
+
 // How often, in the fault's own unit: a share of picks or parcels, or events an hour.
 struct FaultRate {
   double often = 0;
@@ -48,9 +57,12 @@ struct FaultRate {
 struct FaultPlan {
   std::string name = "none";
   std::array<FaultRate, kFaults> rates{};
+  std::vector<Fault> left_out{};  // it has them, and who was given it cannot inject them
 
   [[nodiscard]] const FaultRate& operator[](Fault fault) const { return rates[static_cast<std::size_t>(fault)]; }
   [[nodiscard]] bool any() const;
+  // Its faults that strike there never come.
+  void leave_out(Strikes where);
 };
 
 // How often each was injected.

@@ -120,6 +120,18 @@ TEST_F(FaultsTest, APlanIsNotCalledAsIfThereWereNone) {
   expect_says(refusal("base: none\n"), {"none.yaml", "without faults"});
 }
 
+TEST_F(FaultsTest, WhatIsLeftOutNeverComesAndIsNamed) {
+  auto plan = load_faults(world_, "robin");
+  ASSERT_TRUE(plan) << plan.error().line();
+  plan->leave_out(Strikes::kBrain);
+  EXPECT_EQ(plan->left_out, (std::vector{Fault::kBrainStall, Fault::kBrainLie, Fault::kNetworkLoss}));
+  for (const Fault fault : plan->left_out) EXPECT_EQ((*plan)[fault].often, 0) << name(fault);
+  EXPECT_GT((*plan)[Fault::kBridgeCrash].often, 0);
+  plan->leave_out(Strikes::kBody);
+  EXPECT_EQ(plan->left_out.size(), 12U) << "all but a crash, and a weak pump, which the plan has not";
+  EXPECT_GT((*plan)[Fault::kBridgeCrash].often, 0);
+}
+
 TEST_F(FaultsTest, AnUnknownNameIsAnsweredWithThoseThereAre) {
   const auto plan = load_faults(world_, "hurricane");
   ASSERT_FALSE(plan);

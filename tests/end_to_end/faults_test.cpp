@@ -165,12 +165,27 @@ TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {
   EXPECT_NE(run.err.find("none, robin, storm"), std::string::npos) << run.err;
 }
 
+// By the clock a bridge that crashes is a process that somebody kills.
+TEST(Faults, WhatNeverComesByTheClockIsNamedAtOnceAndInTheReport) {
+  const Folder folder;
+  write_text(folder / "plan.yaml", "bridge_crash: {an_hour: 3600, lasts_s: [1, 2]}\nmissed_grasp: {a_pick: 0}\n");
+  const Finished run =
+      run_pons({"run", "parcel_cell", "--realtime", "--parcels", "1", "--seed", "1", "--quiet", "--faults",
+                folder / "plan.yaml", "--socket", folder / "s", "--report", folder / "report.json"});
+  EXPECT_NE(run.err.find("pons: faults of plan that never come here: bridge_crash; "), std::string::npos) << run.err;
+  const json report = read_json(folder / "report.json");
+  EXPECT_EQ(report["faults_left_out"], json::array({"bridge_crash"}));
+  EXPECT_TRUE(report["faults"].empty()) << "it was not injected no times: it could not be";
+}
+
 TEST(Faults, WithoutAPlanTheReportHasNone) {
   const Folder folder;
   const Finished run =
       run_pons({"run", "parcel_cell", "--parcels", "2", "--seed", "1", "--quiet", "--report", folder / "report.json"});
   EXPECT_EQ(run.code, 0) << run.out << run.err;
   EXPECT_TRUE(read_json(folder / "report.json")["faults"].empty());
+  EXPECT_TRUE(read_json(folder / "report.json")["faults_left_out"].empty());
+  EXPECT_EQ(run.err.find("faults"), std::string::npos) << run.err;
   EXPECT_EQ(run.out.find("faults"), std::string::npos) << run.out;
 }
 

@@ -146,6 +146,24 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
 }
 
 // Who stopped the arm is waited for, whichever bridge was told.
+// Of one plan the body does what strikes it, and the bridge what strikes its brain; each names the rest.
+TEST_F(Processes, EachDoesItsPartOfAPlanOfFaults) {
+  write_text(folder_ / "plan.yaml",
+             "brain_lie: {an_hour: 720}\nmissed_grasp: {a_pick: 0.5}\nbridge_crash: {an_hour: 60, lasts_s: [1, 2]}\n");
+  auto words = body(2), above = bridge(2);
+  for (auto* const each : {&words, &above}) each->insert(each->end(), {"--faults", folder_ / "plan.yaml"});
+  Running body_process(folder_.path(), "body", words);
+  Running bridge_process(folder_.path(), "bridge", above);
+  const Finished bridge_told = bridge_process.wait(), body_told = body_process.wait();
+  EXPECT_THAT(body_told.err, HasSubstr("pons: faults of plan that never come here: brain_lie, bridge_crash; "));
+  EXPECT_THAT(bridge_told.err, HasSubstr("pons: faults of plan that never come here: missed_grasp, bridge_crash; "));
+  EXPECT_TRUE(std::regex_search(bridge_told.out, std::regex("fault: [1-9][0-9]* brain_lie"))) << bridge_told.out;
+  const nlohmann::json report = read_json(folder_ / "body.json");
+  EXPECT_GE(report["faults"].value("missed_grasp", 0), 1) << report.dump(2);
+  EXPECT_FALSE(report["faults"].contains("brain_lie")) << "the bridge tells of it";
+  EXPECT_EQ(report["faults_left_out"], nlohmann::json::array({"brain_lie", "bridge_crash"}));
+}
+
 TEST_F(Processes, APersonsStopOutlivesTheBridgeThatWasTold) {
   constexpr int kParcels = 3;
   nlohmann::json robot;

@@ -1,0 +1,30 @@
+// How much memory this process has resident, and how that goes in the course of a run.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "pons/record/report.hpp"
+
+namespace pons::apps {
+
+// MiB, by the kernel; NaN where it does not say.
+[[nodiscard]] double resident_mib();
+
+// One thread at a time.
+class MemoryWatch {
+ public:
+  explicit MemoryWatch(std::function<double()> read = resident_mib) : read_(std::move(read)) {}
+
+  // So many parcels are settled by now. Reads once for each more, from the 500th on.
+  void settled(std::int64_t parcels);
+  // The run has ended.
+  [[nodiscard]] record::Report::Memory end() const;
+
+ private:
+  std::function<double()> read_;
+  record::Report::Memory seen_;
+  std::int64_t settled_ = 0;
+};
+
+}  // namespace pons::apps
