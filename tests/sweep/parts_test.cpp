@@ -196,10 +196,9 @@ TEST(Plan, KnowsWhenWhatARunIsMadeOfHasChanged) {
              std::string(text).replace(text.find("a_pick: 0.0"), 11, "a_pick: 0.1"));
   EXPECT_EQ(digest("none"), none);
   EXPECT_NE(digest("robin"), robin);
-  for (const char* numbers :
-       {"an_hour: 6, lasts_s: [5, 9], share: 0.6", "an_hour: 7, lasts_s: [5, 9], share: 0.6",
-        "an_hour: 7, lasts_s: [4, 9], share: 0.6", "an_hour: 7, lasts_s: [4, 8], share: 0.6",
-        "an_hour: 7, lasts_s: [4, 8], share: 0.5"}) {
+  for (const char* numbers : {"an_hour: 6, lasts_s: [5, 9], share: 0.6", "an_hour: 7, lasts_s: [5, 9], share: 0.6",
+                              "an_hour: 7, lasts_s: [4, 9], share: 0.6", "an_hour: 7, lasts_s: [4, 8], share: 0.6",
+                              "an_hour: 7, lasts_s: [4, 8], share: 0.5"}) {
     const std::string was = digest("robin");
     write_text(folder / "worlds/faults/robin.yaml", text + "vacuum_weak: {" + numbers + "}\n");
     EXPECT_NE(digest("robin"), was) << numbers;
