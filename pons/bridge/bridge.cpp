@@ -224,7 +224,7 @@ std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_
       [this, id = task.id](const tree::Attempt& attempt, Time when) { return journal_attempt(id, attempt, when); },
       [this, id = task.id](const task::Step& use, Time when) { return permit(id, use, when); });
   if (!task.tree) return tree;
-  // The review has seen that the tree knows them.
+  // The review has seen that the tree knows them, and has room for them.
   for (const auto& [name, value] : task.tree->inputs.items()) (void)tree->set(name, value);
   return tree;
 }

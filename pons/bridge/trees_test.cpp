@@ -281,6 +281,31 @@ TEST_F(TreesOfTasks, PreemptedAtACrashItWaitsAgainWithWhatItHadDone) {
   EXPECT_EQ(place_.log.started.size(), 2u);
 }
 
+// One task of 60 KB, which would remember a hundred megabytes and write them down.
+TEST_F(TreesOfTasks, OneThatRemembersMoreAndMoreHasFailedAndLeavesLittleBehind) {
+  std::string script = "s := '0123456789abcdef'";
+  for (int i = 0; i < 10; ++i) script += "; s += s";
+  for (int i = 0; i < 5000; ++i) script += fmt::format("; a{} := s", i);
+  const std::string xml = fmt::format(
+      R"(<root BTCPP_format="4"><BehaviorTree ID="A"><Sequence><Script code="{}"/><Sleep msec="1000"/></Sequence>
+      </BehaviorTree></root>)",
+      script);
+  ASSERT_TRUE(submit_tree("T1", {{"xml", xml}}));
+  tick();
+  ASSERT_EQ(recorded("T1")->outcome, Outcome::kFailed);
+  EXPECT_EQ(recorded("T1")->reason,
+            "blackboard: its texts and lists would have more than 65536 bytes together; keep shorter ones, or unset "
+            "what is needed no more");
+  EXPECT_LT(recorded("T1")->detail.dump().size(), 100'000u);
+}
+
+TEST_F(TreesOfTasks, InputsThatTheBlackboardHasNoRoomForAreRefused) {
+  const auto refused =
+      submit_tree("T1", {{"name", "sort"}, {"inputs", {{"code", "P1"}, {"mass", std::vector<int>(16'384, 1)}}}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().line(), "/tree/inputs: their texts and lists have 65538 bytes, 65536 are taken; send less");
+}
+
 TEST_F(TreesOfTasks, ATreeThatHasChangedSinceIsNotGoneOnWith) {
   ASSERT_TRUE(submit_sort("T1"));
   tick(10);

@@ -110,6 +110,27 @@ TEST_F(HostileBrain, WaitsForPeopleAndIsKeptToItsRates) {
   EXPECT_THAT(story("second"), HasSubstr("FAILED: against the rules of this world (lookouts): at most 1 in 3600 s"));
 }
 
+// A task of 60 KB that would remember a hundred megabytes, write them down as its outcome, and hold up the run.
+TEST_F(HostileBrain, RemembersNoMoreThanATaskMaySay) {
+  std::string script = "s := '0123456789abcdef'";
+  for (int i = 0; i < 10; ++i) script += "; s += s";
+  for (int i = 0; i < 4000; ++i) script += fmt::format("; a{} := s", i);
+  const nlohmann::json tree{
+      {"xml", fmt::format(R"(<root BTCPP_format="4"><BehaviorTree ID="A"><Sequence>)"
+                          R"(<Script code="{}"/><Sleep msec="1000"/></Sequence></BehaviorTree></root>)",
+                          script)}};
+  during_a_run([&] {
+    const Finished sent = submit(nlohmann::json{{"id", "greedy"}, {"tree", tree}}.dump());
+    EXPECT_EQ(sent.code, 0) << sent.err;
+    EXPECT_EQ(task("watch", "greedy").code, 1);
+    const Finished told = task("history", "greedy");
+    EXPECT_THAT(told.out, HasSubstr("FAILED: blackboard: its texts and lists would have more than 65536 bytes"))
+        << told.err;
+  });
+  EXPECT_LT(std::filesystem::file_size(folder_ / "j.db"), 4'000'000u);
+  EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
+}
+
 TEST_F(HostileBrain, RulesThatMeanNothingAreErrorsOfTheFile) {
   const auto file = folder_ / "worlds" / "small_cell" / "world.yaml";
   std::string text = read_text(file);

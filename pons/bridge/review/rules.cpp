@@ -151,17 +151,18 @@ Expected<bool> Rules::holds(const Condition& condition, const world::Rule& rule,
                             const task::Step& use, task::Moment moment) const {
   std::vector<tree::Slot> slots;
   for (const Name& name : condition.names) {
-    const Json known = value(name, task, use);
-    if (known.is_null() && name.argument != kTask && !use.arguments.contains(name.argument))
+    const Json given = value(name, task, use);
+    if (given.is_null() && name.argument != kTask && !use.arguments.contains(name.argument))
       return fail(fmt::format("{}'{}' is not given, and they depend on it", about(rule), name.argument), {}, "give it");
-    if (known.is_null()) {
+    if (given.is_null()) {
       if (moment == task::Moment::kAdmission) return false;
       return fail(fmt::format("{}nobody knows the {} of {}", about(rule), name.fact,
                               task::excerpt(use.arguments.value(name.argument, Json()).dump())));
     }
-    slots.push_back({tree::value_of(known), 0, true});
+    slots.push_back({tree::value_of(given), 0, true});
   }
-  const auto held = condition.script.holds(slots);
+  tree::Blackboard known(std::move(slots));
+  const auto held = condition.script.holds(known);
   if (!held) return fail(about(rule) + "they cannot be decided: " + held.error().line());
   return *held;
 }

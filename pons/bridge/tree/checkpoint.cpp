@@ -104,8 +104,8 @@ Json Tree::checkpoint() const {
     nodes.push_back({i, std::to_underlying(state.status), std::to_underlying(state.returned), state.on ? 1 : 0,
                      state.completed ? 1 : 0, state.child, state.count, state.other, state.stamp});
   }
-  for (std::size_t i = 0; i < slots_.size(); ++i) {
-    const Slot& slot = slots_[i];
+  for (std::size_t i = 0; i < board_.slots().size(); ++i) {
+    const Slot& slot = board_.slots()[i];
     if (slot.writes == 0 && slot.exists == program_->entries[i].exists) continue;
     entries.push_back({i, slot.exists ? 1 : 0, slot.writes, written(slot.value)});
   }
@@ -117,9 +117,9 @@ Json Tree::checkpoint() const {
     if (leaf.ended) leaves.back().push_back(of_end(leaf.last));
   }
   for (std::size_t i = 0; i < queues_.size(); ++i) {
-    if (queues_[i].empty()) continue;
+    if (queues_[i].values.empty()) continue;
     Json queue = Json::array();
-    for (const Value& value : queues_[i]) queue.push_back(written(value));
+    for (const Value& value : queues_[i].values) queue.push_back(written(value));
     queues.push_back({i, std::move(queue)});
   }
   Json checkpoint{{"of", fmt::format("{:016x}", program_->fingerprint)},
@@ -193,10 +193,11 @@ Expected<void> Tree::restore(const Json& checkpoint) {
   for (const Json& list : part_of(checkpoint, "entries")) {
     Numbers numbers(list);
     std::int32_t i = 0;
-    if (!numbers.next(i, 0, std::ssize(slots_) - 1)) return damaged("entries");
-    Slot& slot = made.slot(i);
+    if (!numbers.next(i, 0, std::ssize(board_.slots()) - 1)) return damaged("entries");
+    Slot slot;
     if (!numbers.next(slot.exists) || !numbers.next(slot.writes, 0) || !numbers.next(slot.value) || !numbers.at_end())
       return damaged("entries");
+    if (auto fits = made.board_.put(i, std::move(slot)); !fits) return fits;
   }
   for (const Json& list : part_of(checkpoint, "leaves")) {
     Numbers numbers(list);
@@ -217,7 +218,9 @@ Expected<void> Tree::restore(const Json& checkpoint) {
     if (!numbers.next(i, 0, std::ssize(queues_) - 1) || !numbers.next(queue)) return damaged("queues");
     const Json* const values = std::get_if<Json>(&queue);
     if (values == nullptr || !values->is_array()) return damaged("queues");
-    for (const Json& value : *values) made.queues_[static_cast<std::size_t>(i)].push_back(value_written(value));
+    std::vector<Value> queue_of_loop;
+    for (const Json& value : *values) queue_of_loop.push_back(value_written(value));
+    if (auto fits = made.queue_up(static_cast<std::size_t>(i), std::move(queue_of_loop)); !fits) return fits;
   }
   *this = std::move(made);
   return {};

@@ -160,7 +160,7 @@ NodeStatus Tree::run_once(std::int32_t index) {
 NodeStatus Tree::guarded(std::int32_t index) {
   State& state = this->state(index);
   if (!state.on) {
-    const auto held = script(node(index).index).holds(slots_);
+    const auto held = script(node(index).index).holds(board_);
     if (!held) return broken(held.error());
     if (!*held) {
       const auto otherwise = static_cast<NodeStatus>(std::get<std::int64_t>(port(node(index), 1).literal));
@@ -191,13 +191,13 @@ NodeStatus Tree::loop(std::int32_t index) {
   }
   if (!state.on) {
     if (!fill_queue(index)) return NodeStatus::kBroken;
-    const auto& queue = loop.fixed ? *loop.fixed : queues_[static_cast<std::size_t>(node.index)];
-    if (state.other == 0 || static_cast<std::size_t>(state.count) >= queue.size())
+    const auto& queue = loop.fixed ? *loop.fixed : queues_[static_cast<std::size_t>(node.index)].values;
+    if (state.other == 0 || static_cast<std::size_t>(state.count) >= queue.size()) {
+      (void)queue_up(static_cast<std::size_t>(node.index), {});
       return static_cast<NodeStatus>(std::get<std::int64_t>(port(node, 1).literal));
+    }
     if (const std::int32_t out = port(node, 2).slot; out >= 0) {
-      slot(out).value = queue[static_cast<std::size_t>(state.count)];
-      slot(out).exists = true;
-      ++slot(out).writes;
+      if (!write(out, queue[static_cast<std::size_t>(state.count)])) return NodeStatus::kBroken;
     }
     ++state.count;
     state.on = true;
@@ -215,10 +215,10 @@ bool Tree::fill_queue(std::int32_t index) {
   const Node& node = this->node(index);
   const Loop& loop = program_->loops[static_cast<std::size_t>(node.index)];
   State& state = this->state(index);
-  auto& queue = queues_[static_cast<std::size_t>(node.index)];
+  const auto at = static_cast<std::size_t>(node.index);
   const Value* const given = value(port(node, 0));
   if (loop.fixed || state.other != 0) return true;
-  queue.clear();
+  (void)queue_up(at, {});
   if (given == nullptr) return true;
   state.other = 1;
   const auto* const json = std::get_if<Json>(given);
@@ -236,14 +236,24 @@ bool Tree::fill_queue(std::int32_t index) {
                   "a list, or values apart by ';'"});
     return false;
   }
-  queue = *std::move(read);
-  return true;
+  const auto queued = queue_up(at, *std::move(read));
+  if (!queued) (void)broken(queued.error());
+  return queued.has_value();
+}
+
+// Instead of what that Loop had before. Error: the blackboard has no room for it.
+Expected<void> Tree::queue_up(std::size_t loop, std::vector<Value> values) {
+  Queue& queue = queues_[loop];
+  const std::size_t bytes = bytes_of(values);
+  if (auto kept = board_.keep(bytes, queue.bytes); !kept) return kept;
+  queue = {std::move(values), bytes};
+  return {};
 }
 
 // ---- entries that change ----
 
 bool Tree::was_updated(std::int32_t index) {
-  const Slot& entry = slot(port(node(index), 0).slot);
+  const Slot& entry = board_[port(node(index), 0).slot];
   if (!entry.exists) return false;
   return std::exchange(state(index).stamp, entry.writes) != entry.writes;
 }

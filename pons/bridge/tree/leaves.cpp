@@ -28,7 +28,7 @@ NodeStatus Tree::leaf(std::int32_t index) {
     case Kind::kSetBlackboard:
       return set_blackboard(index);
     case Kind::kUnsetBlackboard:
-      slot(port(node(index), 0).slot) = {};
+      board_.unset(port(node(index), 0).slot);
       return NodeStatus::kSuccess;
     case Kind::kSleep:
       return wait_out(index);
@@ -42,19 +42,15 @@ NodeStatus Tree::leaf(std::int32_t index) {
 }
 
 NodeStatus Tree::script_condition(std::int32_t index) {
-  const auto held = script(node(index).index).holds(slots_);
+  const auto held = script(node(index).index).holds(board_);
   if (!held) return broken(held.error());
   return *held ? NodeStatus::kSuccess : NodeStatus::kFailure;
 }
 
 NodeStatus Tree::set_blackboard(std::int32_t index) {
   const Value* const given = value(port(node(index), 0));
-  Slot& to = slot(port(node(index), 1).slot);
   if (given == nullptr) return NodeStatus::kFailure;
-  to.value = *given;
-  to.exists = true;
-  ++to.writes;
-  return NodeStatus::kSuccess;
+  return write(port(node(index), 1).slot, *given) ? NodeStatus::kSuccess : NodeStatus::kBroken;
 }
 
 NodeStatus Tree::wait_out(std::int32_t index) {
@@ -87,7 +83,7 @@ Expected<task::Step> Tree::step(std::size_t step) const {
   const SkillUse& use = program_->uses[step];
   Json arguments = use.arguments;
   for (const SkillUse::Argument& bound : use.bound) {
-    auto value = argument_of(slots_[static_cast<std::size_t>(bound.slot)].value, bound.schema);
+    auto value = argument_of(board_[bound.slot].value, bound.schema);
     if (!value) return fail(value.error().what, fmt::format("{}/{}", use.name, bound.name), value.error().mend);
     arguments[bound.name] = *std::move(value);
   }
@@ -120,6 +116,9 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   if (leaf.tries == 0 && leaf.began && clock_ - *leaf.began < kBetweenUses) {
     waits_ = true;
     return NodeStatus::kRunning;
+  }
+  for (const SkillUse::Argument& bound : use.bound) {
+    if (const auto read = board_.handle(bytes_of(board_[bound.slot].value)); !read) return broken(read.error());
   }
   const auto what = this->step(step);
   if (!what) return refused(step, what.error());
@@ -165,8 +164,7 @@ NodeStatus Tree::skill_ended(std::size_t step) {
     for (const SkillUse::Output& output : use.outputs) {
       const auto told = last.detail.find(output.name);
       if (!last.detail.is_object() || told == last.detail.end()) continue;
-      Slot& to = slot(output.slot);
-      to = {value_of(*told), to.writes + 1, true};
+      if (!write(output.slot, value_of(*told))) return NodeStatus::kBroken;
     }
     return NodeStatus::kSuccess;
   }

@@ -71,11 +71,17 @@ Expected<std::shared_ptr<const Program>> Library::program(const task::TreeReques
                   "divide it, or give it to the world");
     }
   }
+  std::size_t bytes = 0;
   for (const auto& [name, value] : request.inputs.items()) {
+    bytes += bytes_of(value);
     if (!program->root.contains(name)) {
       return fail(fmt::format("the tree reads and writes no '{}'", task::excerpt(name)), "/tree/inputs",
                   "leave it out, or name an entry of its main tree");
     }
+  }
+  if (bytes > Blackboard::kMaxBytes) {
+    return fail(fmt::format("their texts and lists have {} bytes, {} are taken", bytes, Blackboard::kMaxBytes),
+                "/tree/inputs", "send less");
   }
   return program;
 }

@@ -82,51 +82,53 @@ std::unexpected<Error> Script::wrong(std::string what) const {
   return fail(fmt::format("{} in the script '{}'", what, task::excerpt(text_, 120)));
 }
 
-Expected<Value> Script::joined(const std::string& left, const std::string& right) const {
-  if (left.size() + right.size() > kMaxTextBytes)
-    return wrong(fmt::format("a text would have more than {} bytes", kMaxTextBytes));
+Expected<Value> Script::joined(const std::string& left, const std::string& right, Blackboard& board) const {
+  const std::size_t bytes = left.size() + right.size();
+  if (bytes > kMaxTextBytes) return wrong(fmt::format("a text would have more than {} bytes", kMaxTextBytes));
+  if (auto handled = board.handle(bytes); !handled) return std::unexpected(handled.error());
   return left + right;
 }
 
-Expected<Value> Script::run(std::span<Slot> slots) const {
+Expected<Value> Script::run(Blackboard& board) const {
   Expected<Value> result{Value{}};
   for (const std::int32_t statement : statements_) {
-    result = value(statement, slots);
+    result = value(statement, board);
     if (!result) break;
   }
   return result;
 }
 
-Expected<bool> Script::holds(std::span<Slot> slots) const {
-  const auto result = run(slots);
+Expected<bool> Script::holds(Blackboard& board) const {
+  const auto result = run(board);
   if (!result) return std::unexpected(result.error());
   const auto held = truth_of(*result);
   if (!held) return wrong(fmt::format("{} is no truth value", kind_of(*result)));
   return *held;
 }
 
-Expected<Value> Script::value(std::int32_t index, std::span<Slot> slots) const {
+Expected<Value> Script::value(std::int32_t index, Blackboard& board) const {
   const Expression& expression = expressions_[static_cast<std::size_t>(index)];
   switch (expression.op) {
     case Operator::kLiteral:
       return expression.literal;
     case Operator::kVariable: {
-      const Slot& slot = slots[static_cast<std::size_t>(expression.slot)];
+      const Slot& slot = board[expression.slot];
       if (!slot.exists) return wrong(fmt::format("there is no '{}'", names_[static_cast<std::size_t>(index)]));
+      if (auto handled = board.handle(bytes_of(slot.value)); !handled) return std::unexpected(handled.error());
       return slot.value;
     }
     case Operator::kNegate:
     case Operator::kComplement:
     case Operator::kNot:
-      return unary(expression, slots);
+      return unary(expression, board);
     case Operator::kCompare:
-      return compare(expression, slots);
+      return compare(expression, board);
     case Operator::kIf: {
-      const auto condition = value(expression.left, slots);
+      const auto condition = value(expression.left, board);
       if (!condition) return condition;
       const auto number = to_number(*condition);
       if (!number) return wrong(fmt::format("{} is no truth value", kind_of(*condition)));
-      return value(*number != 0 ? expression.right : expression.third, slots);
+      return value(*number != 0 ? expression.right : expression.third, board);
     }
     case Operator::kCreate:
     case Operator::kAssign:
@@ -134,14 +136,14 @@ Expected<Value> Script::value(std::int32_t index, std::span<Slot> slots) const {
     case Operator::kTakeFrom:
     case Operator::kMultiplyBy:
     case Operator::kDivideBy:
-      return assign(expression, slots);
+      return assign(expression, board);
     default:
-      return binary(expression, slots);
+      return binary(expression, board);
   }
 }
 
-Expected<Value> Script::unary(const Expression& expression, std::span<Slot> slots) const {
-  const auto operand = value(expression.left, slots);
+Expected<Value> Script::unary(const Expression& expression, Blackboard& board) const {
+  const auto operand = value(expression.left, board);
   if (!operand) return operand;
   if (!is_number(*operand)) return wrong(fmt::format("{} has no sign and no opposite", kind_of(*operand)));
   const double number = number_of(*operand);
@@ -152,10 +154,10 @@ Expected<Value> Script::unary(const Expression& expression, std::span<Slot> slot
   return static_cast<double>(~*bits);
 }
 
-Expected<Value> Script::binary(const Expression& expression, std::span<Slot> slots) const {
-  const auto left = value(expression.left, slots);
+Expected<Value> Script::binary(const Expression& expression, Blackboard& board) const {
+  const auto left = value(expression.left, board);
   if (!left) return left;
-  const auto right = value(expression.right, slots);
+  const auto right = value(expression.right, board);
   if (!right) return right;
   if (is_empty(*left) || is_empty(*right)) return wrong("a variable is used that is not set");
   const bool texts = is_text(*left) && is_text(*right);
@@ -173,16 +175,16 @@ Expected<Value> Script::binary(const Expression& expression, std::span<Slot> slo
   }
   const bool joins = expression.op == Operator::kJoin && (is_text(*left) || is_text(*right)) &&
                      (is_text(*left) || is_number(*left)) && (is_text(*right) || is_number(*right));
-  if (joins || (texts && expression.op == Operator::kPlus)) return joined(to_text(*left), to_text(*right));
+  if (joins || (texts && expression.op == Operator::kPlus)) return joined(to_text(*left), to_text(*right), board);
   return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(*left), kind_of(*right)));
 }
 
-Expected<Value> Script::compare(const Expression& expression, std::span<Slot> slots) const {
-  auto left = value(expression.left, slots);
+Expected<Value> Script::compare(const Expression& expression, Blackboard& board) const {
+  auto left = value(expression.left, board);
   if (!left) return left;
   for (std::int32_t next = expression.right; next >= 0;) {
     const Expression& link = expressions_[static_cast<std::size_t>(next)];
-    auto right = value(link.left, slots);
+    auto right = value(link.left, board);
     if (!right) return right;
     if (is_empty(*left) || is_empty(*right)) return wrong("a variable is compared that is not set");
     bool holds = false;
@@ -225,13 +227,13 @@ std::vector<std::int32_t> Script::writes() const {
   return slots;
 }
 
-Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slots) const {
-  Slot& slot = slots[static_cast<std::size_t>(expression.slot)];
+Expected<Value> Script::assign(const Expression& expression, Blackboard& board) const {
+  const Slot& slot = board[expression.slot];
   const std::string& name = names_[static_cast<std::size_t>(expression.left)];
   const Operator op = expression.op;
   if (!slot.exists && op != Operator::kCreate) return wrong(fmt::format("there is no '{}' yet (':=' makes one)", name));
-  slot.exists = true;
-  auto given = value(expression.right, slots);
+  board.make(expression.slot);
+  auto given = value(expression.right, board);
   if (!given) return given;
   if (is_empty(*given)) return wrong("a variable is assigned that is not set");
   if (op != Operator::kCreate && op != Operator::kAssign) {
@@ -239,7 +241,7 @@ Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slo
     if (is_number(slot.value) && is_number(*given)) {
       given = calculate(op, number_of(slot.value), number_of(*given)).value_or(0);
     } else if (is_text(slot.value) && is_text(*given) && op == Operator::kAddTo) {
-      given = joined(std::get<std::string>(slot.value), std::get<std::string>(*given));
+      given = joined(std::get<std::string>(slot.value), std::get<std::string>(*given), board);
       if (!given) return given;
     } else {
       return wrong(fmt::format("{} and {} cannot be combined like that", kind_of(slot.value), kind_of(*given)));
@@ -250,8 +252,7 @@ Expected<Value> Script::assign(const Expression& expression, std::span<Slot> slo
     if (!kept) return wrong(fmt::format("'{}' holds {}, and cannot take this", name, kind_of(slot.value)));
     given = *std::move(kept);
   }
-  slot.value = *given;
-  ++slot.writes;
+  if (auto written = board.write(expression.slot, *given); !written) return std::unexpected(written.error());
   return given;
 }
 

@@ -7,11 +7,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "pons/bridge/tree/blackboard.hpp"
 #include "pons/bridge/tree/value.hpp"
 #include "pons/core/error.hpp"
 
@@ -70,11 +70,11 @@ class Script {
   [[nodiscard]] static Expected<Script> parse(std::string_view text, const SlotOf& slot_of);
 
   // The value of its last statement. Error: a variable that does not exist or is not set, types that do not fit, a
-  // number that would lose digits in an entry that holds integers, a text that would be too long. What was assigned
-  // until then stays assigned. Allocates nothing but long texts.
-  [[nodiscard]] Expected<Value> run(std::span<Slot> slots) const;
+  // number that would lose digits in an entry that holds integers, a text that would be too long, or more than a
+  // blackboard holds or handles. What was assigned until then stays assigned. Allocates nothing but long texts.
+  [[nodiscard]] Expected<Value> run(Blackboard& board) const;
   // Likewise, as a truth value.
-  [[nodiscard]] Expected<bool> holds(std::span<Slot> slots) const;
+  [[nodiscard]] Expected<bool> holds(Blackboard& board) const;
   // Whether it is one statement that writes to no variable.
   [[nodiscard]] bool is_condition() const;
   // The slots that it reads, but for what an assignment adds to and the like; and those that it assigns to.
@@ -85,12 +85,12 @@ class Script {
 
  private:
   class Parser;
-  [[nodiscard]] Expected<Value> value(std::int32_t index, std::span<Slot> slots) const;
-  [[nodiscard]] Expected<Value> binary(const Expression& expression, std::span<Slot> slots) const;
-  [[nodiscard]] Expected<Value> unary(const Expression& expression, std::span<Slot> slots) const;
-  [[nodiscard]] Expected<Value> compare(const Expression& expression, std::span<Slot> slots) const;
-  [[nodiscard]] Expected<Value> assign(const Expression& expression, std::span<Slot> slots) const;
-  [[nodiscard]] Expected<Value> joined(const std::string& left, const std::string& right) const;
+  [[nodiscard]] Expected<Value> value(std::int32_t index, Blackboard& board) const;
+  [[nodiscard]] Expected<Value> binary(const Expression& expression, Blackboard& board) const;
+  [[nodiscard]] Expected<Value> unary(const Expression& expression, Blackboard& board) const;
+  [[nodiscard]] Expected<Value> compare(const Expression& expression, Blackboard& board) const;
+  [[nodiscard]] Expected<Value> assign(const Expression& expression, Blackboard& board) const;
+  [[nodiscard]] Expected<Value> joined(const std::string& left, const std::string& right, Blackboard& board) const;
   [[nodiscard]] std::unexpected<Error> wrong(std::string what) const;
 
   std::vector<Expression> expressions_;

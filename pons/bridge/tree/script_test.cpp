@@ -20,19 +20,16 @@ class Scripts : public testing::Test {
     const auto found = std::ranges::find(names_, name);
     if (found == names_.end()) {
       names_.emplace_back(name);
-      slots_.emplace_back();
       return static_cast<int>(names_.size() - 1);
     }
     return static_cast<int>(found - names_.begin());
   }
-  void set(std::string_view name, Value value) {
-    slots_[static_cast<std::size_t>(*slot(name))] = {std::move(value), 1, true};
-  }
-  [[nodiscard]] const Slot& entry(std::string_view name) { return slots_[static_cast<std::size_t>(*slot(name))]; }
+  void set(std::string_view name, Value value) { ASSERT_TRUE(board_.write(*slot(name), std::move(value))); }
+  [[nodiscard]] const Slot& entry(std::string_view name) { return board_[*slot(name)]; }
   Expected<Value> run(std::string_view text) {
     auto script = Script::parse(text, [this](std::string_view name) { return slot(name); });
     if (!script) return std::unexpected(script.error());
-    return script->run(slots_);
+    return script->run(board_);
   }
   // The value, or the line that refuses it.
   std::string said(std::string_view text) {
@@ -42,7 +39,7 @@ class Scripts : public testing::Test {
   }
 
   std::vector<std::string> names_;
-  std::vector<Slot> slots_;
+  Blackboard board_{std::vector<Slot>(64)};
 };
 
 std::string at_character(std::string_view what, int place, std::string_view script) {
@@ -183,7 +180,7 @@ TEST_F(Scripts, TruthValuesAndBitsAreOfNumbersThatFit) {
   EXPECT_EQ(said("0xFF & 0x0F | ~-2"), "15.000000");
   const auto script = Script::parse("-1", [this](std::string_view name) { return slot(name); });
   ASSERT_TRUE(script);
-  const auto held = script->holds(slots_);
+  const auto held = script->holds(board_);
   EXPECT_EQ(held ? "holds" : held.error().line(), "a number is no truth value in the script '-1'");
 }
 

@@ -11,6 +11,13 @@
 namespace pons::bridge::tree {
 namespace {
 
+std::vector<Slot> slots_of(const Program& program) {
+  std::vector<Slot> slots;
+  slots.reserve(program.entries.size());
+  for (const Entry& entry : program.entries) slots.push_back({entry.initial, 0, entry.exists});
+  return slots;
+}
+
 // A node that yields is come back to in the same tick, as by tickOnce() there; so often, lest one that does nothing but
 // yield holds up the bridge.
 constexpr int kMostRounds = 100;
@@ -24,11 +31,9 @@ Tree::Tree(std::shared_ptr<const Program> program, Observer observer, Permit per
       observer_(std::move(observer)),
       permit_(std::move(permit)),
       states_(program_->nodes.size()),
-      slots_(program_->entries.size()),
+      board_(slots_of(*program_)),
       leaves_(program_->uses.size()),
       queues_(program_->loops.size()) {
-  for (std::size_t i = 0; i < slots_.size(); ++i)
-    slots_[i] = {program_->entries[i].initial, 0, program_->entries[i].exists};
   active_.reserve(leaves_.size());
 }
 
@@ -36,14 +41,13 @@ Expected<void> Tree::set(std::string_view name, const Json& value) {
   const auto found = program_->root.find(name);
   if (found == program_->root.end())
     return fail(fmt::format("the tree reads and writes no '{}'", task::excerpt(name)), {}, "leave it out");
-  slot(found->second) = {value_of(value), 1, true};
-  return {};
+  return board_.write(found->second, value_of(value));
 }
 
 Json Tree::blackboard() const {
   Json entries = Json::object();
   for (const auto& [name, index] : program_->root) {
-    const Slot& entry = slots_[static_cast<std::size_t>(index)];
+    const Slot& entry = board_[index];
     if (entry.exists && !is_empty(entry.value)) entries[name] = json_of(entry.value);
   }
   return entries;
@@ -58,6 +62,7 @@ Status Tree::tick(Time now) {
   ticked_ = true;
   clock_ += passed;
   work_ = 0;
+  board_.begin_tick();
   run_skills(passed);
   if (end_) return active_.empty() ? ended(*end_) : Status::kRunning;
   if (broken_) return broken_off();
@@ -69,7 +74,7 @@ Status Tree::tick(Time now) {
   for (int round = 0; round < kMostRounds; ++round) {
     wakes_ = false;
     status = tick_node(0);
-    if (broken_ || status != NodeStatus::kRunning || !wakes_ || work_ > kMostWork) break;
+    if (broken_ || status != NodeStatus::kRunning || !wakes_ || work() > kMostWork) break;
   }
   if (status == NodeStatus::kRunning && cancelled_ && active_.empty()) status = broken({"cancelled", {}, {}});
   if (broken_) return broken_off();
@@ -117,6 +122,12 @@ NodeStatus Tree::broken(const Error& error) {
   return NodeStatus::kBroken;
 }
 
+bool Tree::write(std::int32_t slot, Value value) {
+  const auto written = board_.write(slot, std::move(value));
+  if (!written) (void)broken(written.error());
+  return written.has_value();
+}
+
 NodeStatus Tree::tick_node(std::int32_t index) {
   const Node& node = this->node(index);
   State& state = this->state(index);
@@ -156,7 +167,7 @@ std::optional<NodeStatus> Tree::precondition(std::int32_t index) {
   const Conditions& conditions = program_->conditions[static_cast<std::size_t>(node(index).conditions)];
   const NodeStatus status = state(index).status;
   const auto holds = [&](std::int32_t script) -> std::optional<bool> {
-    const auto result = this->script(script).holds(slots_);
+    const auto result = this->script(script).holds(board_);
     if (result) return *result;
     (void)broken(result.error());
     return {};
@@ -187,7 +198,7 @@ const Script& Tree::script(std::int32_t index) {
 
 bool Tree::run_script(std::int32_t script) {
   if (script < 0) return true;
-  const auto result = this->script(script).run(slots_);
+  const auto result = this->script(script).run(board_);
   if (!result) (void)broken(result.error());
   return result.has_value();
 }
@@ -274,7 +285,7 @@ bool Tree::overdue(Duration grace) const {
 
 const Value* Tree::value(const Port& port) {
   if (port.slot < 0) return &port.literal;
-  const Slot& entry = slot(port.slot);
+  const Slot& entry = board_[port.slot];
   return entry.exists && !is_empty(entry.value) ? &entry.value : nullptr;
 }
 

@@ -51,7 +51,8 @@ class Tree {
   // Without `permit` every leaf may.
   Tree(std::shared_ptr<const Program> program, Observer observer, Permit permit = {});
 
-  // Sets an entry of the main tree's blackboard, before the first tick. Error: the program has none of that name.
+  // Sets an entry of the main tree's blackboard, before the first tick. Error: the program has none of that name, or
+  // the blackboard has no room for it.
   [[nodiscard]] Expected<void> set(std::string_view name, const Json& value);
   // The main tree's blackboard, as far as it is set: {"mass_kg":1.5}.
   [[nodiscard]] Json blackboard() const;
@@ -70,8 +71,8 @@ class Tree {
   void halt(Time now);
   // Before a tick: the time since the one before does not count.
   void stand_still() { stood_still_ = true; }
-  // Of the last tick, in nodes and operators.
-  [[nodiscard]] std::size_t work() const { return work_; }
+  // Of the last tick, in nodes and operators; what the blackboard has handled counts as so many as take as long.
+  [[nodiscard]] std::size_t work() const { return work_ + board_.handled() / kBytesAsOperator; }
   // Whether a skill has not ended so long after it was told to.
   [[nodiscard]] bool overdue(Duration grace) const;
 
@@ -89,6 +90,9 @@ class Tree {
   [[nodiscard]] Expected<task::Step> step(std::size_t step) const;
 
  private:
+  // Of texts and lists: to read, to copy and to write so much takes no longer than an operator.
+  static constexpr std::size_t kBytesAsOperator = 32;
+
   // What a node remembers; what `on`, `count` and the others mean is its kind's.
   struct State {
     NodeStatus status = NodeStatus::kIdle;
@@ -99,6 +103,11 @@ class Tree {
     std::int32_t count = 0, other = 0;
     std::int64_t stamp = 0;  // when it began, in the tree's time, ns; or how often an entry had been written
     bool operator==(const State&) const = default;
+  };
+  // What a Loop reads from the blackboard.
+  struct Queue {
+    std::vector<Value> values;
+    std::size_t bytes = 0;  // that it counts as on the blackboard
   };
   // What a leaf that uses a skill remembers.
   struct Leaf {
@@ -118,7 +127,6 @@ class Tree {
   [[nodiscard]] const Port& port(const Node& node, std::int32_t which) const {
     return program_->ports[static_cast<std::size_t>(node.ports + which)];
   }
-  [[nodiscard]] Slot& slot(std::int32_t index) { return slots_[static_cast<std::size_t>(index)]; }
 
   // checkpoint.cpp
   [[nodiscard]] bool is_child(std::int32_t index, std::int32_t child) const;
@@ -133,6 +141,8 @@ class Tree {
   [[nodiscard]] const Script& script(std::int32_t index);
   [[nodiscard]] bool run_script(std::int32_t script);
   [[nodiscard]] NodeStatus broken(const Error& error);
+  // Whether it could be written; the tree is broken if not.
+  [[nodiscard]] bool write(std::int32_t slot, Value value);
   void halt_node(std::int32_t index);
   void halt_child(std::int32_t index);
   void halt_children(std::int32_t index, std::int32_t but = -1);
@@ -169,6 +179,7 @@ class Tree {
   [[nodiscard]] NodeStatus guarded(std::int32_t index);
   [[nodiscard]] NodeStatus loop(std::int32_t index);
   [[nodiscard]] bool fill_queue(std::int32_t index);
+  [[nodiscard]] Expected<void> queue_up(std::size_t loop, std::vector<Value> values);
   [[nodiscard]] NodeStatus if_updated(std::int32_t index, NodeStatus otherwise);
   [[nodiscard]] NodeStatus passed_on(std::int32_t index);
   [[nodiscard]] bool was_updated(std::int32_t index);
@@ -194,10 +205,10 @@ class Tree {
   Observer observer_;
   Permit permit_;
   std::vector<State> states_;
-  std::vector<Slot> slots_;
+  Blackboard board_;
   std::vector<Leaf> leaves_;
-  std::vector<std::size_t> active_;         // leaves whose skill runs, in the order of their start
-  std::vector<std::vector<Value>> queues_;  // of the Loops that read one from the blackboard
+  std::vector<std::size_t> active_;  // leaves whose skill runs, in the order of their start
+  std::vector<Queue> queues_;        // of the Loops that read one from the blackboard
   Progress result_;
   std::optional<Progress> broken_, failure_;  // why the tree was broken off; the last skill that failed
   std::int32_t failed_ = -1;                  // the node that failed last by itself, not for its children
@@ -206,7 +217,7 @@ class Tree {
   std::optional<Pause> pause_;
   Duration clock_{0};
   Time now_;              // of the last tick
-  std::size_t work_ = 0;  // of this tick, in nodes and operators
+  std::size_t work_ = 0;  // of this tick, in nodes and operators alone
   bool ticked_ = false;
   bool wakes_ = false;   // a node wants another round in this tick
   bool waits_ = false;   // a leaf is to start a skill as soon as it can

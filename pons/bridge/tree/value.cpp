@@ -10,6 +10,8 @@ namespace {
 
 // Doubles from here on are no int64_t.
 constexpr double kTooLarge = 9223372036854775808.0;
+// A short number and what parts it from the next.
+constexpr std::size_t kBytesAnElement = 4;
 
 template <typename Number>
 std::optional<Number> whole(std::string_view text) {
@@ -81,6 +83,27 @@ Value value_of_literal(std::string_view text) {
   }
   if (const auto real = whole<double>(text)) return *real;
   return std::string(text);
+}
+
+std::size_t bytes_of(const Value& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return text->size();
+  const auto* json = std::get_if<Json>(&value);
+  return json != nullptr ? bytes_of(*json) : 0;
+}
+
+std::size_t bytes_of(const Json& json) {
+  if (const auto* text = json.get_ptr<const std::string*>()) return text->size();
+  std::size_t bytes = 0;
+  if (!json.is_structured()) return bytes;
+  for (const auto& [key, each] : json.items())
+    bytes += kBytesAnElement + (json.is_object() ? key.size() : 0) + bytes_of(each);
+  return bytes;
+}
+
+std::size_t bytes_of(const std::vector<Value>& list) {
+  std::size_t bytes = 0;
+  for (const Value& each : list) bytes += kBytesAnElement + bytes_of(each);
+  return bytes;
 }
 
 std::string_view kind_of(const Value& value) {

@@ -1,11 +1,13 @@
 // What an entry of a tree's blackboard holds, with the conversions that BehaviorTree.CPP makes between them.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "pons/task/json_value.hpp"
 
@@ -15,13 +17,6 @@ using task::Json;
 
 // Nothing; a number; text; or whatever else a skill has to tell: a list, an object. Booleans are the numbers 0 and 1.
 using Value = std::variant<std::monostate, std::int64_t, double, std::string, Json>;
-
-// One entry. `writes` counts every assignment, of the same value, too.
-struct Slot {
-  Value value;
-  std::int64_t writes = 0;
-  bool exists = false;
-};
 
 [[nodiscard]] inline bool is_empty(const Value& value) { return std::holds_alternative<std::monostate>(value); }
 [[nodiscard]] inline bool is_text(const Value& value) { return std::holds_alternative<std::string>(value); }
@@ -44,6 +39,12 @@ struct Slot {
 [[nodiscard]] Json json_of(const Value& value);
 // As the constant of a port: a number where the whole text is one.
 [[nodiscard]] Value value_of_literal(std::string_view text);
+
+// About as much as it takes to write it down: of a text its length, of a list or an object that of all in it; nothing
+// of a number.
+[[nodiscard]] std::size_t bytes_of(const Value& value);
+[[nodiscard]] std::size_t bytes_of(const Json& json);
+[[nodiscard]] std::size_t bytes_of(const std::vector<Value>& list);
 
 // For a message: "a number", "text", …
 [[nodiscard]] std::string_view kind_of(const Value& value);
