@@ -10,7 +10,9 @@
 #include "apps/resources.hpp"
 #include "apps/visitors.hpp"
 #include "pons/bridge/journal/place.hpp"
+#include "pons/bridge/journal/story.hpp"
 #include "pons/rt/clock.hpp"
+#include "pons/rt/shared_memory.hpp"
 #include "pons/runner/thinker.hpp"
 
 namespace pons::apps {
@@ -34,13 +36,13 @@ constexpr Duration kRealTimeLead = std::chrono::milliseconds(60);
 
 constexpr std::string_view kAttached = "attached";  // a bridge to a body; in the journal
 
-// That of the body whose last bridge wrote this journal; empty in one that no bridge of such a body has opened.
-Expected<std::string> body_in(const bridge::Journal& journal) {
+// Whose bridge wrote this journal last, {"body", "link"}; empty in one that no bridge of such a body has opened.
+Expected<task::Json> body_in(const bridge::Journal& journal) {
   const auto events = journal.notes();
   if (!events) return std::unexpected(events.error());
-  std::string body;
+  auto body = task::Json::object();
   for (const bridge::Event& event : *events) {
-    if (event.kind == kAttached) body = task::text_of(event.detail, "body");
+    if (event.kind == kAttached) body = event.detail;
   }
   return body;
 }
@@ -272,15 +274,27 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   const auto earlier = body_in(**opened);
   if (!earlier) return std::unexpected(earlier.error());
   const std::string body = options.body ? fmt::format("{:016x}", *options.body) : std::string();
-  const bool taken_up = options.comes != BridgeOptions::Comes::kFirst && options.body && *earlier == body;
-  if (!taken_up && (counts->accepted > 0 || !earlier->empty())) {
-    const bool may_follow = options.body && options.comes != BridgeOptions::Comes::kFirst;
-    return fail(may_follow ? "holds a run of another body" : "holds an earlier run", bridge::shown(options.journal),
-                "name another file for --journal, or move this one away");
-  }
+  const bool may_follow = options.body && options.comes != BridgeOptions::Comes::kFirst;
+  const bool taken_up = may_follow && task::text_of(*earlier, "body") == body;
+  const bool used = !taken_up && (counts->accepted > 0 || !earlier->empty());
+  const auto refused = [&](std::string_view why) {
+    return fail(std::string(why), bridge::shown(options.journal),
+                bridge::in_database(options.journal) ? "name another bridge, postgresql://…#NAME"
+                                                     : "name another file for --journal, or move this one away");
+  };
+  if (used && !may_follow) return refused("holds an earlier run");
+  if (used && !bridge::in_database(options.journal)) return refused("holds a run of another body");
+  // Whoever has a link's name now follows on a body that had it; of another name, that one may live.
+  const std::string link = task::text_of(*earlier, "link");
+  if (used && !link.empty() && link != options.link && rt::SharedMemory::is_owned(link))
+    return refused(fmt::format("holds the run of a body that lives (--link {})", link));
   journal = std::move(*opened);
   if (!options.body) return {};
-  if (auto noted = journal->note(Time{}, kAttached, {{"body", body}}); !noted) return noted;
+  if (auto noted = journal->note(Time{}, kAttached, {{"body", body}, {"link", options.link}}); !noted) return noted;
+  // A bridge's name in a database is for good, and orders wait under it.
+  if (used) {
+    if (auto ended = bridge::end_with_body(*journal, Time{}); !ended) return ended;
+  }
   return journal->commit();
 }
 

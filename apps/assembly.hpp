@@ -98,9 +98,10 @@ struct BridgeOptions {
   std::optional<gate::ros::NodeSettings> ros;   // likewise, and see
   std::vector<Sink*> sinks = {};                // where else it shows itself; they outlive it
   std::vector<gate::Visitors*> visitors = {};   // who else may ask; likewise
-  // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up, each other that
-  // holds something is refused. Without: each such.
+  // A body that outlives its bridges: the journal of an earlier bridge of the same body is taken up; one in a database
+  // also of another body, which is gone; each other that holds something is refused. Without: each such.
   std::optional<std::uint64_t> body;
+  std::string link = {};  // where that body and its bridges meet
   runner::Recovery recovery = runner::Recovery::kRefused;
   std::uint64_t keep_free = runner::kKeptFree;  // bytes on the journal's disk
   enum class Comes : std::uint8_t { kFirst, kFirstOrLater };

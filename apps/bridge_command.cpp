@@ -20,6 +20,7 @@
 #include "apps/run_kit.hpp"
 #include "apps/run_watch.hpp"
 #include "pons/bridge/journal/place.hpp"
+#include "pons/bridge/journal/story.hpp"
 #include "pons/runner/processes.hpp"
 
 namespace pons::apps {
@@ -93,6 +94,13 @@ void tell(const runner::RunResult& result, const brain::Tally& tally, std::int64
   for (const auto& [fault, times] : faults) say(stdout, fmt::format("fault: {} {}\n", times, fault));
 }
 
+// Its tasks' outcomes, before the journal is closed.
+int body_gone(bridge::Journal& journal, Time now) {
+  auto told = bridge::end_with_body(journal, now);
+  if (told) told = journal.commit();
+  return told ? kExitBodyGone : bad_run(told.error());
+}
+
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
                const world::FaultPlan& plan, const MeetingPlace& place) {
   link::Border& border = place.border();
@@ -110,6 +118,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
       .sinks = along->sinks(),
       .visitors = along->visitors(),
       .body = border.body,
+      .link = options.link,
       .recovery = options.recover ? runner::Recovery::kAllowed : runner::Recovery::kRefused,
       .keep_free = bytes_of(options.keep_free_mib),
       .faults = &faults};
@@ -133,7 +142,8 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   progress.finish();
   const brain::Tally tally = (*half)->dispatcher->tally();
   // Said at once; what perception is in the middle of may take its time to end.
-  const int code = result ? kExitGood : failed(result.error());
+  int code = result ? kExitGood : failed(result.error());
+  if (code == kExitBodyGone) code = body_gone(*(*half)->journal, border.clock.now());
   if (result) {
     (*half)->show(result->end);
     along->end(*result);
@@ -189,6 +199,7 @@ int bridge(const BridgeCommandOptions& options) {
   if (!place) return bad_input(place.error());
   auto named = options;
   named.journal = bridge::named(options.journal, world->name);
+  named.link = name;
   return run_bridge(named, *world, *manifest, *plan, *place);
 }
 

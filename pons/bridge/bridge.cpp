@@ -72,10 +72,12 @@ void Bridge::enqueue(const Open& open, Time since) {
 // ---- after another bridge ----
 
 Expected<void> Bridge::recover(std::span<const Resume> resumes, Time now) {
-  const auto tasks = journal_.tasks();
+  auto tasks = journal_.tasks();
   if (!tasks) return std::unexpected(tasks.error());
-  for (const TaskRecord& record : *tasks) {
+  for (TaskRecord& record : *tasks) {
     if (record.outcome) continue;
+    // An order may have been taken in the time of an earlier body, which was another.
+    record.accepted = std::min(record.accepted, now);
     // Its skills and places are those of the program and the world that run now.
     auto program = review_.check(record.task, record.accepted);
     if (!program) {

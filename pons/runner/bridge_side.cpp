@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "pons/bridge/journal/story.hpp"
 #include "pons/task/json_value.hpp"
 
 namespace pons::runner {
@@ -44,16 +45,22 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
 }
 
 Expected<void> BridgeSide::recall(const bridge::Journal& journal, Time now) {
+  auto events = journal.notes();
+  if (!events) return std::unexpected(events.error());
+  // Of a body that is gone, only the ids that its tasks have taken are still so.
+  std::int64_t since = 0;
+  for (const bridge::Event& event : *events) {
+    if (event.kind == bridge::kBodyGoneEvent) since = event.run;
+  }
+  std::erase_if(*events, [&](const bridge::Event& event) { return event.run < since; });
   const auto tasks = journal.tasks();
   if (!tasks) return std::unexpected(tasks.error());
   decided_ = brain_heard_ = now;  // nobody was there to hear it
   for (const bridge::TaskRecord& record : *tasks) {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
-    if (record.outcome) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
+    if (record.outcome && record.outcome->run >= since) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
   }
-  const auto events = journal.notes();
-  if (!events) return std::unexpected(events.error());
   for (const bridge::Event& event : *events) {
     if (event.kind == "ride") brain_.recall_ride(task::text_of(event.detail, "code"));
   }

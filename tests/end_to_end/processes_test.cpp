@@ -205,7 +205,9 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   EXPECT_EQ(ended.code, kBodyGone) << ended.err;
   EXPECT_THAT(ended.err, HasSubstr("the body has gone"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db-wal")) << "the journal was not closed";
-  EXPECT_FALSE(outcomes(folder_ / "j.db").empty());
+  const auto ends = outcomes(folder_ / "j.db");
+  EXPECT_FALSE(ends.empty());
+  for (const auto& [id, outcome] : ends) EXPECT_NE(outcome, "none") << id << " ends with its body";
 
   // What it left does not hinder the next body; the journal of its run is of no use to that one's bridge.
   Running next_body(folder_.path(), "next", body(6, "next"));

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/story.hpp"
 #include "pons/bridge/journal/test_journal.hpp"
@@ -147,6 +149,44 @@ TEST_F(BookTest, WhatWasNotCommittedIsNeitherInTheJournalNorInTheBook) {
   ASSERT_TRUE(bridge.recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
   EXPECT_EQ(run(bridge).size(), 1u);
   EXPECT_EQ(found("a").outcome, task::Outcome::kSucceeded);
+}
+
+// The journal of one name, with a body that died in the middle of "a", and then with another one.
+TEST_F(BookTest, OrdersThatABodyHadNotBegunAreTheNextOnesAndWhatItHadBegunHasFailed) {
+  for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(book()->submit(order(id)));
+  now_ = at(500);
+  {
+    const auto journal = open("one");
+    Bridge bridge(*journal, skills_, world_);
+    bridge.tick(now_);
+    ASSERT_EQ(bridge.running(), std::vector<std::string>{"a"});
+    ASSERT_TRUE(bridge.submit(R"({"id":"direct","steps":[{"skill":"pick"}]})", now_));
+    ASSERT_TRUE(journal->commit());
+    journal->abandon();
+  }
+  EXPECT_EQ(ids(open("two")->claim(9)), "") << "they wait for the next bridge of that name";
+  now_ = at(0.1);
+  pick_.log.started.clear();
+  const auto journal = open("one");
+  EXPECT_EQ(journal->claimed(), (std::set<std::string>{"a", "b", "c"}));
+  ASSERT_TRUE(end_with_body(*journal, now_));
+  ASSERT_TRUE(end_with_body(*journal, now_)) << "once more has nothing to end";
+  Bridge bridge(*journal, skills_, world_);
+  const auto look = [](const task::Task& task, std::size_t done) {
+    ADD_FAILURE() << task.id << " was begun with another body";
+    return Resumption{.done = done};
+  };
+  ASSERT_TRUE(bridge.recover(look, now_));
+  EXPECT_EQ(run(bridge).size(), 2u);
+  EXPECT_EQ(pick_.log.started.size(), 2u);
+  EXPECT_EQ(found("a").outcome, task::Outcome::kFailed);
+  EXPECT_EQ(found("a").reason, "its body is gone");
+  EXPECT_EQ(found("b").outcome, task::Outcome::kSucceeded);
+  EXPECT_EQ(found("c").outcome, task::Outcome::kSucceeded);
+  EXPECT_EQ(journal->record("direct").value()->outcome->reason, "its body is gone") << "it was that body's alone";
+  for (const Event& event : journal->history("b").value())
+    EXPECT_GE(event.detail.value("waited_s", 0.0), 0.0) << "in the time of a run that is over";
+  EXPECT_EQ(audit(*journal), std::vector<std::string>{});
 }
 
 TEST_F(BookTest, ABridgeTakesOrdersWhileItHasLittleToDoAndTellsHowTheyEnd) {

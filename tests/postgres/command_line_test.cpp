@@ -1,6 +1,11 @@
 // What a person does with a journal and an order book in a database.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <functional>
 
 #include "tests/end_to_end/run_pons.hpp"
 #include "tests/postgres/server.hpp"
@@ -54,6 +59,67 @@ TEST_F(CommandLine, ARunTakesOrdersAndItsJournalIsReadAsAFileIs) {
   EXPECT_THAT(pons({"task", "history", "odd", "--journal", journal}).out, HasSubstr(" refused "));
   EXPECT_THAT(pons({"journal", "compact", journal}).out, HasSubstr("events dropped"));
   EXPECT_EQ(pons({"journal", "upgrade", journal}).code, 0);
+  EXPECT_EQ(pons({"journal", "check", journal}).code, 0);
+}
+
+// Body and bridge are killed while one of their orders goes on and two wait for its arm.
+TEST_F(CommandLine, WhatABodyHadClaimedAndNotBegunIsDoneWithTheNextUnderItsName) {
+  const std::string link = "test.book." + std::to_string(::getpid());
+  write_text(folder_ / "long.json",
+             R"({"id":"long","priority":90,"tree":{"xml":"<root BTCPP_format=\"4\"><BehaviorTree ID=\"A\"><Sequence>)"
+             R"(<Sleep msec=\"600000\"/><move_to place=\"home\"/></Sequence></BehaviorTree></root>"}})");
+  EXPECT_EQ(pons({"book", "submit", place_, folder_ / "long.json"}).out, "long: taken\n");
+  for (const char* const id : {"b", "c"}) {
+    write_text(folder_ / "home.json",
+               fmt::format(R"({{"id":"{}","steps":[{{"skill":"move_to","arguments":{{"place":"home"}}}}]}})", id));
+    EXPECT_EQ(pons({"book", "submit", place_, folder_ / "home.json"}).code, 0);
+  }
+  const auto body = [&](const std::string& of) {
+    return std::vector<std::string>{"body", "small_cell", "--parcels", "3", "--link", of, "--quiet"};
+  };
+  const auto bridge = [&](const std::string& of) {
+    return std::vector<std::string>{"bridge",    "small_cell", "--parcels", "3",          "--link", of,  "--quiet",
+                                    "--journal", place_,       "--socket",  folder_ / of, "--wait", "60"};
+  };
+  const auto book = [&] { return pons({"book", "list", place_}).out; };
+  const auto eventually = [](const std::function<bool()>& holds) {
+    bool held = false;
+    for (int i = 0; i < 3000 && !held; ++i) held = holds();
+    return held;
+  };
+  const std::string journal = place_ + "#small_cell";
+  Running first_body(folder_.path(), "body", body(link));
+  {
+    Running first(folder_.path(), "bridge", bridge(link));
+    ASSERT_TRUE(eventually([&] {
+      return pons({"task", "history", "long", "--journal", journal}).out.find("started") != std::string::npos &&
+             pons({"task", "show", "c", "--journal", journal}).code == 0;
+    })) << first.err();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait().code, -SIGKILL);
+  }
+  {
+    Running other_body(folder_.path(), "other", body(link + ".other"));
+    const Finished refused = pons(bridge(link + ".other"));
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("holds the run of a body that lives (--link " + link + ")"));
+    other_body.signal(SIGINT);
+    EXPECT_EQ(other_body.wait().code, 130);
+  }
+  first_body.signal(SIGKILL);
+  EXPECT_EQ(first_body.wait().code, -SIGKILL);
+  EXPECT_THAT(pons({"run", "small_cell", "--parcels", "1", "--journal", place_}).err,
+              HasSubstr("holds an earlier run"));
+
+  Running next_body(folder_.path(), "next_body", body(link));
+  Running next(folder_.path(), "next", bridge(link));
+  ASSERT_TRUE(eventually([&] { return pons({"book", "list", place_, "--open"}).out.empty(); })) << next.err() << book();
+  next_body.signal(SIGINT);
+  EXPECT_EQ(next.wait().code, 130) << next.err();
+  EXPECT_EQ(next_body.wait().code, 130);
+  EXPECT_THAT(book(), testing::ContainsRegex("long +90 .* FAILED +small_cell +its body is gone"));
+  EXPECT_THAT(book(), testing::ContainsRegex("b +50 .* SUCCEEDED +small_cell"));
+  EXPECT_THAT(book(), testing::ContainsRegex("c +50 .* SUCCEEDED +small_cell"));
   EXPECT_EQ(pons({"journal", "check", journal}).code, 0);
 }
 

@@ -11,7 +11,7 @@ Expected<BookEnd> BookEnd::open(Database& database) {
   BookEnd end(database.name());
   // What another bridge is about to take is as good as taken: who waited for it would hold up its own robot. The locked
   // rows come first, by themselves: no plan can lock more than it takes.
-  const std::array<std::pair<Statement*, std::string_view>, 3> statements{{
+  const std::array<std::pair<Statement*, std::string_view>, 4> statements{{
       {&end.waits_, "SELECT 1 FROM pons.book WHERE claimed_by IS NULL AND priority >= ?1 LIMIT 1"},
       {&end.claim_,
        "WITH free AS MATERIALIZED (SELECT number FROM pons.book WHERE claimed_by IS NULL AND priority >= ?3 "
@@ -19,6 +19,7 @@ Expected<BookEnd> BookEnd::open(Database& database) {
        "mine AS (UPDATE pons.book b SET claimed_by = ?1, claimed = clock_timestamp() FROM free "
        "WHERE b.number = free.number RETURNING b.number, b.priority, b.id, b.body) "
        "SELECT id, body FROM mine ORDER BY priority DESC, number"},
+      {&end.claimed_, "SELECT id FROM pons.book WHERE claimed_by = ?1 AND outcome IS NULL"},
       {&end.close_,
        "UPDATE pons.book SET outcome = ?1, reason = ?2, ended = clock_timestamp() "
        "WHERE id = ?3 AND claimed_by = ?4 AND outcome IS NULL"},
@@ -46,6 +47,18 @@ Expected<std::vector<Order>> BookEnd::claim(std::size_t most, int least) {
     if (!row) return std::unexpected(row.error());
     if (!*row) return orders;
     orders.push_back({claim_.text(0), claim_.text(1)});
+  }
+}
+
+Expected<std::set<std::string>> BookEnd::claimed() {
+  Reading reading(claimed_);
+  claimed_.bind(bridge_);
+  std::set<std::string> ids;
+  for (;;) {
+    const auto row = claimed_.step();
+    if (!row) return std::unexpected(row.error());
+    if (!*row) return ids;
+    ids.insert(claimed_.text(0));
   }
 }
 

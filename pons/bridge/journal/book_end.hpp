@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -22,13 +24,15 @@ class BookEnd {
   [[nodiscard]] Expected<bool> waits(int least);
   // Within a transaction.
   [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least);
+  // The ids of all that this bridge has claimed and that have not ended.
+  [[nodiscard]] Expected<std::set<std::string>> claimed();
   [[nodiscard]] Expected<void> close(std::string_view id, task::Outcome outcome, std::string_view reason);
 
  private:
   explicit BookEnd(std::string bridge) : bridge_(std::move(bridge)) {}
 
   std::string bridge_;
-  Statement waits_, claim_, close_;
+  Statement waits_, claim_, claimed_, close_;
 };
 
 }  // namespace pons::bridge

@@ -346,6 +346,10 @@ Expected<std::vector<Order>> Journal::claim(std::size_t most, int least) {
   return orders;
 }
 
+Expected<std::set<std::string>> Journal::claimed() {
+  return impl_->book ? impl_->book->claimed() : Expected<std::set<std::string>>{};
+}
+
 Expected<void> Journal::close_order(std::string_view id, task::Outcome outcome, std::string_view reason) {
   if (!impl_->book) return {};
   if (auto begun = impl_->ensure_transaction(); !begun) return begun;

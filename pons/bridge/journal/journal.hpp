@@ -131,6 +131,9 @@ class Journal {
   // the next commit(), so that it becomes durable together with their acceptance. None from a file. Error: as a
   // write's.
   [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least = 0);
+  // The ids of those that this bridge, or one of its name before it, has claimed and that have not ended. None of a
+  // file. Error: as of a read.
+  [[nodiscard]] Expected<std::set<std::string>> claimed();
   // How an order that was claimed has ended; outcome() says it by itself. Nothing happens where it is no such order, or
   // has ended before. Error: as a write's.
   [[nodiscard]] Expected<void> close_order(std::string_view id, task::Outcome outcome, std::string_view reason);

@@ -168,6 +168,21 @@ Expected<void> shorten(Journal& journal, std::string_view id, std::size_t keep, 
   return journal.leave_out(id, now, (*events)[from].sequence, story.rests_on(), so_far);
 }
 
+Expected<void> end_with_body(Journal& journal, Time now) {
+  const auto tasks = journal.tasks();
+  if (!tasks) return std::unexpected(tasks.error());
+  const auto orders = journal.claimed();
+  if (!orders) return std::unexpected(orders.error());
+  int ended = 0;
+  for (const TaskRecord& record : *tasks) {
+    if (record.outcome || (!record.started && orders->contains(record.task.id))) continue;
+    if (auto written = journal.outcome(record.task.id, task::Outcome::kFailed, "its body is gone", now); !written)
+      return written;
+    ++ended;
+  }
+  return journal.note(now, kBodyGoneEvent, {{"ended", ended}});
+}
+
 std::vector<std::string> audit(const Journal& journal) {
   std::vector<std::string> wrong;
   if (auto whole = journal.check_storage(); !whole) wrong.push_back(whole.error().line());

@@ -97,6 +97,13 @@ class Story {
 // that checkpoint among it. Errors: as of Journal::event().
 [[nodiscard]] Expected<void> shorten(Journal& journal, std::string_view id, std::size_t keep, Time now);
 
+// The body that this journal's tasks were for is gone, and another may come. What had begun ends as FAILED, for nobody
+// can go on with it or say what became of it; so does what had not, for it was asked of that body and its run's time.
+// Orders of the book that had not begun are as good for another body and stay open. A note says that what was noted of
+// the body before is so no more. Becomes durable with the next commit(). Error: the journal cannot be read or written.
+[[nodiscard]] Expected<void> end_with_body(Journal& journal, Time now);
+inline constexpr std::string_view kBodyGoneEvent = "body_gone";  // {"ended": how many tasks}
+
 // Everything that is wrong with a journal, a line each; empty when it is whole: its storage, each task's story, and
 // every record's form.
 [[nodiscard]] std::vector<std::string> audit(const Journal& journal);
