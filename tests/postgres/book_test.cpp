@@ -184,7 +184,8 @@ TEST_F(BookTest, OrdersThatABodyHadNotBegunAreTheNextOnesAndWhatItHadBegunHasFai
   EXPECT_EQ(found("b").outcome, task::Outcome::kSucceeded);
   EXPECT_EQ(found("c").outcome, task::Outcome::kSucceeded);
   EXPECT_EQ(journal->record("direct").value()->outcome->reason, "its body is gone") << "it was that body's alone";
-  for (const Event& event : journal->history("b").value())
+  const auto story = journal->history("b").value();
+  for (const Event& event : story)
     EXPECT_GE(event.detail.value("waited_s", 0.0), 0.0) << "in the time of a run that is over";
   EXPECT_EQ(audit(*journal), std::vector<std::string>{});
 }
