@@ -172,7 +172,7 @@ Expected<void> Tree::restore(const Json& checkpoint) {
   if (clock == checkpoint.end() || !clock->is_number_integer()) return damaged("clock");
   const auto passed = clock->get<std::int64_t>();
   if (passed < 0 || passed > kMost) return damaged("clock");
-  Tree made(program_, observer_);
+  Tree made(program_, observer_, permit_);
   made.clock_ = Duration(passed);
   if (!made.restore_end(checkpoint)) return damaged("end");
   // Broken are only nodes that are not ticked any more.

@@ -358,6 +358,21 @@ TEST_F(CheckpointsOfSkills, DamagedTheyAreRefusedOrDoNoHarm) {
   EXPECT_GT(taken, 100);
 }
 
+// As rules do that are asked again when a skill starts.
+TEST_F(CheckpointsOfSkills, WhetherASkillMayStartIsAskedInTheNextLifeToo) {
+  const auto document = read_document(in_document("<Sequence><Sleep msec='20'/><good/></Sequence>"), "test");
+  ASSERT_TRUE(document) << document.error().line();
+  const auto program = compile(*document, "", skills_);
+  ASSERT_TRUE(program) << program.error().line();
+  Tree tree(*program, observer_);
+  ASSERT_EQ(tick(tree), Status::kRunning);
+  Tree next(*program, observer_, [](const task::Step&, Time) -> Expected<void> { return fail("not any more"); });
+  ASSERT_TRUE(next.restore(tree.checkpoint()));
+  EXPECT_EQ(run(next), Status::kFailed);
+  EXPECT_EQ(next.result().reason, "not any more");
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
 // ---- how much a tick does ----
 
 TEST(TreeTick, DoesNotAllocate) {
