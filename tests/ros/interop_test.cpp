@@ -1,7 +1,9 @@
 // Pons' node among nodes of both ROS 2 middlewares.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -131,17 +133,20 @@ TEST(InteropOfPictures, ArriveOnASocketOfTheSystemsOwnSize) {
   ASSERT_TRUE(spin_until({node.get()}, [&] {
     return publisher->publish({"first"}) && reliable.said("heard first") && viewer.said("heard first");
   }));
-  const auto name = [](int picture) { return std::to_string(picture) + " "; };
-  for (int i = 0; i < kPictures; ++i) {
-    ASSERT_TRUE(publisher->publish({name(i) + std::string(1 << 20, '.')}));
-    ASSERT_TRUE(spin_until({node.get()}, [&] { return reliable.said("heard " + name(i)); })) << i;
-  }
-  // The viewer may have been kept from its CPU now and then.
-  EXPECT_TRUE(spin_until({node.get()}, [&] {
+  const auto heard = [](const PeerProcess& by, int picture) { return by.said(fmt::format("heard {} ", picture)); };
+  // The viewer may be kept from its CPU now and then; sent in one burst each, hardly half of any row arrive.
+  int most = 0;
+  for (int row = 0; row < 10 && most <= kPictures * 3 / 4; ++row) {
+    const int first = row * kPictures, end = first + kPictures;
+    for (int i = first; i < end; ++i) {
+      ASSERT_TRUE(publisher->publish({fmt::format("{} {}", i, std::string(1 << 20, '.'))}));
+      ASSERT_TRUE(spin_until({node.get()}, [&] { return heard(reliable, i); })) << i;
+    }
     int seen = 0;
-    for (int i = 0; i < kPictures; ++i) seen += viewer.said("heard " + name(i)) ? 1 : 0;
-    return seen > kPictures / 2;
-  })) << ::testing::PrintToString(viewer.lines());
+    for (int i = first; i < end; ++i) seen += heard(viewer, i) ? 1 : 0;
+    most = std::max(most, seen);
+  }
+  EXPECT_GT(most, kPictures * 3 / 4) << ::testing::PrintToString(viewer.lines());
 }
 
 TEST(InteropOfBoth, OneServerAnswersClientsOfEither) {
