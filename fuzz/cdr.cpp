@@ -1,5 +1,6 @@
 // A ROS 2 message as anybody on the wire may send it: the first two bytes say which type it is taken for, the rest is
-// any bytes. What is refused is refused in one readable line; what is taken is written and read again as the same.
+// any bytes. What is refused is refused in one readable line; what is taken is written and read again as the same. A
+// type that is read of its interface file takes what the struct takes, and makes the same of it.
 
 #include <cstdint>
 #include <cstdio>
@@ -9,6 +10,9 @@
 #include <vector>
 
 #include "pons/wire/cdr.hpp"
+#include "pons/wire/interface_types.hpp"
+#include "pons/wire/known_types.hpp"
+#include "pons/wire/schema.hpp"
 #include "pons/wire/types/all_types.hpp"
 
 namespace {
@@ -20,9 +24,23 @@ using namespace pons;
   std::abort();
 }
 
+// A message's own definition: others' parts have none.
+void take_as_read(const std::string& name, std::span<const std::byte> bytes) {
+  static wire::InterfaceTypes types([](const std::string& interface) -> Expected<wire::InterfaceText> {
+    return wire::InterfaceText{std::string(wire::definition(interface)), interface};
+  });
+  if (name.find("/msg/") == name.npos || wire::wire_name(name) != name) return;
+  const auto read = types.type(name);
+  if (!read) found(read.error().line());
+  const auto wanted = wire::known_type(name)->to_json(bytes), got = read->to_json(bytes);
+  if (wanted.has_value() != got.has_value()) found(name + " is taken by one of both");
+  if (wanted ? *got != *wanted : got.error().line() != wanted.error().line()) found(name + " is read as another");
+}
+
 // Numbers that are none are equal to nothing, so what is compared is bytes.
 template <wire::Message T>
 void take(std::span<const std::byte> bytes) {
+  take_as_read(std::string(T::kName), bytes);
   T message, again;
   if (const auto taken = wire::decode(bytes, message); !taken) {
     const std::string line = taken.error().line();

@@ -40,13 +40,14 @@ class Readers {
     }
   }
   // nullptr: its channel is left out.
-  [[nodiscard]] Expected<Json> (*of(std::uint16_t channel) const)(std::span<const std::byte>) {
+  using Read = std::function<Expected<Json>(std::span<const std::byte>)>;
+  [[nodiscard]] const Read* of(std::uint16_t channel) const {
     const auto found = readers_.find(channel);
-    return found == readers_.end() ? nullptr : found->second;
+    return found == readers_.end() ? nullptr : &found->second;
   }
 
  private:
-  std::map<std::uint16_t, Expected<Json> (*)(std::span<const std::byte>)> readers_;
+  std::map<std::uint16_t, Read> readers_;
 };
 
 using Put = std::function<Expected<void>(const mcap::Message&, const mcap::Channel&, const Json&)>;
@@ -61,9 +62,9 @@ Expected<Exported> each_json(const McapReader& reader, const Query& query, const
   const Readers readers(reader.contents(), query, exported);
   Expected<void> done;
   const auto read = reader.each_message(query, [&](const mcap::Message& message, const mcap::Channel& channel) {
-    const auto to_json = readers.of(channel.id);
+    const Readers::Read* const to_json = readers.of(channel.id);
     if (to_json == nullptr) return true;
-    const auto json = to_json(message.data);
+    const auto json = (*to_json)(message.data);
     if (!json) {
       ++exported.unreadable;
       if (!exported.first_unreadable)

@@ -31,6 +31,39 @@ concept Message = requires {
 template <typename T>
 concept Number = std::is_arithmetic_v<T>;
 
+// An array of a type that is known only when the program runs (pons/wire/dynamic.hpp): as many elements as it has.
+template <typename T>
+struct Fixed : std::vector<T> {
+  using std::vector<T>::vector;
+};
+
+namespace detail {
+
+template <typename T>
+inline constexpr bool kIsArray = false;
+template <typename T, std::size_t kCount>
+inline constexpr bool kIsArray<std::array<T, kCount>> = true;
+template <typename T>
+inline constexpr bool kIsArray<Fixed<T>> = true;
+
+}  // namespace detail
+
+template <typename T>
+concept Array = detail::kIsArray<T>;
+
+template <typename T>
+concept Sequence = !Array<T> && std::derived_from<T, std::vector<typename T::value_type>>;
+
+// What a sequence grows by.
+template <Sequence T>
+[[nodiscard]] typename T::value_type blank_of(const T& sequence) {
+  if constexpr (requires { sequence.blank(); }) {
+    return sequence.blank();
+  } else {
+    return {};
+  }
+}
+
 // That many elements or characters at most.
 struct AtMost {
   std::size_t count;
@@ -74,12 +107,12 @@ class Encoding {
   void put(const T& message) {
     T::each_field(message, *this);
   }
-  template <typename T, std::size_t kCount>
-  void put(const std::array<T, kCount>& values) {
+  template <Array T>
+  void put(const T& values) {
     elements(values);
   }
-  template <typename T>
-  void put(const std::vector<T>& values) {
+  template <Sequence T>
+  void put(const T& values) {
     sink_.number(static_cast<std::uint32_t>(values.size()));
     elements(values);
   }
@@ -214,33 +247,39 @@ class CdrReader {
   void take(T& message) {
     T::each_field(message, *this);
   }
-  template <typename T, std::size_t kCount>
-  void take(std::array<T, kCount>& values) {
-    if constexpr (Number<T> && !std::same_as<T, bool>) {
-      numbers(values.data(), kCount);
+  template <Array T>
+  void take(T& values) {
+    elements(values);
+  }
+  template <Sequence T>
+  void take(T& values) {
+    using Element = typename T::value_type;
+    const std::size_t count = length();
+    if constexpr (Number<Element>) {
+      if (count > left() / sizeof(Element)) return fail_with(kTooLong);
+      values.resize(count);
+      elements(values);
     } else {
-      for (T& value : values)
-        if (!failed()) take(value);
+      // One by one: what a count promises may not be there.
+      if (values.size() > count) values.resize(count);
+      for (std::size_t i = 0; i < count && !failed(); ++i)
+        take(i < values.size() ? values[i] : values.emplace_back(blank_of(values)));
     }
   }
-  template <typename T>
-  void take(std::vector<T>& values) {
-    const std::size_t count = length();
-    if constexpr (std::same_as<T, bool>) {
-      values.assign(count, false);
-      for (std::size_t i = 0; i < count && !failed(); ++i) {
+  // As many as there are.
+  template <typename Values>
+  void elements(Values& values) {
+    using Element = typename Values::value_type;
+    if constexpr (std::same_as<Element, bool>) {
+      for (std::size_t i = 0; i < values.size() && !failed(); ++i) {
         bool value = false;
         take(value);
         values[i] = value;
       }
-    } else if constexpr (Number<T>) {
-      if (count > left() / sizeof(T)) return fail_with(kTooLong);
-      values.resize(count);
-      if (count > 0) numbers(values.data(), count);
+    } else if constexpr (Number<Element>) {
+      if (!values.empty()) numbers(values.data(), values.size());
     } else {
-      // One by one: what a count promises may not be there.
-      if (values.size() > count) values.resize(count);
-      for (std::size_t i = 0; i < count && !failed(); ++i) take(i < values.size() ? values[i] : values.emplace_back());
+      for (std::size_t i = 0; i < values.size() && !failed(); ++i) take(values[i]);
     }
   }
   template <Number T>

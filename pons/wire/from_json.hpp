@@ -4,7 +4,6 @@
 // text or a sequence that is too long or too short is refused, with its way there: "poses[3].pose.position.x".
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -84,18 +83,22 @@ class FromJson {
   }
   void take(const Json& json, std::string& value);
   void take(const Json& json, std::vector<std::uint8_t>& value);
-  template <typename T, std::size_t kCount>
-  void take(const Json& json, std::array<T, kCount>& values) {
+  template <Array T>
+  void take(const Json& json, T& values) {
     if (!is_array(json)) return;
-    if (json.size() != kCount) return wrong_count(json.size(), kCount);
-    for (std::size_t i = 0; i < kCount && !error_; ++i) element(json, i, values[i]);
+    if (json.size() != values.size()) return wrong_count(json.size(), values.size());
+    elements(json, values);
   }
-  template <typename T>
-  void take(const Json& json, std::vector<T>& values) {
+  template <Sequence T>
+  void take(const Json& json, T& values) {
     if (!is_array(json)) return;
-    values.assign(json.size(), T{});
+    values.assign(json.size(), blank_of(values));
+    elements(json, values);
+  }
+  template <typename Values>
+  void elements(const Json& json, Values& values) {
     for (std::size_t i = 0; i < values.size() && !error_; ++i) {
-      if constexpr (std::is_same_v<T, bool>) {
+      if constexpr (std::is_same_v<typename Values::value_type, bool>) {
         bool value = false;
         element(json, i, value);
         values[i] = value;

@@ -4,7 +4,6 @@
 // rosbridge and Foxglove show pictures; all other arrays and sequences are arrays. Fields keep their order.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -53,19 +52,12 @@ class ToJson {
     return std::move(visit).take();
   }
   static Json json(const std::vector<std::uint8_t>& bytes) { return base64(bytes); }
-  template <typename T, std::size_t kCount>
-  static Json json(const std::array<T, kCount>& values) {
-    return several(values);
-  }
   template <typename T>
-  static Json json(const std::vector<T>& values) {
-    return several(values);
-  }
-  template <typename Values>
-  static Json several(const Values& values) {
+    requires(Array<T> || Sequence<T>)
+  static Json json(const T& values) {
     Json::array_t array;
     array.reserve(values.size());
-    for (const auto& value : values) array.push_back(json(static_cast<const typename Values::value_type&>(value)));
+    for (const auto& value : values) array.push_back(json(static_cast<const typename T::value_type&>(value)));
     return array;
   }
 

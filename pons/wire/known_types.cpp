@@ -1,7 +1,6 @@
 #include "pons/wire/known_types.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "pons/wire/from_json.hpp"
 #include "pons/wire/schema.hpp"
@@ -32,26 +31,29 @@ Json nothing() {
 }
 
 template <typename... Each>
-constexpr auto listed(Types<Each...>) {
-  return std::array<KnownType, sizeof...(Each)>{
-      KnownType{Each::kName, Each::kHash, &decoded<Each>, &encoded<Each>, &nothing<Each>}...};
+std::vector<KnownType> listed(Types<Each...>) {
+  return {
+      KnownType{std::string(Each::kName), std::string(Each::kHash), &decoded<Each>, &encoded<Each>, &nothing<Each>}...};
 }
 
-constexpr auto kKnown = listed(AllTypes{});
+const std::vector<KnownType>& known() {
+  static const std::vector<KnownType> all = listed(AllTypes{});
+  return all;
+}
 
 }  // namespace
 
 std::vector<const KnownType*> known_types(std::string_view name) {
   std::vector<const KnownType*> found;
-  for (const KnownType& each : kKnown) {
+  for (const KnownType& each : known()) {
     if (wire::wire_name(each.name) == name) found.push_back(&each);
   }
   return found;
 }
 
 const KnownType* known_type(std::string_view name) {
-  const auto found = std::ranges::find(kKnown, name, &KnownType::name);
-  return found == kKnown.end() ? nullptr : &*found;
+  const auto found = std::ranges::find(known(), name, &KnownType::name);
+  return found == known().end() ? nullptr : &*found;
 }
 
 }  // namespace pons::wire

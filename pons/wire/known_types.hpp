@@ -1,9 +1,11 @@
-// All types that Pons knows, by name, for what has only the name: a recording's channels, a
-// world's file. Any thread.
+// Types by name, for what has only the name: a recording's channels, a world's file. Here those that Pons was built
+// with; others: pons/wire/interface_types.hpp. Any thread.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,14 +15,14 @@
 namespace pons::wire {
 
 struct KnownType {
-  std::string_view name;  // as it is here: "rmw_dds_common_humble/msg/Gid"
-  std::string_view hash;  // RIHS01
+  std::string name;  // as it is here: "rmw_dds_common_humble/msg/Gid"
+  std::string hash;  // RIHS01
   // Errors: those of decode().
-  Expected<Json> (*to_json)(std::span<const std::byte> cdr);
+  std::function<Expected<Json>(std::span<const std::byte> cdr)> to_json;
   // Errors: those of from_json() and encode().
-  Expected<std::vector<std::byte>> (*to_cdr)(const Json& json);
+  std::function<Expected<std::vector<std::byte>>(const Json& json)> to_cdr;
   // A new message: its fields, and what they hold when nobody says otherwise.
-  Json (*empty)();
+  std::function<Json()> empty;
 };
 
 // Those that have this name on the wire: none, one, or two forms of it.

@@ -39,6 +39,11 @@ std::string wire_name(std::string_view type) {
   return std::string(package) + std::string(type.substr(slash));
 }
 
+std::string_view definition(std::string_view type) {
+  const Definition* const found = find(type);
+  return found == nullptr ? std::string_view() : found->text;
+}
+
 std::string ros2msg_schema(std::string_view type) {
   const Definition* root = find(type);
   if (root == nullptr) return {};

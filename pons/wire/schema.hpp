@@ -17,6 +17,9 @@ namespace pons::wire {
 // such type.
 [[nodiscard]] std::string ros2msg_schema(std::string_view type);
 
+// What its interface file says of it alone, likewise.
+[[nodiscard]] std::string_view definition(std::string_view type);
+
 template <Message T>
 [[nodiscard]] std::string ros2msg_schema() {
   return ros2msg_schema(T::kName);
