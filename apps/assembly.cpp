@@ -219,7 +219,7 @@ void BridgeHalf::say(std::uint8_t level, Time at, std::string_view line) {
 
 Expected<void> BridgeHalf::add_arms(const world::World& world, const Meeting& meeting) {
   const bool realtime = meeting.pace == runner::Pace::kRealTime;
-  auto served = gate::ros::OutsideSkills::compile(world.outside_skills);
+  auto served = gate::ros::OutsideSkills::compile(world.outside_skills, interface_folders(world));
   if (!served) return std::unexpected(served.error());
   outside = *std::move(served);
   const auto stations = world.arms();

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "apps/outside.hpp"
 #include "apps/paths.hpp"
 #include "apps/policies.hpp"
 #include "pons/gate/ros/outside_skill.hpp"
@@ -20,7 +21,7 @@ Expected<std::unique_ptr<CellSkills>> CellSkills::make(const std::string& name) 
   self->world = *std::move(world);
   self->link = std::make_unique<link::Link>();
   self->end = std::make_unique<link::BridgeEnd>(*self->link);
-  const auto outside = gate::ros::OutsideSkills::compile(self->world.outside_skills);
+  const auto outside = gate::ros::OutsideSkills::compile(self->world.outside_skills, interface_folders(self->world));
   if (!outside) return std::unexpected(outside.error());
   if (self->world.base) {
     self->chassis = std::make_unique<skills::Chassis>(*self->end, self->world);

@@ -10,6 +10,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/doctor.hpp"
+#include "apps/outside.hpp"
 #include "apps/paths.hpp"
 #include "apps/rounds.hpp"
 #include "apps/run_kit.hpp"
@@ -106,7 +107,7 @@ Finding try_world(const std::string& name) {
   const std::string what = "world " + name;
   const auto world = world::load(worlds_folder(), name);
   if (!world) return say(Finding::kBad, what, world.error().line());
-  if (auto served = gate::ros::OutsideSkills::compile(world->outside_skills); !served)
+  if (auto served = gate::ros::OutsideSkills::compile(world->outside_skills, interface_folders(*world)); !served)
     return say(Finding::kBad, what, served.error().line());
   if (world->base) return std::max(try_base(what, *world), try_speech());
   const auto manifest = world::draw_manifest(*world, 1, 1);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <ranges>
 #include <string>
 
 namespace pons::apps {
@@ -17,6 +19,15 @@ Expected<void> check_outside(const world::World& world, const RosOptions& ros, r
   if (!ros.on) return refused(", and this run is none", "--ros");
   if (pace == runner::Pace::kLockstep) return refused(", which lives by the clock", "--realtime");
   return {};
+}
+
+std::vector<std::filesystem::path> interface_folders(const world::World& world) {
+  std::vector<std::filesystem::path> folders = world.interfaces;
+  const char* const prefixes = std::getenv("AMENT_PREFIX_PATH");
+  for (const auto prefix : std::views::split(std::string_view(prefixes == nullptr ? "" : prefixes), ':')) {
+    if (!prefix.empty()) folders.push_back(std::filesystem::path(prefix.begin(), prefix.end()) / "share");
+  }
+  return folders;
 }
 
 bool is_served_by_another(const gate::ros::Node& node, std::string_view name,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -20,6 +21,10 @@ namespace pons::apps {
 
 // Errors: the world has such skills, and the run is no node, or runs in virtual time, which others do not live in.
 [[nodiscard]] Expected<void> check_outside(const world::World& world, const RosOptions& ros, runner::Pace pace);
+
+// Where the types of those skills are looked for that Pons was not built with: in the world's folders of interface
+// files, then in the share/ of each prefix of AMENT_PREFIX_PATH, as nodes of this computer have them.
+[[nodiscard]] std::vector<std::filesystem::path> interface_folders(const world::World& world);
 
 // Whether one of those skills is served by an action or service of that name: then it is not for the run to serve, for
 // of two servers each would take every goal.

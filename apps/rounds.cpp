@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "apps/outside.hpp"
 #include "apps/resources.hpp"
 #include "apps/views/base_view.hpp"
 #include "apps/views/clock_view.hpp"
@@ -62,7 +63,7 @@ Expected<void> Rounds::build_bridge(const RoundsSetup& setup) {
   chassis = std::make_unique<skills::Chassis>(bridge_end, world, realtime ? kRealTimeLead : skills::kSpliceLead);
   speaker = std::make_unique<runner::Speaker>(setup.speech, setup.pace);
   skills::add_base_skills(registry, *chassis, *speaker, [this] { return bridge->is_waited_for(kBase); });
-  auto served = gate::ros::OutsideSkills::compile(world.outside_skills);
+  auto served = gate::ros::OutsideSkills::compile(world.outside_skills, interface_folders(world));
   if (!served) return std::unexpected(served.error());
   outside = *std::move(served);
   if (auto added = outside.add_to(registry); !added) return added;

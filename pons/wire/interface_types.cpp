@@ -89,7 +89,7 @@ std::string hash_of(const std::string& described, const std::map<std::string, st
 
 // ---- a type ----
 
-KnownType known_type_of(std::string name, std::string hash, std::shared_ptr<const DynamicMessage> blank) {
+KnownType known_type_of(const std::string& name, std::string hash, const std::shared_ptr<const DynamicMessage>& blank) {
   auto to_json = [name, blank](std::span<const std::byte> cdr) -> Expected<Json> {
     DynamicMessage message = *blank;
     CdrReader reader(cdr);
@@ -106,7 +106,7 @@ KnownType known_type_of(std::string name, std::string hash, std::shared_ptr<cons
     return bytes;
   };
   auto empty = [blank] { return wire::to_json(*blank); };
-  return {std::move(name), std::move(hash), std::move(to_json), std::move(to_cdr), std::move(empty)};
+  return {name, std::move(hash), std::move(to_json), std::move(to_cdr), std::move(empty)};
 }
 
 }  // namespace

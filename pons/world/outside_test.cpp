@@ -100,6 +100,17 @@ TEST_F(OutsideSection, EachMistakeIsNamed) {
   EXPECT_THAT(changed("goal:", "aim:"), HasSubstr("unknown key"));
 }
 
+TEST_F(OutsideSection, FoldersOfInterfaceFilesLieBesideTheWorldsFile) {
+  folder_.write("cell/own/warehouse_msgs/srv/Stow.srv", "---");
+  const auto world = with(std::string(kNavigate) + "interfaces: [own, ..]\n");
+  ASSERT_TRUE(world) << world.error().line();
+  EXPECT_THAT(world->interfaces, ElementsAre(folder_.path() / "cell/own", folder_.path() / ""));
+  EXPECT_THAT(error(std::string(kNavigate) + "interfaces: [own, mine]\n"),
+              AllOf(HasSubstr("cell/world.yaml:"), HasSubstr("interfaces[1]: there is no folder"),
+                    HasSubstr("relative to the world's folder")));
+  EXPECT_THAT(error(std::string(kNavigate) + "interfaces: own\n"), HasSubstr("interfaces"));
+}
+
 TEST_F(OutsideSection, SeveralArmsHaveNone) {
   folder_.write("two/scene.xml", "<mujoco/>");
   std::ifstream stream("worlds/parcel_cell_two_arms/world.yaml", std::ios::binary);

@@ -18,10 +18,11 @@
 namespace pons::world {
 namespace {
 
-constexpr double kReach = 100;            // m
-constexpr double kMaxSeconds = 3600;      // of a period, a phase, a latency
-constexpr int kNobodysPriority = 101;     // a task has 100 at most
-constexpr int kMostRunning = 1000;        // tasks that need no resource
+constexpr double kReach = 100;         // m
+constexpr double kMaxSeconds = 3600;   // of a period, a phase, a latency
+constexpr int kNobodysPriority = 101;  // a task has 100 at most
+constexpr int kMostRunning = 1000;     // tasks that need no resource
+constexpr std::size_t kMostInterfaceFolders = 64;
 constexpr double kMaxMass = 1000;         // kg
 constexpr double kMaxBeltRamp = 50;       // m/s²
 constexpr double kSlowest = 0.05;         // share of the speed limits: slower, nothing gets anywhere
@@ -227,11 +228,15 @@ void read_common(const YamlMap& map, World& world) {
   if (map.has("review")) world.review = read_review(map["review"]);
   if (map.has("dialects")) world.dialects = read_dialects(map["dialects"]);
   if (map.has("skills")) world.outside_skills = read_outside(map["skills"], world.resources);
+  if (map.has("interfaces")) {
+    for (const YamlValue& folder : map["interfaces"].list(1, kMostInterfaceFolders))
+      world.interfaces.push_back(folder.existing_folder(world.folder));
+  }
 }
 
 World read_rounds(const YamlValue& file, World world) {
   const YamlMap map(file, {"scene_mjcf", "physics_step_s", "robot", "base", "map", "lidars", "stations", "resources"},
-                    {"schedule", "review", "dialects", "skills", "tasks"});
+                    {"schedule", "review", "dialects", "skills", "interfaces", "tasks"});
   read_common(map, world);
   world.robot = read_wheels(map["robot"], world.folder);
   world.base = read_base(map["base"], world.robot);
@@ -259,7 +264,7 @@ World read_world(const std::filesystem::path& folder, std::string_view name) {
   }
   const YamlMap map(
       file, {"scene_mjcf", "physics_step_s", "robot", "belt", "places", "cameras", "resources", "arrivals", "rules"},
-      {"schedule", "review", "dialects", "skills", "zones", "arms", "fallback"});
+      {"schedule", "review", "dialects", "skills", "interfaces", "zones", "arms", "fallback"});
   read_common(map, world);
   const Arms arms = map.has("arms") ? Arms::kSeveral : Arms::kOne;
   world.robot = read_robot(map["robot"], folder, arms);

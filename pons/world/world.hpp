@@ -231,7 +231,9 @@ struct World {
   Schedule schedule;
   Review review;
   std::vector<OutsideSkill> outside_skills;  // that nodes of others serve
-  std::vector<Dialect> dialects;             // over ROS 2; each kind once
+  // Of interface files of their types, PACKAGE/{msg,srv,action}/NAME.{msg,srv,action}.
+  std::vector<std::filesystem::path> interfaces;
+  std::vector<Dialect> dialects;  // over ROS 2; each kind once
   Fallback fallback;
   std::vector<Zone> zones;  // at most kMaxZones
   Arrivals arrivals;

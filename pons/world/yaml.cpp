@@ -204,6 +204,16 @@ std::filesystem::path YamlValue::existing_file(const std::filesystem::path& fold
   return path;
 }
 
+std::filesystem::path YamlValue::existing_folder(const std::filesystem::path& folder) const {
+  const std::filesystem::path path = (folder / text()).lexically_normal();
+  std::error_code code;
+  if (!std::filesystem::is_directory(path, code)) {
+    refuse(fmt::format("there is no folder '{}'", printable(path.string())),
+           "name an existing one, relative to the world's folder");
+  }
+  return path;
+}
+
 YamlMap::YamlMap(const YamlValue& value, std::initializer_list<std::string_view> required,
                  std::initializer_list<std::string_view> optional)
     : value_(value) {

@@ -47,6 +47,8 @@ class YamlValue {
   // An existing file, named relative to `folder`.
   [[nodiscard]] std::filesystem::path existing_file(const std::filesystem::path& folder) const;
 
+  // Likewise, of a folder.
+  [[nodiscard]] std::filesystem::path existing_folder(const std::filesystem::path& folder) const;
   // For a message: file, line and key.
   [[nodiscard]] std::string place() const;
   [[noreturn]] void refuse(std::string what, std::string mend) const;

@@ -1,8 +1,9 @@
 // A node as rmw_cyclonedds_cpp makes one, on Cyclone DDS alone: names, qualities of service, user data, the header of
 // services, and when a service counts as there. What it hears it prints, a line each.
 //
-// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, client, or the JSON of a task to
-// submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input does
+// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, stower, client, or the JSON of a
+// task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input
+// does
 #include <dds/dds.h>
 #include <peer.h>
 #include <poll.h>
@@ -28,6 +29,8 @@ using String = std_msgs_msg_dds__String_;
 using Request = std_srvs_srv_dds__SetBool_Request_;
 using Response = std_srvs_srv_dds__SetBool_Response_;
 using Submitted = pons_msgs_srv_dds__SubmitTask_Request_;
+using Stow = warehouse_msgs_srv_dds__Stow_Request_;
+using Stowed = warehouse_msgs_srv_dds__Stow_Response_;
 using Accepted = pons_msgs_srv_dds__SubmitTask_Response_;
 using QosOwner = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
 
@@ -198,23 +201,20 @@ class Listener final : public Role {
   dds_entity_t reader_;
 };
 
-class Server final : public Role {
+template <typename Asked, typename Told>
+class Server : public Role {
  public:
-  explicit Server(Peer& peer)
-      : replies_(peer.writer(std_srvs_srv_dds__SetBool_Response__desc, "rr/switchReply",
-                             "serviceid=" + peer.identifier(1) + ";")),
-        requests_(peer.reader(std_srvs_srv_dds__SetBool_Request__desc, "rq/switchRequest",
-                              "serviceid=" + peer.identifier(1) + ";")) {}
+  Server(Peer& peer, const std::string& service, const dds_topic_descriptor_t& asked,
+         const dds_topic_descriptor_t& told)
+      : replies_(peer.writer(told, ("rr" + service + "Reply").c_str(), "serviceid=" + peer.identifier(1) + ";")),
+        requests_(peer.reader(asked, ("rq" + service + "Request").c_str(), "serviceid=" + peer.identifier(1) + ";")) {}
   void step() override {
     void* sample = nullptr;
     dds_sample_info_t info;
     while (dds_take(requests_, &sample, &info, 1, 1) == 1) {
       if (info.valid_data) {
-        const Request& request = *static_cast<const Request*>(sample);
-        std::printf("asked %d\n", request.data ? 1 : 0);
         wait_for_reader(info.publication_handle);
-        char text[] = "by cyclone";
-        const Response response{request.client, request.number, request.data, text};
+        const Told response = answer(*static_cast<const Asked*>(sample));
         checked(dds_write(replies_, &response), "reply");
       }
       dds_return_loan(requests_, &sample, 1);
@@ -223,6 +223,7 @@ class Server final : public Role {
   }
 
  private:
+  virtual Told answer(const Asked& request) = 0;
   // Up to 100 ms, for the reader that tells the identifier which the request's writer tells.
   void wait_for_reader(dds_instance_handle_t asker) const {
     auto* const writer = dds_get_matched_publication_data(requests_, asker);
@@ -244,6 +245,45 @@ class Server final : public Role {
   }
 
   dds_entity_t replies_, requests_;
+};
+
+class SwitchServer final : public Server<Request, Response> {
+ public:
+  explicit SwitchServer(Peer& peer)
+      : Server(peer, "/switch", std_srvs_srv_dds__SetBool_Request__desc, std_srvs_srv_dds__SetBool_Response__desc) {}
+
+ private:
+  Response answer(const Request& request) override {
+    std::printf("asked %d\n", request.data ? 1 : 0);
+    return {request.client, request.number, request.data, text_.data()};
+  }
+  std::string text_ = "by cyclone";
+};
+
+// Of a type that Pons was not built with: each bin is stowed whose flags are all set.
+class Stower final : public Server<Stow, Stowed> {
+ public:
+  explicit Stower(Peer& peer)
+      : Server(peer, "/stow", warehouse_msgs_srv_dds__Stow_Request__desc, warehouse_msgs_srv_dds__Stow_Response__desc) {
+  }
+
+ private:
+  Stowed answer(const Stow& request) override {
+    std::printf("stow %s at %.2f %.2f, %.2f\n", request.shelf, request.corners[0].z, request.corners[1].x,
+                static_cast<double>(request.speed));
+    left_.clear();
+    for (std::uint32_t i = 0; i < request.bins._length; ++i) {
+      const auto& bin = request.bins._buffer[i];
+      std::printf("bin %s of %.2f with %u flags\n", bin.name, bin.size_m[2], bin.free._length);
+      for (std::uint32_t k = 0; k < bin.free._length; ++k) {
+        if (!bin.free._buffer[k]) left_.push_back(static_cast<std::uint16_t>(i));
+      }
+    }
+    const auto count = static_cast<std::uint32_t>(left_.size());
+    return {request.client, request.number, left_.empty(), text_.data(), {count, count, left_.data(), false}};
+  }
+  std::string text_ = "there is no room";
+  std::vector<std::uint16_t> left_;
 };
 
 // A server's two ends tell one identifier.
@@ -418,7 +458,8 @@ int main(int count, char** words) {
   if (wanted == "listener") role = std::make_unique<Listener>(peer, "rt/chatter", DDS_DURABILITY_VOLATILE);
   if (wanted == "described")
     role = std::make_unique<Listener>(peer, "rt/robot_description", DDS_DURABILITY_TRANSIENT_LOCAL);
-  if (wanted == "server") role = std::make_unique<Server>(peer);
+  if (wanted == "server") role = std::make_unique<SwitchServer>(peer);
+  if (wanted == "stower") role = std::make_unique<Stower>(peer);
   if (wanted == "client") role = std::make_unique<Switch>(peer);
   if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) role = std::make_unique<Actor>(peer, wanted);
   if (wanted.starts_with("{")) role = std::make_unique<Submitter>(peer, wanted);

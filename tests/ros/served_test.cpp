@@ -40,6 +40,19 @@ skills:
     feedback: [distance_remaining]
     reason: error_msg
 )";
+constexpr const char* kStow = R"(
+  - name: stow
+    service: /stow
+    type: warehouse_msgs/srv/Stow
+    arguments: {shelf: text, z: number, free: boolean}
+    request:
+      shelf: "{shelf}"
+      bins: [{name: box, size_m: [1, 2, "{z}"], free: [true]}, {name: bag, free: [true, "{free}"]}]
+      corners: [{z: "{z}"}, {x: 3}]
+    timeout_s: 60
+    success: stowed
+    reason: why
+)";
 constexpr const char* kHurry = R"(
   - name: hurry_to
     action: /navigate_to_pose
@@ -84,7 +97,10 @@ class Served : public ::testing::Test {
     return held;
   }
   void submit(const std::string& id, double x_m, const char* skill = "navigate_to") const {
-    const nlohmann::json task{{"id", id}, {"steps", {{{"skill", skill}, {"arguments", {{"x", x_m}}}}}}};
+    submit(id, nlohmann::json{{"x", x_m}}, skill);
+  }
+  void submit(const std::string& id, const nlohmann::json& arguments, const char* skill) const {
+    const nlohmann::json task{{"id", id}, {"steps", {{{"skill", skill}, {"arguments", arguments}}}}};
     EXPECT_TRUE(eventually([&] {
       const auto told = gate::ask(folder_ / "s", {{"op", "submit"}, {"task", task}});
       return told && told->value("ok", false);
@@ -140,6 +156,38 @@ TEST_F(Served, AnotherNodeDoesWhatATaskAsksFor) {
   expect_end("alone", "FAILED", "/navigate_to_pose: no server within 5 s");
   run_process.signal(SIGINT);
   (void)run_process.wait();
+}
+
+// By Cyclone DDS, whose own generator has made the peer's code.
+TEST_F(Served, ATypeOfSomebodysOwnIsReadOfItsInterfaceFiles) {
+  const auto share = folder_ / "install" / "warehouse_msgs" / "share" / "warehouse_msgs";
+  std::filesystem::create_directories(share / "srv");
+  write_text(share / "srv" / "Stow.srv",
+             "uint8 FAST=2\nstring<=16 shelf\nBin[] bins\ngeometry_msgs/Point[2] corners\nfloat32 speed 0.5\n---\n"
+             "bool stowed\nstring why\nuint16[] left\n");
+  const auto own = folder_ / "worlds" / "small_cell" / "own" / "warehouse_msgs" / "msg";
+  std::filesystem::create_directories(own);
+  write_text(own / "Bin.msg", "string name\nfloat64[3] size_m  # along x, y, z\nbool[] free\n");
+  write_world(std::string(kSkills) + kStow + "interfaces: [own]\n");
+  EXPECT_THAT(run_pons(run()).err,
+              AllOf(HasSubstr("skills[1].type: Pons does not know the type "
+                              "'warehouse_msgs/srv/Stow'"),
+                    HasSubstr("there is no warehouse_msgs/srv/Stow.srv in "), HasSubstr("small_cell/own")));
+
+  ::setenv("AMENT_PREFIX_PATH", (folder_ / "install" / "warehouse_msgs").c_str(), 1);
+  Running run_process(folder_.path(), "run", run());
+  PeerProcess peer(PONS_CYCLONE_PEER, test_domain(), "warehouse", "stower");
+  submit("stowed", {{"shelf", "A1"}, {"z", 0.25}, {"free", true}}, "stow");
+  expect_end("stowed", "SUCCEEDED", R"("left":[])");
+  EXPECT_TRUE(peer.said("stow A1 at 0.25 3.00, 0.50"));
+  EXPECT_TRUE(peer.said("bin box of 0.25 with 1 flags"));
+  EXPECT_TRUE(peer.said("bin bag of 0.00 with 2 flags"));
+  submit("full", {{"shelf", "A1"}, {"z", 0.25}, {"free", false}}, "stow");
+  expect_end("full", "FAILED", "/stow: not done: there is no room");
+  EXPECT_THAT(story("full"), HasSubstr(R"("left":[1])"));
+  run_process.signal(SIGINT);
+  (void)run_process.wait();
+  ::unsetenv("AMENT_PREFIX_PATH");
 }
 
 TEST_F(Served, ABridgeThatFollowsAnotherDoesNotAskAgain) {

@@ -167,40 +167,47 @@ constexpr std::string_view kGoal = "goal.";
 
 }  // namespace
 
-Expected<OutsideForm> OutsideForm::compile(const world::OutsideSkill& skill) {
+Expected<OutsideForm> OutsideForm::compile(const world::OutsideSkill& skill, wire::InterfaceTypes& types) {
   OutsideForm form(skill);
   if (auto name = expanded(skill.server.text, {"/", "pons"}, {}); !name)
     return fail(name.error().what, skill.server.where, name.error().mend);
-  if (auto found = form.find_types(); !found) return std::unexpected(found.error());
+  if (auto found = form.find_types(types); !found) return std::unexpected(found.error());
   if (auto good = form.check_fields(); !good) return std::unexpected(good.error());
   return form;
 }
 
-Expected<void> OutsideForm::find_types() {
+Expected<void> OutsideForm::find_types(wire::InterfaceTypes& types) {
   const auto& [type, where] = skill_.type;
   const std::string_view kind = acts() ? "/action/" : "/srv/";
   const std::size_t at = type.find(kind);
   if (at == type.npos || at == 0 || type.find('/', at + kind.size()) != type.npos)
     return fail(fmt::format("'{}' is no {}'s type", type, acts() ? "action" : "service"), where,
                 fmt::format("write PACKAGE{}NAME", kind));
-  const auto found = [&](const wire::KnownType*& known, const char* part) {
-    known = wire::known_type(type + part);
-    return known != nullptr;
-  };
-  const bool all = acts() ? found(request_, "_SendGoal_Request") && found(decision_, "_SendGoal_Response") &&
-                                found(ask_, "_GetResult_Request") && found(reply_, "_GetResult_Response") &&
-                                found(feedback_, "_FeedbackMessage")
-                          : found(request_, "_Request") && found(reply_, "_Response");
-  if (all) return {};
-  return fail(fmt::format("Pons does not know the type '{}'", type), where,
-              "it knows those that ros2/interfaces and ros2/pons_msgs define: put its file there and build");
+  using Found = std::pair<wire::KnownType*, const char*>;
+  const std::vector<Found> parts = acts() ? std::vector<Found>{{&request_, "_SendGoal_Request"},
+                                                               {&decision_, "_SendGoal_Response"},
+                                                               {&ask_, "_GetResult_Request"},
+                                                               {&reply_, "_GetResult_Response"},
+                                                               {&feedback_, "_FeedbackMessage"}}
+                                          : std::vector<Found>{{&request_, "_Request"}, {&reply_, "_Response"}};
+  for (const auto& [found, part] : parts) {
+    if (const wire::KnownType* const built = wire::known_type(type + part)) {
+      *found = *built;
+      continue;
+    }
+    auto read = types.type(type + part);
+    if (!read)
+      return fail(read.error().what, read.error().where.empty() ? where : read.error().where, read.error().mend);
+    *found = *std::move(read);
+  }
+  return {};
 }
 
 // With some arguments: what is wrong whatever they are, is wrong with these.
 Expected<void> OutsideForm::check_fields() const {
   task::Json sample = task::Json::object();
   for (const OutsideArgument& argument : skill_.arguments) sample[argument.name] = sample_of(argument);
-  if (const auto bytes = request_->to_cdr(message(sample, {})); !bytes) {
+  if (const auto bytes = request_.to_cdr(message(sample, {})); !bytes) {
     std::string_view way = bytes.error().where;
     if (acts() && way.starts_with(kGoal)) way.remove_prefix(kGoal.size());
     return fail(fmt::format("{}{}{}", way, way.empty() ? "" : " ", bytes.error().what), place_of(skill_.message, way),
@@ -214,7 +221,7 @@ Expected<void> OutsideForm::check_fields() const {
     if (auto good = check_field(result, *skill_.reason, Json::value_t::string, "a text"); !good) return good;
   }
   if (!skill_.told) return {};
-  const Json told = feedback_->empty().at("feedback");
+  const Json told = feedback_.empty().at("feedback");
   for (const world::Placed& wanted : *skill_.told) {
     if (auto good = check_field(told, wanted, Json::value_t::null, ""); !good) return good;
   }
@@ -233,17 +240,17 @@ wire::Json OutsideForm::message(const task::Json& arguments, const GoalId& id) c
 }
 
 wire::Json OutsideForm::empty_result() const {
-  const Json whole = reply_->empty();
+  const Json whole = reply_.empty();
   return acts() ? whole.at("result") : whole;
 }
 
-ServiceTypes OutsideForm::service_types() const { return {request_->name, request_->hash, reply_->name, reply_->hash}; }
+ServiceTypes OutsideForm::service_types() const { return {request_.name, request_.hash, reply_.name, reply_.hash}; }
 
 ActionTypes OutsideForm::action_types() const {
-  return {.send_goal = {request_->name, request_->hash, decision_->name, decision_->hash},
-          .get_result = {ask_->name, ask_->hash, reply_->name, reply_->hash},
-          .feedback = feedback_->name,
-          .feedback_hash = feedback_->hash};
+  return {.send_goal = {request_.name, request_.hash, decision_.name, decision_.hash},
+          .get_result = {ask_.name, ask_.hash, reply_.name, reply_.hash},
+          .feedback = feedback_.name,
+          .feedback_hash = feedback_.hash};
 }
 
 task::Json OutsideForm::schema() const {
@@ -270,14 +277,14 @@ std::vector<std::string> OutsideForm::outputs() const {
 }
 
 Expected<std::vector<std::byte>> OutsideForm::request(const task::Json& arguments, const GoalId& id) const {
-  auto bytes = request_->to_cdr(message(arguments, id));
+  auto bytes = request_.to_cdr(message(arguments, id));
   if (!bytes) return std::unexpected(bytes.error());
   bytes->insert(bytes->begin(), kHeaderRoom, std::byte{});
   return bytes;
 }
 
 Expected<OutsideForm::Reply> OutsideForm::reply(std::span<const std::byte> cdr) const {
-  const auto whole = reply_->to_json(cdr);
+  const auto whole = reply_.to_json(cdr);
   if (!whole) return std::unexpected(whole.error());
   const Json result = acts() ? whole->at("result") : *whole;
   Reply reply{.result = task::Json(result)};
@@ -287,7 +294,7 @@ Expected<OutsideForm::Reply> OutsideForm::reply(std::span<const std::byte> cdr) 
 }
 
 Expected<task::Json> OutsideForm::feedback(std::span<const std::byte> cdr) const {
-  const auto whole = feedback_->to_json(cdr);
+  const auto whole = feedback_.to_json(cdr);
   if (!whole) return std::unexpected(whole.error());
   const Json& all = whole->at("feedback");
   if (!skill_.told) return task::Json(all);

@@ -1,5 +1,5 @@
 // A skill that others serve, as far as it is messages: what a task's arguments become, and what a reply means. Made of
-// what a world's file says and of the types that Pons knows. No network; any thread.
+// what a world's file says and of types that Pons knows or interface files define. No network; any thread.
 #pragma once
 
 #include <optional>
@@ -9,6 +9,7 @@
 #include "pons/core/error.hpp"
 #include "pons/gate/ros/goal_client.hpp"
 #include "pons/task/task.hpp"
+#include "pons/wire/interface_types.hpp"
 #include "pons/wire/known_types.hpp"
 #include "pons/world/outside.hpp"
 
@@ -16,14 +17,16 @@ namespace pons::gate::ros {
 
 class OutsideForm {
  public:
-  // Errors, each with its place in the file: a name that is none; a type that is not known, or no action or service; a
-  // field that the type does not have, or that cannot hold what is written there, whatever the arguments.
-  [[nodiscard]] static Expected<OutsideForm> compile(const world::OutsideSkill& skill);
+  // `types`: where those are looked for that Pons does not know. Errors, each with its place in the file: a name that
+  // is none; a type that is found nowhere, or no action or service; an interface file that cannot be read; a field that
+  // the type does not have, or that cannot hold what is written there, whatever the arguments.
+  [[nodiscard]] static Expected<OutsideForm> compile(const world::OutsideSkill& skill, wire::InterfaceTypes& types);
 
   [[nodiscard]] const world::OutsideSkill& skill() const { return skill_; }
   [[nodiscard]] bool acts() const { return skill_.kind == world::OutsideSkill::Kind::kAction; }
-  [[nodiscard]] ServiceTypes service_types() const;  // of a service
-  [[nodiscard]] ActionTypes action_types() const;    // of an action
+  // Of a service, of an action; valid as long as this lives.
+  [[nodiscard]] ServiceTypes service_types() const;
+  [[nodiscard]] ActionTypes action_types() const;
 
   // JSON schema of the arguments, as task::SkillType has it.
   [[nodiscard]] task::Json schema() const;
@@ -46,18 +49,18 @@ class OutsideForm {
 
  private:
   explicit OutsideForm(world::OutsideSkill skill) : skill_(std::move(skill)) {}
-  [[nodiscard]] Expected<void> find_types();
+  [[nodiscard]] Expected<void> find_types(wire::InterfaceTypes& types);
   [[nodiscard]] Expected<void> check_fields() const;
   [[nodiscard]] wire::Json message(const task::Json& arguments, const GoalId& id) const;
   // What the fields of a result are read in.
   [[nodiscard]] wire::Json empty_result() const;
 
   world::OutsideSkill skill_;
-  const wire::KnownType* request_ = nullptr;   // of a service's request, of send_goal's
-  const wire::KnownType* decision_ = nullptr;  // of send_goal's response
-  const wire::KnownType* ask_ = nullptr;       // of get_result's request
-  const wire::KnownType* reply_ = nullptr;     // of a service's response, of get_result's
-  const wire::KnownType* feedback_ = nullptr;
+  wire::KnownType request_;   // of a service's request, of send_goal's
+  wire::KnownType decision_;  // of send_goal's response
+  wire::KnownType ask_;       // of get_result's request
+  wire::KnownType reply_;     // of a service's response, of get_result's
+  wire::KnownType feedback_;
 };
 
 }  // namespace pons::gate::ros

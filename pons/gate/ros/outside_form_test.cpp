@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "pons/gate/ros/interface_folders.hpp"
 #include "pons/gate/ros/test_outside.hpp"
 #include "pons/task/schema.hpp"
 #include "pons/wire/types/nav2_msgs/action/navigate_to_pose.hpp"
@@ -23,7 +24,8 @@ using wire::std_srvs::srv::SetBool;
 Expected<OutsideForm> form_of(const std::string& text) {
   const auto skills = outside_skills(text);
   if (!skills) return std::unexpected(skills.error());
-  return OutsideForm::compile(skills->front());
+  wire::InterfaceTypes types = interface_types({});
+  return OutsideForm::compile(skills->front(), types);
 }
 
 // The error after the first `from` has become `to`.

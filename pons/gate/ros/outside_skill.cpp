@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "pons/gate/ros/interface_folders.hpp"
+
 namespace pons::gate::ros {
 namespace {
 
@@ -158,10 +160,12 @@ task::SkillType skill_type(const std::shared_ptr<const OutsideForm>& form, const
 
 }  // namespace
 
-Expected<OutsideSkills> OutsideSkills::compile(std::span<const world::OutsideSkill> skills) {
+Expected<OutsideSkills> OutsideSkills::compile(std::span<const world::OutsideSkill> skills,
+                                               std::vector<std::filesystem::path> folders) {
   OutsideSkills compiled;
+  wire::InterfaceTypes types = interface_types(std::move(folders));
   for (const world::OutsideSkill& skill : skills) {
-    auto form = OutsideForm::compile(skill);
+    auto form = OutsideForm::compile(skill, types);
     if (!form) return std::unexpected(form.error());
     compiled.skills_.push_back(
         {std::make_shared<const OutsideForm>(*std::move(form)), std::make_shared<OutsideLine>()});

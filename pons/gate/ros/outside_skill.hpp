@@ -2,6 +2,7 @@
 // once: what became of it and is not known is a failure, never a reason to ask again.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -23,8 +24,10 @@ class OutsideSkills {
   static constexpr Duration kCancelledWithin = std::chrono::seconds(10), kHaltedWithin = std::chrono::seconds(2);
   static constexpr Duration kFeedbackPeriod = std::chrono::seconds(1);  // in the journal at most
 
-  // Errors: those of OutsideForm::compile().
-  [[nodiscard]] static Expected<OutsideSkills> compile(std::span<const world::OutsideSkill> skills);
+  // `folders`: of interface files, where types are looked for that Pons does not know, in this order. Errors: those of
+  // OutsideForm::compile().
+  [[nodiscard]] static Expected<OutsideSkills> compile(std::span<const world::OutsideSkill> skills,
+                                                       std::vector<std::filesystem::path> folders);
   // They wait for their servers in vain as long as there is no node. Error: there is a skill of that name already.
   [[nodiscard]] Expected<void> add_to(task::SkillRegistry& registry) const;
   // Before the node spins, on its thread; they may outlive it. Errors: those of Node::add_writer().

@@ -37,7 +37,7 @@ class OutsideSkillTest : public ::testing::Test {
   void SetUp() override {
     const auto skills = outside_skills(std::string(kNavigateTo) + kSwitch);
     ASSERT_TRUE(skills) << skills.error().line();
-    auto compiled = OutsideSkills::compile(*skills);
+    auto compiled = OutsideSkills::compile(*skills, {});
     ASSERT_TRUE(compiled) << compiled.error().line();
     skills_ = *std::move(compiled);
     ASSERT_TRUE(skills_.add_to(registry_));
