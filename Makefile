@@ -16,8 +16,10 @@ LOOP = rt_test link_test motion_test cerebellum_test
 # What reads bytes that others wrote: fuzz/NAME.cpp.
 FUZZERS = cdr foxglove journal mcap ros task tree
 FUZZ_S ?= 30
+# Interfaces that real nodes need beside those of ROS 2's wheels.
+ROS_MESSAGES = ros2/pons_msgs $(addprefix ros2/interfaces/,control_msgs nav2_msgs tf2_msgs)
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers clean
+.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers ros-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -103,6 +105,16 @@ bench-peers: ## build what the benchmarks compare against
 	mkdir -p build/release/bench/peers
 	g++ -std=c++17 -O3 -DNDEBUG -Wall -Wextra -Werror -isystem /usr/include/eigen3 bench/peers/kdl_inverse.cpp \
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
+
+ros-peers: .venv-ros/messages ## runs beside real nodes of ROS 2, as wheels (hundreds of MB; wants a python3.12)
+	cmake --preset release
+	cmake --build --preset release --parallel $(JOBS) --target pons
+	for name in arm pictures rounds; do .venv-ros/bin/python tests/ros/real/$${name}_test.py build/release/apps/pons || exit 1; done
+
+.venv-ros/messages: tools/requirements-ros.txt tests/ros/real/messages.py $(shell find $(ROS_MESSAGES) -type f)
+	@tools/setup --ros
+	.venv-ros/bin/python tests/ros/real/messages.py $(ROS_MESSAGES) >/dev/null
+	touch $@
 
 gates: build bench-peers ## the benchmarks with bars, which fail where one is missed; on a computer that does nothing else
 	for program in cdr control_step inverse_kinematics journal recording ros_images ros_round_trip scheduling stop_latency trees wake_up; do build/release/bench/$$program --gate || exit 1; done
