@@ -106,7 +106,7 @@ bench-peers: ## build what the benchmarks compare against
 	g++ -std=c++17 -O3 -DNDEBUG -Wall -Wextra -Werror -isystem /usr/include/eigen3 bench/peers/kdl_inverse.cpp \
 	  -lorocos-kdl -o build/release/bench/peers/kdl_inverse
 
-ros-peers: .venv-ros/messages ## runs beside real nodes of ROS 2, as wheels (hundreds of MB; wants a python3.12)
+ros-peers: .venv-ros/messages ## runs beside real nodes of ROS 2, as wheels (260 MB; wants a python3.12)
 	cmake --preset release
 	cmake --build --preset release --parallel $(JOBS) --target pons
 	for name in arm pictures rounds; do .venv-ros/bin/python tests/ros/real/$${name}_test.py build/release/apps/pons || exit 1; done
