@@ -35,7 +35,8 @@ constexpr int kPauseMs = 2;  // between two rounds of what is malformed
 
 class Maker {
  public:
-  // No reader that expects anything can read it, but by chance.
+  // No reader that expects anything can read it, but by chance; and none the wish to stop a robot, which has a byte, or
+  // 17 behind a client's number. That is granted, and the robot stands until a person resets it.
   Bytes malformed(int number) {
     switch (number % 8) {
       case 0:
@@ -45,13 +46,13 @@ class Maker {
       case 2:
         return after({0x7f, 0x7f, 0, 0}, zeros(24));
       case 3:
-        return after({0, 1, 0, 0}, random(number % 200));
+        return after({0, 1, 0, 0}, random(24 + number % 200));
       case 4:  // a length that cannot be, wherever one is looked for
         return after({0, 1, 0, 0}, Bytes(64, std::byte{0xff}));
       case 5:  // text that ends too early; and so behind a header or a goal's id of 16 bytes
         return after({0, 1, 0, 0}, number / 8 % 2 == 0 ? promised(0) : promised(16));
       case 6:
-        return after({0, 0, 0, 0}, random(number % 100));
+        return after({0, 0, 0, 0}, random(24 + number % 100));
       default:
         return after({0, 1, 0, 0}, random(100'000));
     }
@@ -158,7 +159,6 @@ int main(int count, char** words) {
     Hostile hostile(static_cast<std::uint32_t>(std::atoi(words[1])));
     Maker maker;
     const bool floods = role == "flood";
-    // A request that can be read is granted: a robot that is asked to stop stands until a person resets it.
     std::vector<std::string_view> spares;
     if (floods) spares = {"emergency_stop", "/stopRequest", "change_state"};
     for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, floods ? 0 : kPauseMs) == 0;)
