@@ -23,6 +23,14 @@ struct DynamicField {
 struct DynamicValue;
 
 struct DynamicMessage {
+  // A message may hold messages: what it is made of is complete only below.
+  explicit DynamicMessage(std::shared_ptr<const std::vector<DynamicField>> of = nullptr);
+  DynamicMessage(const DynamicMessage& other);
+  DynamicMessage(DynamicMessage&& other) noexcept;
+  DynamicMessage& operator=(const DynamicMessage& other);
+  DynamicMessage& operator=(DynamicMessage&& other) noexcept;
+  ~DynamicMessage();
+
   static constexpr std::string_view kName = "";  // messages of any type are of this one
   std::shared_ptr<const std::vector<DynamicField>> fields;
   std::vector<DynamicValue> values;  // one for each of them
@@ -51,6 +59,13 @@ struct DynamicValue {
                std::uint64_t, float, double, std::string>
       held;
 };
+
+inline DynamicMessage::DynamicMessage(std::shared_ptr<const std::vector<DynamicField>> of) : fields(std::move(of)) {}
+inline DynamicMessage::DynamicMessage(const DynamicMessage& other) = default;
+inline DynamicMessage::DynamicMessage(DynamicMessage&& other) noexcept = default;
+inline DynamicMessage& DynamicMessage::operator=(const DynamicMessage& other) = default;
+inline DynamicMessage& DynamicMessage::operator=(DynamicMessage&& other) noexcept = default;
+inline DynamicMessage::~DynamicMessage() = default;
 
 template <typename Self, typename Visit>
 void DynamicMessage::each_field(Self& self, Visit& visit) {
