@@ -71,6 +71,18 @@ std::string read_bounded(const std::filesystem::path& file) {
   return text;
 }
 
+std::filesystem::path existing(const YamlValue& named, const std::filesystem::path& folder,
+                               std::filesystem::file_type type) {
+  std::filesystem::path path = (folder / named.text()).lexically_normal();
+  std::error_code code;
+  if (std::filesystem::status(path, code).type() != type) {
+    named.refuse(fmt::format("there is no {} '{}'", type == std::filesystem::file_type::directory ? "folder" : "file",
+                             printable(path.string())),
+                 "name an existing one, relative to the world's folder");
+  }
+  return path;
+}
+
 }  // namespace
 
 YamlValue::YamlValue(std::shared_ptr<const std::filesystem::path> file, const YAML::Node& node, std::string key)
@@ -195,23 +207,11 @@ AxisVector YamlValue::axes(std::size_t count, double low, double high) const {
 }
 
 std::filesystem::path YamlValue::existing_file(const std::filesystem::path& folder) const {
-  const std::filesystem::path path = (folder / text()).lexically_normal();
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) {
-    refuse(fmt::format("there is no file '{}'", printable(path.string())),
-           "name an existing one, relative to the world's folder");
-  }
-  return path;
+  return existing(*this, folder, std::filesystem::file_type::regular);
 }
 
 std::filesystem::path YamlValue::existing_folder(const std::filesystem::path& folder) const {
-  const std::filesystem::path path = (folder / text()).lexically_normal();
-  std::error_code code;
-  if (!std::filesystem::is_directory(path, code)) {
-    refuse(fmt::format("there is no folder '{}'", printable(path.string())),
-           "name an existing one, relative to the world's folder");
-  }
-  return path;
+  return existing(*this, folder, std::filesystem::file_type::directory);
 }
 
 YamlMap::YamlMap(const YamlValue& value, std::initializer_list<std::string_view> required,
