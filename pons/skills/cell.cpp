@@ -171,14 +171,6 @@ void Cell::holds_nothing() {
   arm.payload(0, Vector3::Zero());
 }
 
-const world::Place* Cell::fallen_since(const Falls& before) const {
-  for (std::size_t i = 0; i < world.places.size(); ++i) {
-    const world::Place& place = world.places[i];
-    if (place.kind == world::PlaceKind::kChute && falls()[i] != before[i]) return &place;
-  }
-  return nullptr;
-}
-
 std::vector<task::Note> Cell::take_notes() {
   for (const SentMotion& motion : arm.take_sent())
     note("motion", {{"first_tick", motion.first_tick}, {"last_tick", motion.last_tick}});

@@ -168,8 +168,6 @@ class Cell {
   };
   [[nodiscard]] const std::vector<Watched>& watched() const { return watched_; }
   [[nodiscard]] const Falls& falls() const { return arm.state().fallen_into; }
-  // The chute into which something has fallen since; nullptr: none. What rides off the belt's end breaks no chute's.
-  [[nodiscard]] const world::Place* fallen_since(const Falls& before) const;
   // For the journal, of whatever task runs.
   void note(std::string kind, task::Json detail) { notes_.push_back({std::move(kind), std::move(detail)}); }
   // Since the last call, the motions that were sent among them.

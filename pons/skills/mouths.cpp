@@ -21,10 +21,21 @@ std::vector<const world::Place*> Mouths::unexpected(const Falls& falls, Time now
   const Falls before = std::exchange(last_, falls).value_or(falls);
   for (std::size_t i = 0; i < world_.places.size(); ++i) {
     const bool rides = world_.places[i].kind != world::PlaceKind::kChute;
+    if (falls[i] != before[i]) counted_[i] = now;
     for (auto more = static_cast<std::uint16_t>(falls[i] - before[i]); more > 0; --more)
       if (rides || !was_expected(i, now)) fell.push_back(&world_.places[i]);
   }
   return fell;
+}
+
+std::vector<const world::Place*> Mouths::fallen_since(const Falls& before) const {
+  const auto index = [&](const world::Place& place) { return static_cast<std::size_t>(&place - world_.places.data()); };
+  std::vector<const world::Place*> chutes;
+  for (const world::Place& place : world_.places)
+    if (place.kind == world::PlaceKind::kChute && last_ && (*last_)[index(place)] != before[index(place)])
+      chutes.push_back(&place);
+  std::ranges::stable_sort(chutes, {}, [&](const world::Place* place) { return counted_[index(*place)]; });
+  return chutes;
 }
 
 // One fall each.

@@ -36,6 +36,9 @@ class Mouths {
   void expect_no_more() { anywhere_.reset(); }
   // Each tick: the places into which something fell since the last one that was not expected, or rode.
   [[nodiscard]] std::vector<const world::Place*> unexpected(const Falls& falls, Time now);
+  // The chutes into which something has fallen since it was so, the last one last. What rides off the belt's end breaks
+  // no chute's.
+  [[nodiscard]] std::vector<const world::Place*> fallen_since(const Falls& before) const;
   // After that: the loads that should have fallen into their places by now, each once.
   [[nodiscard]] std::vector<Load> take_uncounted(Time now);
 
@@ -45,6 +48,7 @@ class Mouths {
   const world::World& world_;
   std::optional<Falls> last_;
   std::array<std::optional<Load>, kMaxPlaces> expected_{};
+  std::array<Time, kMaxPlaces> counted_{};
   std::optional<Time> anywhere_;
 };
 

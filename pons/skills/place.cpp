@@ -313,11 +313,11 @@ class Place final : public ArmSkill {
   // is seen again.
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
-    if (const world::Place* const chute = cell_.fallen_since(fallen_.falls)) {
+    if (const auto chutes = cell_.mouths.fallen_since(fallen_.falls); !chutes.empty()) {
       cell_.await_no_more(fallen_.code);
-      cell_.mouths.expect_anywhere(now);  // it may have grazed that one
+      cell_.mouths.expect_anywhere(now);  // it may have grazed the last one
       fallen_.falls = cell_.falls();
-      count(*chute, now);
+      for (const world::Place* const chute : chutes) count(*chute, now);
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
@@ -339,10 +339,11 @@ class Place final : public ArmSkill {
     return {Status::kFailed, "dropped", std::move(detail)};
   }
 
-  // Grazed, a mouth counts, too, and the last one is where it went; unless another hung on it, or lies on a rim: of two
-  // counts that of its own mouth is its own then, and the other that one's.
+  // Grazed, a mouth counts, too, and the last one is where it went; unless another hung on it, may have though no scale
+  // felt it, or lies on a rim: of two counts that of its own mouth is its own then, and the other that one's.
   void count(const world::Place& chute, Time now) {
-    const bool two = !fallen_.alone || cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
+    const bool hung = !fallen_.alone || !fallen_.company.empty();
+    const bool two = hung || cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
     const bool another = into_ != nullptr && two;
     const bool own_before = another && into_->name == name_;
     if (another) cell_.strays->fell(cell_.world.arm, own_before ? chute.name : into_->name, now);

@@ -125,6 +125,55 @@ TEST_F(LostOverItsChuteTest, OfTwoThatFellTheOneInItsOwnMouthIsTheLoad) {
   EXPECT_EQ(*cell_.strays->place_of("P2"), "chute_7");
 }
 
+// It was too light for the scale, and nobody has read it. Curtains count both before the cups are known to be open, or
+// after.
+TEST_F(LostOverItsChuteTest, WhoMayHaveHungOnItUnfeltFellBeside) {
+  const Company company{{2, "", {0.2, 0}}};
+  for (const bool before : {true, false}) {
+    seen_.resize(1);
+    seen_[0].track = company[0].track;
+    seen_[0].world_from_top.translation() = Vector3(-0.3, 0, 1.0);
+    seen_[0].last_seen = now_;
+    cell_.strays->lifted(world_.arm, "P1", company);
+    pass();
+    seen_.clear();
+    cell_.lost = held_;
+    cell_.lost->falls = falls_;
+    cell_.lost->company = company;
+    skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+    fell_ = now_;
+    for (const std::size_t place : {1U, 0U}) {
+      if (!before) {
+        EXPECT_EQ(skill_->tick(now_).status, Status::kRunning);
+      }
+      ++falls_[place];
+      pass();
+    }
+    const Progress progress = ends(1.2, kThings);
+    EXPECT_EQ(progress.status, Status::kSucceeded) << progress.reason;
+    for (int i = 0; i < 200; ++i) pass();
+    const std::vector<Stray> strays = cell_.strays->take_found_gone();
+    ASSERT_EQ(strays.size(), 1U) << before;
+    EXPECT_EQ(strays[0].code, "");
+    EXPECT_EQ(strays[0].place, "chute_2");
+  }
+}
+
+// Nothing hung on it.
+TEST_F(LostOverItsChuteTest, TheMouthThatCountedLastIsWhereItWent) {
+  pass();
+  cell_.lost = held_;
+  cell_.lost->falls = falls_;
+  for (const std::size_t place : {4U, 2U}) {
+    ++falls_[place];
+    pass();
+  }
+  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+  const Progress progress = ends(1.2, kThings);
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_EQ(progress.detail.value("fell_into", std::string()), "chute_3");
+}
+
 // It may still be falling.
 TEST_F(LostOverItsChuteTest, APictureOfTheNextMomentSaysNothing) {
   const Progress progress = ends(0.2, kThings);

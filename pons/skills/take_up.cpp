@@ -85,13 +85,22 @@ TakeUp::Fate TakeUp::fate(const task::Task& task, std::size_t done) const {
   if (cell_.held) return Fate::kGoesOn;
   if (next.skill != "place") return Fate::kBroken;
   const auto place = next.arguments.value("place", std::string{});
-  if (const std::string chute = fell_into(); !chute.empty()) return chute == place ? Fate::kDone : Fate::kAstray;
+  if (const auto chutes = fallen_into(); !chutes.empty()) {
+    // Of two counts the other is another's.
+    const bool own = std::ranges::find(chutes, place, &world::Place::name) != chutes.end();
+    return own ? Fate::kDone : Fate::kAstray;
+  }
   return is_over(place) ? Fate::kDone : Fate::kLost;  // let go of there, and still falling
 }
 
+std::vector<const world::Place*> TakeUp::fallen_into() const {
+  if (!cell_.lost || cell_.held) return {};
+  return cell_.mouths.fallen_since(cell_.lost->falls);
+}
+
 std::string TakeUp::fell_into() const {
-  const world::Place* const chute = cell_.lost && !cell_.held ? cell_.fallen_since(cell_.lost->falls) : nullptr;
-  return chute != nullptr ? chute->name : std::string();
+  const auto chutes = fallen_into();
+  return chutes.empty() ? std::string() : chutes.back()->name;
 }
 
 bool TakeUp::is_over(const std::string& name) const {

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pons/skills/cell.hpp"
 #include "pons/task/task.hpp"
@@ -43,6 +44,7 @@ class TakeUp {
 
  private:
   [[nodiscard]] Falls falls_from(const task::Json& carried) const;
+  [[nodiscard]] std::vector<const world::Place*> fallen_into() const;
   [[nodiscard]] bool is_over(const std::string& place) const;
   [[nodiscard]] bool is_over_belt() const;
   [[nodiscard]] double too_low_m() const;
