@@ -39,6 +39,7 @@ Bridge::Bridge(Journal& journal, const task::SkillRegistry& skills, const world:
       review_(skills, names(world.resources)),
       arbiter_(names(world.resources), world.schedule),
       urgent_priority_(world.schedule.urgent_priority),
+      ageing_(world.schedule.ageing),
       on_emergency_stop_(world.schedule.on_emergency_stop) {}
 
 Bridge::~Bridge() = default;

@@ -274,6 +274,7 @@ class Bridge {
   Review review_;
   Arbiter arbiter_;
   int urgent_priority_;
+  Duration ageing_;
   world::OnEmergencyStop on_emergency_stop_;
   std::map<std::string, std::unique_ptr<Open>, std::less<>> open_;
   std::map<std::string, Open*, std::less<>> running_;

@@ -29,7 +29,7 @@ void Bridge::take_orders(Time now) {
     }));
   }
   if (waiting >= kAhead) return;
-  const auto orders = journal_.claim(kAhead - waiting, least);
+  const auto orders = journal_.claim(kAhead - waiting, least, ageing_);
   if (!orders) {
     set_fault(orders.error());
     return;

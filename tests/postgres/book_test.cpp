@@ -99,6 +99,30 @@ TEST_F(BookTest, EachBridgeTakesWhatNoOtherIsAboutToTakeAndWaitsForNobody) {
   EXPECT_EQ(ids(one->claim(9)) + ids(two->claim(9)), "");
 }
 
+TEST_F(BookTest, TheOldestComesFirstOnceItHasWaitedLongEnough) {
+  const auto senders = book();
+  for (const int i : {1, 2}) ASSERT_TRUE(senders->submit(order("old-" + std::to_string(i), 20)));
+  for (const int i : {1, 2, 3, 4}) ASSERT_TRUE(senders->submit(order("new-" + std::to_string(i), 50)));
+  const auto waited = [&](int seconds) {
+    ASSERT_TRUE(server_.execute(database_, "pons",
+                                "UPDATE book SET submitted = now() - interval '" + std::to_string(seconds) +
+                                    " s' WHERE claimed_by IS NULL AND priority = 20"));
+  };
+  const auto one = open("one");
+  const auto takes = [&](int least) {
+    const std::string taken = ids(one->claim(1, least, from_s(30)));
+    EXPECT_TRUE(one->commit());
+    return taken;
+  };
+  waited(29 * 30);
+  EXPECT_EQ(takes(0), "new-1 ") << "49 of 50";
+  waited(32 * 30);
+  EXPECT_EQ(takes(50), "new-2 ") << "when only what is urgent may come";
+  EXPECT_EQ(takes(0), "old-1 ");
+  EXPECT_EQ(takes(0), "old-2 ") << "the next one is the oldest now";
+  EXPECT_EQ(takes(0), "new-3 ");
+}
+
 TEST_F(BookTest, TheTablesHoldThemselvesToIt) {
   const auto senders = book();
   for (const char* id : {"a", "b"}) ASSERT_TRUE(senders->submit(order(id)));

@@ -23,7 +23,7 @@ class BookEnd {
   // Whether there is an order of at least that priority that nobody has claimed. Locks nothing.
   [[nodiscard]] Expected<bool> waits(int least);
   // Within a transaction.
-  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least);
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least, Duration ageing);
   // The ids of all that this bridge has claimed and that have not ended.
   [[nodiscard]] Expected<std::set<std::string>> claimed();
   [[nodiscard]] Expected<void> close(std::string_view id, task::Outcome outcome, std::string_view reason);

@@ -332,7 +332,7 @@ Expected<void> Journal::commit() { return impl_->make_durable(); }
 
 // ---- the order book beside it ----
 
-Expected<std::vector<Order>> Journal::claim(std::size_t most, int least) {
+Expected<std::vector<Order>> Journal::claim(std::size_t most, int least, Duration ageing) {
   std::vector<Order> none;
   if (!impl_->book || most == 0) return none;
   if (impl_->failed) return std::unexpected(*impl_->failed);
@@ -341,7 +341,7 @@ Expected<std::vector<Order>> Journal::claim(std::size_t most, int least) {
   if (waits) {
     if (auto begun = impl_->ensure_transaction(); !begun) return std::unexpected(begun.error());
   }
-  auto orders = waits ? impl_->book->claim(most, least) : std::unexpected(waits.error());
+  auto orders = waits ? impl_->book->claim(most, least, ageing) : std::unexpected(waits.error());
   if (!orders) impl_->give_up(orders.error());
   return orders;
 }

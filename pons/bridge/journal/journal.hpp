@@ -10,6 +10,7 @@
 // One thread. One process at a time may own a file.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -128,9 +129,11 @@ class Journal {
 
   // Takes up to `most` orders out of the order book of the journal's database, as this bridge's: the most important and
   // then the oldest first, none that another bridge has or whose priority is less than `least`, and for good only with
-  // the next commit(), so that it becomes durable together with their acceptance. None from a file. Error: as a
-  // write's.
-  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least = 0);
+  // the next commit(), so that it becomes durable together with their acceptance. Where anybody may come, the oldest
+  // comes first once it counts more than all others, with one priority more for each `ageing` that it has waited by the
+  // server's clock. None from a file. Error: as a write's.
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least = 0,
+                                                   Duration ageing = std::chrono::seconds(30));
   // The ids of those that this bridge, or one of its name before it, has claimed and that have not ended. None of a
   // file. Error: as of a read.
   [[nodiscard]] Expected<std::set<std::string>> claimed();

@@ -88,6 +88,7 @@ CREATE TABLE pons.book(
   CHECK(outcome IS NULL OR claimed_by IS NOT NULL)
 );
 CREATE INDEX free ON pons.book(priority DESC, number) WHERE claimed_by IS NULL;
+CREATE INDEX oldest ON pons.book(number) WHERE claimed_by IS NULL;
 CREATE FUNCTION pons.refuse() RETURNS trigger LANGUAGE plpgsql AS
   $$ BEGIN RAISE EXCEPTION USING MESSAGE = TG_ARGV[0], ERRCODE = 'integrity_constraint_violation'; END $$;
 CREATE TRIGGER claims_and_outcomes_stay BEFORE UPDATE ON pons.book
