@@ -1,7 +1,6 @@
 #include "pons/skills/detour.hpp"
 
 #include <algorithm>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -12,7 +11,7 @@ namespace pons::skills {
 namespace {
 
 // Together more than what the route's own check in time asks for, between two looks, too.
-constexpr model::CollisionMargins kMargins{.scene_m = 0.025, .self_m = 0.0, .load_m = 0.035};
+constexpr model::CollisionMargins kMargins{.scene_m = kKeepOff_m, .self_m = 0.0, .load_m = 0.035};
 constexpr double kGrow_m = 0.03;  // around what rides on the belt
 constexpr Duration kHorizon = std::chrono::seconds(3);
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
@@ -71,7 +70,6 @@ bool Detour::keeps_off(const motion::Trajectory& way, const Load* load) {
 std::string Detour::touched(const std::function<AxisVector(Time)>& at, Time from, Time until, const Load* load,
                             const AxisVector& leaves) {
   std::vector<model::Box> boxes = standing(world_);
-  const std::size_t obstacles = boxes.size();
   boxes.push_back(belt(world_, kBeltLower_m));
   collision_.surround(boxes);
   collision_.carry(carried(load));
@@ -81,23 +79,10 @@ std::string Detour::touched(const std::function<AxisVector(Time)>& at, Time from
     if (collision_.clear(a, b)) continue;
     for (const AxisVector& q : {a, AxisVector(0.5 * (a + b)), b}) {
       if (collision_.clearance(q) > least_m) continue;
-      return named(collision_.touching(q), obstacles);
+      return named(world_, collision_.touching(q), "the belt");
     }
   }
   return {};
-}
-
-// Boxes are numbered from 1 in the order of the world's obstacles; the belt is the last one.
-std::string Detour::named(std::string touching, std::size_t obstacles) const {
-  constexpr std::string_view kBox = "box ";
-  const std::size_t at = touching.rfind(kBox);
-  if (at == std::string::npos) return touching;
-  std::size_t number = std::stoul(touching.substr(at + kBox.size()));
-  std::string name = "the belt";
-  for (const world::Place& place : world_.places) {
-    if (number <= obstacles && place.kind == world::PlaceKind::kObstacle && --number == 0) name = place.name;
-  }
-  return touching.replace(at, std::string::npos, name);
 }
 
 // Straight up until it is clear.
@@ -110,7 +95,8 @@ Expected<AxisVector> Detour::lifted(const AxisVector& q) {
     if (!higher) break;
     if (collision_.clear(*higher)) return higher;
   }
-  return fail("no clear posture above it: " + collision_.touching(q), "route", "clear the space there");
+  return fail("no clear posture above it: " + named(world_, collision_.touching(q), "what lies there"), "route",
+              "clear the space there");
 }
 
 Expected<std::vector<AxisVector>> Detour::corners(const AxisVector& from, const AxisVector& to, const Vector3& load_m,
@@ -133,7 +119,10 @@ Expected<std::vector<AxisVector>> Detour::corners(const AxisVector& from, const 
   if (!ended) return std::unexpected(unfinished);
   if (!*ended) {
     sought_.reset();
-    return std::unexpected(ended->error());
+    Error none = ended->error();
+    const std::string past = in_the_way(world_, scene_, from, to);
+    if (!past.empty()) none.what = "no way past " + past + ": " + none.what;
+    return std::unexpected(none);
   }
   const std::vector<AxisVector>& points = (*ended)->points;
   sought_->corners.emplace(points.begin() + 1, points.end() - 1);
@@ -159,6 +148,7 @@ Expected<motion::Trajectory> Detour::plan(const AxisState& start, Time at, const
                                           const AxisLimits& limits) {
   collision_.surround(surroundings(world_, objects, at, at + kHorizon, kGrow_m));
   collision_.carry(carried(load));
+  scene_.carry(carried(load));
   auto way = motion::stop(start, at, limits);  // hardly anything where it rests
   if (!way) return way;
   const AxisVector from = motion::sample(*way, way->back().end(), model_.axes()).position;

@@ -43,7 +43,6 @@ class Detour {
 
  private:
   [[nodiscard]] bool clear(const motion::Trajectory& way, model::CollisionModel& judge);
-  [[nodiscard]] std::string named(std::string touching, std::size_t obstacles) const;
   [[nodiscard]] Expected<AxisVector> lifted(const AxisVector& q);
   // Where the path from `from` to `to` turns.
   [[nodiscard]] Expected<std::vector<AxisVector>> corners(const AxisVector& from, const AxisVector& to,

@@ -457,5 +457,18 @@ TEST_F(RouteTest, AWayRoundIsSearchedForFromTickToTick) {
   EXPECT_LT(again + 5, ticks) << "found once, it is known for a while";
 }
 
+// A fence before the chutes that nothing passes.
+TEST_F(RouteTest, WhatNoWayLeadsPastIsNamed) {
+  world::World world = parcel_cell();
+  world.places.push_back({"fence", world::PlaceKind::kObstacle, {0, -0.62, 1.3}, {4, 0.04, 2.6}});
+  Router router(world, model_.copy());
+  const world::Place* chute = world.place("chute_8");
+  int ticks = 0;
+  const auto way = route_in(ticks, router, rest(world.robot.home),
+                            halt(over(chute->center_m.x(), chute->center_m.y(), 1.1)), nullptr, limits_);
+  ASSERT_FALSE(way);
+  EXPECT_THAT(way.error().line(), testing::HasSubstr("fence"));
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -70,6 +70,29 @@ std::vector<model::Box> standing(const world::World& world) {
   return boxes;
 }
 
+std::string named(const world::World& world, std::string touching, std::string_view other) {
+  constexpr std::string_view kBox = "box ";
+  const std::size_t at = touching.rfind(kBox);
+  if (at == std::string::npos) return touching;
+  std::size_t number = std::stoul(touching.substr(at + kBox.size()));  // from 1 on
+  std::string name(other);
+  for (const world::Place& place : world.places) {
+    if (place.kind == world::PlaceKind::kObstacle && number-- == 1) name = place.name;
+  }
+  return touching.replace(at, std::string::npos, name);
+}
+
+std::string in_the_way(const world::World& world, model::CollisionModel& judge, const AxisVector& from,
+                       const AxisVector& to) {
+  constexpr std::string_view kAnd = " and ";
+  const double steps = std::ceil(judge.travel(from, to) / model::CollisionModel::kStep_m) + 1;
+  for (double step = 0; step <= steps; ++step) {
+    const std::string touching = named(world, judge.touching(from + step / steps * (to - from)), "");
+    if (!touching.empty()) return touching.substr(touching.find(kAnd) + kAnd.size());
+  }
+  return {};
+}
+
 std::vector<model::Box> surroundings(const world::World& world, std::span<const ObjectBelief> objects, Time from,
                                      Time until, double grow_m) {
   std::vector<model::Box> boxes = standing(world);

@@ -3,6 +3,8 @@
 
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "pons/core/belief.hpp"
@@ -27,8 +29,17 @@ struct Load {
 inline constexpr double kSwing_rad = 0.06;
 [[nodiscard]] std::optional<model::CarriedBox> carried(const Load* load);
 
+// What ways keep off the world's own obstacles, m.
+inline constexpr double kKeepOff_m = 0.025;
 // The world's own obstacles.
 [[nodiscard]] std::vector<model::Box> standing(const world::World& world);
+// What CollisionModel::touching() says of these boxes, and of others after them, which are all called `other`: with the
+// obstacle's name in place of its number.
+[[nodiscard]] std::string named(const world::World& world, std::string touching, std::string_view other);
+// Of the obstacles alone, around which `judge` is: the first that is touched on the straight line in joint space from
+// `from` to `to` (rad), by its name. Empty: none.
+[[nodiscard]] std::string in_the_way(const world::World& world, model::CollisionModel& judge, const AxisVector& from,
+                                     const AxisVector& to);
 // All that is to be kept off from `from` until `until`: those; the room beside the belt up to the highest rim, which
 // holds chutes and tray; the belt, and over what no camera has shown yet the highest parcel; and each object, wherever
 // it rides meanwhile, wider by `grow_m` all round.
