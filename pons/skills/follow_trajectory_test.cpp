@@ -250,6 +250,33 @@ TEST_F(FollowTest, WhatStandsInTheWayIsNamed) {
   EXPECT_THAT(joints.error().line(), HasSubstr("at point 1 the arm touches what stands there ("));
 }
 
+// The arm swings about its base, past where it is free, into what stands between two of its points.
+TEST_F(FollowTest, WhatStandsBetweenTwoPointsIsRefusedWithTheTaskWhereTheBeginIsGiven) {
+  const AxisVector from = home(), over = home({{0, 0.5}}), to = home({{0, 1.0}});
+  const world::World changed = with_post(world_, cell_.model.world_from_tip(over).translation());
+  Cell own(end_, changed, model::RobotModel::load(changed.robot).value());
+  own.refresh(now_, {});
+  task::SkillRegistry registry;
+  add_skills(registry, own, {});
+  const auto says = [&](const Json& arguments, Moment moment) {
+    const auto good = registry.find(kTrajectory)->feasible(arguments, moment);
+    return good ? std::string() : good.error().line();
+  };
+  const Json through = trajectory({{0.0, from}, {1.0, home({{0, 0.1}})}, {5.0, to}});
+  for (const Moment moment : {Moment::kAdmission, Moment::kStart}) {
+    EXPECT_THAT(says(through, moment),
+                AllOf(HasSubstr("between point 2 and point 3, "), HasSubstr("the arm touches what stands there ("),
+                      HasSubstr(" and post); lead it around that")));
+  }
+  EXPECT_EQ(says(trajectory({{0.0, from}, {5.0, home({{0, -1.0}})}}), Moment::kAdmission), "") << "the other way";
+  EXPECT_EQ(says(trajectory({{1.0, home({{0, 0.1}})}, {5.0, to}}), Moment::kAdmission), "")
+      << "where it begins nobody knows, and how it passes the first point depends on that";
+  // In its times it could not be gone; in others it would be another way.
+  Json quick = trajectory({{0.0, from}, {0.1, home({{0, 0.1}})}, {0.8, to}});
+  quick["goal_time_tolerance"] = 10;
+  EXPECT_EQ(says(quick, Moment::kAdmission), "");
+}
+
 TEST_F(FollowTest, WhatComesInTheWayStopsItBeforeItIsTouched) {
   const Vector3 here = tip_now(), down(here.x(), 0, world_.belt.surface_z_m + 0.05);
   double lowest = here.z();

@@ -1,5 +1,7 @@
 #include "pons/skills/move_to.hpp"
 
+#include <array>
+
 #include "pons/motion/line.hpp"
 #include "pons/skills/conduct.hpp"
 
@@ -10,6 +12,7 @@ using task::Progress;
 using task::Status;
 
 constexpr double kAbove_m = 0.15;
+constexpr std::array kHeights_m{kAbove_m};
 constexpr Duration kSearchFor = std::chrono::milliseconds(1000);  // where one tick is too short to find a way
 constexpr std::string_view kHome = "home", kJoints = "joints", kLine = "line";
 
@@ -95,11 +98,12 @@ class MoveTo final : public ArmSkill {
     auto line = motion::move_line(cell_.model, start, from, cell_.model.world_from_tip(*q), cell_.limits_empty(), {});
     if (!line) return std::unexpected(line.error());
     motion::Trajectory& way = line->trajectory;
-    if (!cell_.router.clear(way, from, way.back().end(), nullptr, cell_.objects())) {
-      return fail("the line to " + place_ + " is not clear", "move_to",
-                  "leave out \"path\": a way round is looked for");
-    }
-    return std::move(way);
+    const Time end = way.back().end();
+    if (cell_.router.clear(way, from, end, nullptr, cell_.objects())) return std::move(way);
+    const auto judged = cell_.router.judge(way, from, end, nullptr, cell_.objects());
+    const std::string why = judged ? "" : ": " + judged.error().what;
+    return fail("the line to " + place_ + " is not clear" + why, "move_to",
+                "leave out \"path\": a way round is looked for");
   }
 
   Cell& cell_;
@@ -116,6 +120,7 @@ class MoveTo final : public ArmSkill {
 
 task::SkillType move_to(Cell& cell) {
   std::vector<std::string> places = cell.world.place_names();
+  for (const std::string& name : places) cell.reach.foresee(name, kHeights_m);
   places.emplace_back(kHome);
   return {.name = "move_to",
           .summary = "Bring the tool over a place, or home",
@@ -130,7 +135,7 @@ task::SkillType move_to(Cell& cell) {
           .safe_points = {"anywhere on the way; with something on the cups nobody else gets the arm there"},
           .feasible =
               [&cell](const task::Json& arguments, task::Moment) {
-                return cell.reach.over(arguments.at("place").get<std::string>(), {{kAbove_m}});
+                return cell.reach.over(arguments.at("place").get<std::string>(), kHeights_m);
               },
           .start =
               [&cell](const task::Json& arguments, Time) {

@@ -453,6 +453,7 @@ std::vector<std::string> held_for(const Cell& cell, const task::Json& arguments)
 }  // namespace
 
 task::SkillType place(Cell& cell) {
+  for (const std::string& name : cell.world.place_names()) cell.reach.foresee(name, kHeightsOverRim_m);
   return {.name = "place",
           .summary = "Carry what the cups hold to a place, let go, and make sure that it left",
           .schema = {{"type", "object"},

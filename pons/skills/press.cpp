@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -29,12 +30,14 @@ constexpr Duration kSettleWithin = std::chrono::milliseconds(1500);  // and from
 constexpr Duration kSteady = std::chrono::milliseconds(300);         // within the tolerance, before it counts
 constexpr double kRise_m = 0.08;
 
-// From where the arm feels its way down.
+// Over a region's middle, from where the arm feels its way down.
+double height_over(const world::Place& region) { return 0.5 * region.size_m.z() + kOver_m; }
+
 Expected<Vector3> over_region(const world::World& world, const std::string& name) {
   const world::Place* const place = world.place(name);
   if (place == nullptr || place->kind != world::PlaceKind::kRegion)
     return fail("'" + name + "' is no region of this world", {}, "name a place of kind region");
-  return Vector3(place->center_m + Vector3(0, 0, 0.5 * place->size_m.z() + kOver_m));
+  return Vector3(place->center_m + Vector3(0, 0, height_over(*place)));
 }
 
 class Press final : public ArmSkill {
@@ -202,6 +205,8 @@ class Press final : public ArmSkill {
 Expected<void> feasible(Cell& cell, const std::string& place, double force_n) {
   const auto over = over_region(cell.world, place);
   if (!over) return std::unexpected(over.error());
+  const std::array heights_m{height_over(*cell.world.place(place))};
+  if (auto led = cell.reach.over(place, heights_m); !led) return led;
   const auto posture = cell.reach.posture(*over, place);
   if (!posture) return std::unexpected(posture.error());
   return cell.reach.can_press(*posture, force_n);
@@ -210,6 +215,9 @@ Expected<void> feasible(Cell& cell, const std::string& place, double force_n) {
 }  // namespace
 
 task::SkillType press(Cell& cell) {
+  for (const world::Place& place : cell.world.places) {
+    if (place.kind == world::PlaceKind::kRegion) cell.reach.foresee(place.name, std::array{height_over(place)});
+  }
   return {.name = "press",
           .summary = "Press the tool down on a region with a force, hold it, and rise",
           .schema = {{"type", "object"},

@@ -323,6 +323,23 @@ class FollowTimed final : public ArmSkill {
   std::optional<Progress> verdict_;
 };
 
+// A way that says where it begins is known before it begins, but where it may take longer than asked for, and would:
+// that changes it between its points. Of others the skill alone can tell, which looks at all of the way, too.
+Expected<void> looked_through(Cell& cell, const TimedWay& way, bool may_take_longer) {
+  if (!way.begins) return {};
+  const auto motion = way.make(*way.begins, way.points);
+  if (!motion) return std::unexpected(motion.error());
+  if (may_take_longer && !motion::excesses(*motion, way.points, cell.limits_timed()).empty()) return {};
+  const auto touch = cell.reach.touches(*motion);
+  if (!touch) return {};
+  const auto next =
+      std::ranges::find_if(way.points, [&](const TimedPoint& p) { return from_s(p.time_s) >= touch->at - Time{}; });
+  const auto point = next - way.points.begin() + 1;  // the one before it: where it begins is point 1
+  return fail(fmt::format("between point {} and point {}, {:.2f} s on the way, the arm touches what stands there ({})",
+                          point, point + 1, to_s(touch->at - Time{}), touch->what),
+              {}, "lead it around that");
+}
+
 }  // namespace
 
 task::SkillType timed_skill(Cell& cell, TimedSkill skill) {
@@ -338,7 +355,7 @@ task::SkillType timed_skill(Cell& cell, TimedSkill skill) {
           .feasible = [&cell, read = skill.read](const Json& arguments, task::Moment) -> Expected<void> {
             const auto way = read(cell, arguments);
             if (!way) return std::unexpected(way.error());
-            return {};
+            return looked_through(cell, *way, arguments.contains(kTimeTolerance));
           },
           .start =
               [&cell, read = skill.read](const Json& arguments, Time) {
