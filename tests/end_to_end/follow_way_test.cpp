@@ -114,5 +114,32 @@ TEST_P(FollowWay, WhatCannotBeDoneIsRefusedWithTheTask) {
 INSTANTIATE_TEST_SUITE_P(Worlds, FollowWay, testing::Values("parcel_cell", "small_cell"),
                          [](const auto& world) { return std::string(world.param); });
 
+// A wall along the belt with a window about the arm's base, too small to turn round in.
+world::World walled_off() {
+  world::World world = world::load(PONS_WORLDS_SOURCE, "parcel_cell").value();
+  const auto stands = [&](const char* name, const Vector3& center, const Vector3& size) {
+    world.places.push_back({name, world::PlaceKind::kObstacle, center, size});
+  };
+  stands("west_wall", {-1.4, -0.35, 1.0}, {2.2, 0.04, 2.0});
+  stands("east_wall", {1.4, -0.35, 1.0}, {2.2, 0.04, 2.0});
+  stands("sill", {0, -0.35, 0.65}, {0.6, 0.04, 1.3});
+  stands("ceiling", {0, 0, 2.05}, {5, 5, 0.1});
+  return world;
+}
+
+TEST(WalledOff, APlaceToWhichNoWayLeadsIsRefusedBeforeAnythingMoves) {
+  TaskRun cell(walled_off());
+  const Json beyond{{"skill", "move_to"}, {"arguments", {{"place", "chute_8"}}}};
+  const auto refused = cell.bridge().submit(Json{{"id", "beyond"}, {"steps", {beyond}}}.dump(), cell.now());
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().line(),
+              HasSubstr("/steps/0: the robot cannot do that: no way leads from home to over chute_8 past west_wall ("));
+  const auto tasks = cell.journal().tasks();
+  ASSERT_TRUE(tasks);
+  EXPECT_TRUE(tasks->empty()) << "no task is left behind";
+  const Json here{{"skill", "move_to"}, {"arguments", {{"place", "chute_1"}}}};
+  EXPECT_TRUE(cell.bridge().submit(Json{{"id", "here"}, {"steps", {here}}}.dump(), cell.now()));
+}
+
 }  // namespace
 }  // namespace pons::tests
