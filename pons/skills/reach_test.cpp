@@ -143,6 +143,21 @@ TEST_F(ReachTest, WhatASkillIsAskedForIsKnownWhenTheWorldIsLoaded) {
   }
 }
 
+TEST_F(ReachTest, WhatALineWouldTouchIsNamed) {
+  world::World world = world_;
+  const Vector3 there = world.place("chute_1")->center_m + Vector3(0, 0, 0.15);
+  world.places.push_back({"post", world::PlaceKind::kObstacle, 0.5 * (tip_now() + there), {0.03, 0.03, 0.2}});
+  Cell cell(end_, world, model::RobotModel::load(world.robot).value());
+  cell.refresh(now_, {});
+  task::SkillRegistry registry;
+  add_skills(registry, cell, {});
+  const auto skill = registry.find("move_to")->start({{"place", "chute_1"}, {"path", "line"}}, now_);
+  const task::Progress end = skill->tick(now_);
+  EXPECT_EQ(end.status, task::Status::kFailed);
+  EXPECT_THAT(end.reason, MatchesRegex(".*the line to chute_1 is not clear: .* on the way the arm would touch .* and "
+                                       "post; leave out \"path\".*"));
+}
+
 // The skills' own search, from home at rest.
 bool skill_finds(const world::World& world, const model::RobotModel& model, const world::Place& place,
                  double height_m) {
