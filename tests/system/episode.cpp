@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -15,11 +16,21 @@ constexpr Duration kPeriod = std::chrono::milliseconds(10);
 constexpr Duration kCalmWithin = std::chrono::minutes(20);   // all must have ended by then,
 constexpr Duration kQuietAtLast = std::chrono::seconds(40);  // and what lies on the belt has ridden off after that
 constexpr Step kMotionSent{Doing::kTicking, Act::kMotion, Moment::kAfter};
-constexpr std::uint64_t kRemembers = 3;        // words to a task, of which a bridge dies soon after one
-constexpr std::uint64_t kDecisions = 12;       // bridges, one that is held up with one
-constexpr std::uint64_t kPieces = 8;           // about as many as a motion has
+constexpr std::uint64_t kAims = 3;        // moments that deaths are aimed at, of which a bridge dies soon after one
+constexpr std::uint64_t kDecisions = 12;  // bridges, one that is held up with one
+constexpr std::uint64_t kPieces = 8;      // about as many as a motion has
 constexpr std::uint64_t kCellsThatGoDark = 6;  // one of so many
 constexpr std::size_t kRoomInLink = 256;       // commands, at least, after every period
+constexpr double kLostAstrayPerS = 2;          // where deaths are aimed at what leaves the cups
+
+// The kind of moment that deaths are aimed at in one episode: what was told, written or seen just before its end is
+// what the next bridge has most easily wrong.
+enum class Aim : std::uint8_t {
+  kAtWords,    // somebody was answered who has told a task to pause, cancel or halt
+  kAtGrasps,   // the bridge has written what hangs on the cups, or that nothing does
+  kAtLeaving,  // the cups have let go of a load or lost it, over other chutes than its own more often then
+};
+constexpr std::array<std::string_view, 3> kAimNames{"words", "grasps", "what leaves the cups"};
 
 // The link as two processes share it: what one of them has not written when it dies, the other never reads. So what a
 // process seems to send after its end is taken back.
@@ -88,6 +99,8 @@ class Episode {
   void gone(Fate fate);
   void compact();
   [[nodiscard]] Plan draw_plan();
+  void take_aim();
+  void comes_by(Aim moment);
   void calm();
   void go_dark();
   void close();
@@ -95,6 +108,7 @@ class Episode {
   const Cellar& cellar_;
   const EpisodeOptions options_;
   Random random_;
+  std::optional<Aim> aim_;
   world::World world_;
   Time now_;
   Trace trace_;
@@ -113,6 +127,7 @@ class Episode {
   Person person_;
   Outside outside_;
   std::unique_ptr<Process> process_;
+  std::string carries_;  // as the bridge had it after its last whole tick
   std::optional<Time> gone_since_ = Time{};
   Time begins_at_, ends_at_, asked_to_end_, button_at_;
   std::optional<Time> released_at_, idle_since_;
@@ -151,15 +166,16 @@ Episode::Episode(const Cellar& cellar, const EpisodeOptions& options)
   network_.when_heard = [this](const Question& question) {
     if (question.text == person_.words_for("reset")) referee_.person_resets(now_);
     if (question.text == person_.words_for("arm")) referee_.person_arms(now_);
-    // What a task was told a moment ago is what its bridge forgets most easily.
-    const bool is_verb = question.way == Way::kNetwork && (question.text.find("\"cancel\"") != std::string::npos ||
-                                                           question.text.find("\"halt\"") != std::string::npos ||
-                                                           question.text.find("\"pause\"") != std::string::npos);
-    if (is_verb && !calm_ && !ending_ && !options_.only && random_.below(kRemembers) == 0)
-      steps_.begin({.fate = random_.below(3) == 0 ? Fate::kLosesPower : Fate::kDies,
-                    .at = {},
-                    .count = static_cast<std::int64_t>(1 + random_.below(80))});
   };
+  network_.when_answered = [this](const Question& question, const Json& answer) {
+    const auto says = [&](std::string_view word) { return question.text.find(word) != std::string::npos; };
+    if (question.way == Way::kNetwork && answer.value("ok", false) &&
+        (says("\"cancel\"") || says("\"halt\"") || says("\"pause\"")))
+      comes_by(Aim::kAtWords);
+  };
+  senders_.at_work = [this] { return process_ ? process_->bridge().running() : std::vector<std::string>{}; };
+  plant_.when_left = [this] { comes_by(Aim::kAtLeaving); };
+  if (!options_.only) take_aim();
   button_at_ = now_ + from_s(60 * random_.uniform());
 }
 
@@ -250,6 +266,21 @@ Plan Episode::draw_plan() {
   return plan;
 }
 
+void Episode::take_aim() {
+  const std::uint64_t drawn = random_.below(kAimNames.size());
+  aim_ = static_cast<Aim>(drawn);
+  if (aim_ == Aim::kAtLeaving) plant_.faults.lost_astray_per_s = kLostAstrayPerS;
+  say(fmt::format("deaths are aimed at {}", kAimNames.at(drawn)));
+}
+
+// A moment that deaths are aimed at, or may be: after one of so many the bridge ends soon, and mostly at once.
+void Episode::comes_by(Aim moment) {
+  if (moment != aim_ || calm_ || !process_ || !steps_.alive() || random_.below(kAims) != 0) return;
+  steps_.begin({.fate = random_.below(3) == 0 ? Fate::kLosesPower : Fate::kDies,
+                .at = {},
+                .count = static_cast<std::int64_t>(std::pow(80, random_.uniform()))});
+}
+
 void Episode::bridge() {
   if (!process_) {
     if (now_ >= begins_at_) begin_bridge();
@@ -282,6 +313,7 @@ void Episode::begin_bridge() {
   if (!steps_.alive() || !started) return end_bridge();
   gone_since_.reset();
   referee_.look(process_->journal());
+  referee_.takes_up(carries_, process_->carries(), plant_);
 }
 
 void Episode::tick_bridge(Process& process) {
@@ -290,6 +322,10 @@ void Episode::tick_bridge(Process& process) {
   if (!good) {
     wrong("a fault without a cause: " + good.error().line());
     return end_bridge();
+  }
+  if (std::string carries = process.carries(); carries != carries_) {
+    carries_ = std::move(carries);
+    comes_by(Aim::kAtGrasps);
   }
   if (process.room() < kRoomInLink) wrong("the link is filling up");
   if (process.bridge().open_count() > bridge::kMaxUrgent) wrong("more tasks are open than may be");
@@ -333,6 +369,7 @@ void Episode::compact() {
   steps_.begin(draw_plan());
   steps_.doing(Doing::kOpening);
   if (auto journal = bridge::Journal::open(kJournal, disk_.vfs())) {
+    if (steps_.alive()) referee_.look(**journal);
     steps_.doing(Doing::kCompacting);
     const auto dropped = (*journal)->compact(static_cast<std::int64_t>(random_.below(20)));
     if (dropped) say(fmt::format("{} events are compacted away", *dropped));
@@ -380,7 +417,7 @@ void Episode::calm() {
   if (steps_.alive()) steps_.begin({});
   network_.faults = {0, 0, 0};
   person_.calm_down();
-  plant_.faults = {0, 0};
+  plant_.faults = {0, 0, 0};
   shared_.link().clear_emergency_stop();
   senders_.calm_down();
   std::optional<Time> quiet_since;

@@ -44,6 +44,7 @@ std::vector<Question> Network::hear() {
 }
 
 void Network::answer(const Question& question, const Json& json, Time now) {
+  if (when_answered) when_answered(question, json);
   if (question.way == Way::kBeside) {
     back_.emplace(now, Answer{question.number, json});
     return;

@@ -51,6 +51,7 @@ class Network {
 
   NetworkFaults faults;
   std::function<void(const Question&)> when_heard;
+  std::function<void(const Question&, const Json&)> when_answered;
 
  private:
   [[nodiscard]] int copies();

@@ -69,16 +69,24 @@ void Plant::hold(Time) {
   Parcel& parcel = parcels_.at(held_);
   parcel.was_lost = told_cups_ != 0;
   if (told_cups_ == 0) return leave(parcel, "let go of");
-  if (random_.uniform() < faults.lost_per_s * kPeriod_s) {
+  const double per_s = is_astray(parcel, tip()) ? faults.lost_astray_per_s : faults.lost_per_s;
+  if (random_.uniform() < per_s * kPeriod_s) {
     misses_ = true;
     leave(parcel, "lost");
   }
+}
+
+bool Plant::is_astray(const Parcel& parcel, const Vector3& tip) const {
+  return std::ranges::any_of(world_.places, [&](const world::Place& place) {
+    return place.kind == world::PlaceKind::kChute && place.name != parcel.destination && is_over(place, tip);
+  });
 }
 
 void Plant::leave(Parcel& parcel, std::string_view how) {
   held_.clear();
   ++parcel.left;
   parcel.track = ++tracks_;
+  if (when_left) when_left();
   const Vector3 from = tip();
   const world::Belt& belt = world_.belt;
   if (std::abs(from.y() - belt.y_center_m) < 0.5 * belt.width_m && from.x() < belt.x_end_m) {

@@ -35,8 +35,9 @@ struct Parcel {
 
 // A share of the times, or of the time.
 struct PlantFaults {
-  double missed = 0.05;      // the cups do not seal
-  double lost_per_s = 0.01;  // what they hold, they lose
+  double missed = 0.05;             // the cups do not seal
+  double lost_per_s = 0.01;         // what they hold, they lose,
+  double lost_astray_per_s = 0.01;  // or over a chute that is not its own
 };
 
 class Plant {
@@ -66,6 +67,7 @@ class Plant {
   [[nodiscard]] const std::map<std::pair<std::string, int>, int>& prints() const { return printed_; }
 
   PlantFaults faults;
+  std::function<void()> when_left;  // something has left the cups
 
  private:
   void ride();
@@ -74,6 +76,7 @@ class Plant {
   void leave(Parcel& parcel, std::string_view how);
   [[nodiscard]] double beside_others(double x_m) const;
   [[nodiscard]] Vector3 tip();
+  [[nodiscard]] bool is_astray(const Parcel& parcel, const Vector3& tip) const;
 
   const world::World& world_;
   model::RobotModel model_;

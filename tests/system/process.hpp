@@ -53,6 +53,8 @@ class Process {
   [[nodiscard]] bool idle() const { return side_->idle(); }
   [[nodiscard]] const bridge::Bridge& bridge() const { return *bridge_; }
   [[nodiscard]] const bridge::Journal& journal() const { return *journal_; }
+  // The code by which it knows what hangs on the cups; empty: nothing, as it believes.
+  [[nodiscard]] std::string carries() const { return cell_.held ? cell_.held->code : std::string(); }
   // How much room is in the link.
   [[nodiscard]] std::size_t room() { return end_.room(); }
 

@@ -103,9 +103,35 @@ void Referee::watch(const Glance& glance) {
   before_ = state;
 }
 
+void Referee::takes_up(const std::string& known, const std::string& knows, const Plant& plant) {
+  const Parcel* const hangs = plant.on_cups();
+  if (hangs != nullptr && hangs->code == known && knows != known)
+    wrong_(fmt::format("{} hangs on the cups as the bridge before knew; this one knows of {}", known,
+                       knows.empty() ? "nothing" : knows));
+}
+
 void Referee::look(const bridge::Journal& journal) {
   for (const std::string& line : bridge::audit(journal)) wrong_("the journal: " + line);
   check_told(journal);
+  check_endings(journal);
+}
+
+// What was told to end begins nothing more; and where the bridge that was told so is gone, it is cancelled.
+void Referee::check_endings(const bridge::Journal& journal) {
+  std::string id;
+  std::optional<std::int64_t> told_in;  // a run
+  const auto read = journal.each_event([&](const bridge::Event& event) -> Expected<void> {
+    if (event.task != id) told_in.reset();
+    id = event.task;
+    if (event.kind == bridge::kCancellingEvent || event.kind == bridge::kHaltingEvent) told_in = event.run;
+    if (told_in && event.kind == bridge::kAttemptEvent)
+      wrong_(fmt::format("{} has begun a skill after it was told to end", id));
+    if (told_in && event.kind == bridge::kEndedEvent && event.run > *told_in &&
+        event.detail.value("outcome", "") != task::name(Outcome::kCancelled))
+      wrong_(fmt::format("{} was told to end, and the next bridge has not ended it so", id));
+    return {};
+  });
+  if (!read) wrong_("the journal: " + read.error().line());
 }
 
 void Referee::check_told(const bridge::Journal& journal) {
@@ -146,15 +172,9 @@ void Referee::close(const bridge::Journal& journal, const Plant& plant) {
 void Referee::check_story(const TaskHistory& task) {
   const std::string& id = task.record.task.id;
   if (!task.record.outcome) return wrong_(fmt::format("{} has no outcome", id));
-  bool ending = false;
-  for (const bridge::Event& event : task.events) {
-    if (ending && event.kind == bridge::kAttemptEvent)
-      wrong_(fmt::format("{} has begun a skill after it was told to end", id));
-    const bool ends = event.kind == bridge::kCancellingEvent || event.kind == bridge::kHaltingEvent;
-    if (ends && event.run < task.record.outcome->run && task.record.outcome->outcome != Outcome::kCancelled)
-      wrong_(fmt::format("{} was told to end, and the next bridge has not ended it so", id));
-    ending = ending || ends;
-  }
+  const bool ending = std::ranges::any_of(task.events, [](const bridge::Event& event) {
+    return event.kind == bridge::kCancellingEvent || event.kind == bridge::kHaltingEvent;
+  });
   if (told_to_end_.contains(id) && task.record.outcome->outcome != Outcome::kCancelled && !ending &&
       kept_ == Kept::kAll)
     wrong_(fmt::format("{} was told to end, and the journal knows nothing of it", id));
@@ -181,6 +201,7 @@ void Referee::check_parcels(const std::vector<TaskHistory>& tasks, const Plant& 
       }
     }
     const bool in_chute = parcel.place.starts_with("chute");
+    if (parcel.place == "tray" && !parcel.was_lost) wrong_(fmt::format("{} was let go of beside the chutes", code));
     if (in_chute && !asked_there && !parcel.was_lost)
       wrong_(fmt::format("{} is in {}, and no task has brought it there", code, parcel.place));
     if (in_chute && !brought && !broken_off && !parcel.was_lost)

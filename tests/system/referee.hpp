@@ -44,8 +44,13 @@ class Referee {
   };
   void watch(const Glance& glance);
 
+  // ---- what hangs on the cups, when a bridge has taken over ----
+  // By its code, empty when nothing does: what the one before knew after its last whole tick, and what this one knows.
+  void takes_up(const std::string& known, const std::string& knows, const Plant& plant);
+
   // ---- the journal ----
-  // While tasks may be open, of a journal that a bridge opens or has closed.
+  // While tasks may be open, of a journal that a bridge opens or has closed; and before one is compacted, for what it
+  // drops then nobody sees again.
   void look(const bridge::Journal& journal);
   // When all has ended.
   void close(const bridge::Journal& journal, const Plant& plant);
@@ -56,6 +61,7 @@ class Referee {
 
  private:
   void check_told(const bridge::Journal& journal);
+  void check_endings(const bridge::Journal& journal);
   void check_story(const bridge::TaskHistory& task);
   void check_parcels(const std::vector<bridge::TaskHistory>& tasks, const Plant& plant);
   void check_prints(const std::vector<bridge::TaskHistory>& tasks, const Plant& plant);

@@ -176,19 +176,22 @@ void Senders::pursue(const std::string& id, Wish& wish, Time now) {
 void Senders::meddle(Time now) {
   if (ids_.empty()) return;
   if (calm_) {
+    for (const std::string& id : paused_) ask(About::kOther, id, {{"op", "resume"}, {"id", id}}, now);
     for (const auto& [id, wish] : wishes_) {
       if (wish.ended || wish.hopeless || !wish.accepted) continue;
-      ask(About::kOther, id, {{"op", "resume"}, {"id", id}}, now);
       ask(About::kOther, id, {{"op", "approve"}, {"id", id}, {"tier", "operator"}, {"by", "Kim"}}, now);
     }
     return;
   }
   const std::size_t lately = std::min<std::size_t>(ids_.size(), 6);
-  const std::string& id = ids_[ids_.size() - 1 - random_.below(lately)];
+  const std::vector<std::string> seen = at_work();
+  const std::string id = seen.empty() || random_.below(2) == 0 ? ids_[ids_.size() - 1 - random_.below(lately)]
+                                                               : seen[random_.below(seen.size())];
   constexpr std::array<std::string_view, 8> kWords{"pause",  "pause",   "resume", "resume",
                                                    "cancel", "approve", "halt",   "list"};
   const std::string word(kWords.at(random_.below(kWords.size())));
   say_(fmt::format("somebody says {} {}", word, id));
+  if (word == "pause") paused_.insert(id);
   Json json{{"op", word}};
   if (word != "list") json["id"] = id;
   if (word == "approve") json.update({{"tier", "operator"}, {"by", "Kim"}});

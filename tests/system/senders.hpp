@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,7 @@ class Senders {
   [[nodiscard]] std::size_t wishes() const { return wishes_.size(); }
 
   Asking asking;
+  std::function<std::vector<std::string>()> at_work;  // tasks, by their ids, as whoever looks on sees them
 
  private:
   struct Wish {
@@ -77,6 +79,7 @@ class Senders {
   std::map<std::string, Wish> wishes_;
   std::vector<std::string> ids_;
   std::vector<std::string> pursued_;  // of those, the ones that are not over
+  std::set<std::string> paused_;      // tasks that somebody has told to pause, other people's too
   std::map<std::int64_t, Asked> asked_;
   std::int64_t questions_ = 0;
   Time next_wish_, next_meddling_, next_hostility_;
