@@ -38,9 +38,9 @@ struct TimedWay {
 // that the arm has arrived. A way that cannot be gone in its times, or is not clear, is refused before anything moves:
 // by point and axis, with the least time; but it takes as much longer as limits ask for and its argument
 // "goal_time_tolerance" (s) allows, which both skills have. One that says where it begins, and meets what stands there
-// for good, is refused with its task. What is left of that tolerance, or half a second where the times are kept, the arm
-// has to come to its end. Paused or stopped, it goes on from where the arm then stands along the rest, with what longer
-// times that takes; where somebody else has had it, from where it had left off.
+// for good, is refused with its task. What is left of that tolerance, or half a second where the times are kept, the
+// arm has to come to its end. Paused or stopped, it goes on from where the arm then stands along the rest, with what
+// longer times that takes; where somebody else has had it, from where it had left off.
 struct TimedSkill {
   std::string name, summary;
   task::Json schema;
