@@ -15,8 +15,6 @@ constexpr model::CollisionMargins kMargins{.scene_m = kKeepOff_m, .self_m = 0.0,
 constexpr double kGrow_m = 0.03;  // around what rides on the belt
 constexpr Duration kHorizon = std::chrono::seconds(3);
 constexpr Duration kCheckEvery = std::chrono::milliseconds(20);
-constexpr double kRise_m = 0.05;
-constexpr int kRises = 8;
 // Enough for a post or a wall in a cell; and so many in a tick, which must not become long.
 constexpr int kSamples = 400, kShortcuts = 40, kStepsPerTick = 10;
 constexpr double kNearly_rad = 0.3;  // from what was asked for before: its path leads round the same things
@@ -85,16 +83,8 @@ std::string Detour::touched(const std::function<AxisVector(Time)>& at, Time from
   return {};
 }
 
-// Straight up until it is clear.
 Expected<AxisVector> Detour::lifted(const AxisVector& q) {
-  if (collision_.clear(q)) return q;
-  Pose pose = model_.world_from_tip(q);
-  for (int step = 0; step < kRises; ++step) {
-    pose.translation().z() += kRise_m;
-    const auto higher = model_.inverse(pose, q);
-    if (!higher) break;
-    if (collision_.clear(*higher)) return higher;
-  }
+  if (auto clear = skills::lifted(model_, collision_, q)) return *std::move(clear);
   return fail("no clear posture above it: " + named(world_, collision_.touching(q), "what lies there"), "route",
               "clear the space there");
 }

@@ -67,29 +67,30 @@ Expected<void> Reach::look(const world::Place& place, std::span<const double> he
 // One of all postures over the place is enough; mostly it is the nearest, and straight.
 Expected<void> Reach::led_to(const world::Place& place, std::span<const double> heights_m,
                              const Expected<AxisVector>& nearest) {
-  const AxisVector& home = world_.robot.home;
-  if (!kept_off_->clear(home))
+  const AxisVector& at_home = world_.robot.home;
+  const std::optional<AxisVector> home = lifted(model_, *kept_off_, at_home);
+  if (!home)
     return fail(fmt::format("no way leads from home: there the arm is less than {:.0f} mm off {}", 1e3 * kKeepOff_m,
-                            in_the_way(world_, *kept_off_, home, home)),
+                            in_the_way(world_, *kept_off_, at_home, at_home)),
                 {}, "move that, or home");
-  if (nearest && kept_off_->clear(home, *nearest)) return {};
+  if (nearest && kept_off_->clear(*home, *nearest)) return {};
   const std::vector<AxisVector> goals = postures(place, heights_m);
   if (goals.empty() && !nearest) return std::unexpected(nearest.error());
   const motion::FreeSpace space{[&](const AxisVector& q) { return kept_off_->clear(q); },
                                 [&](const AxisVector& a, const AxisVector& b) { return kept_off_->clear(a, b); }};
   const auto led = [&](const AxisVector& goal) {
-    return motion::find_path(home, goal, world_.robot.limits, space, {.iterations = kSamples, .shortcuts = 0});
+    return motion::find_path(*home, goal, world_.robot.limits, space, {.iterations = kSamples, .shortcuts = 0});
   };
   if (std::ranges::any_of(goals, [&](const AxisVector& goal) { return led(goal).has_value(); })) return {};
-  const std::string past = in_the_way(world_, *kept_off_, home, goals.empty() ? *nearest : goals.front());
+  const std::string past = in_the_way(world_, *kept_off_, *home, goals.empty() ? *nearest : goals.front());
   return fail(fmt::format("no way leads from home to over {} past {} ({} samples searched)", place.name, past,
                           kSamples * goals.size()),
               {}, fmt::format("name another place, or move {}: ways keep {:.0f} mm off it", past, 1e3 * kKeepOff_m));
 }
 
-// Tool down over it, as far off what stands there as ways keep, on every branch, the nearest to home first; and with
-// the first axis a whole turn further, from where a way may lead that is shut from here. What a straight line joins to
-// a lower one is left out: a way to either is one to both.
+// Tool down over it, on every branch, the nearest to home first; and with the first axis a whole turn further, from
+// where a way may lead that is shut from here. What is too close to what stands there is come down to from above, as
+// skills do. What a straight line joins to one before it is left out: a way to either is one to both.
 std::vector<AxisVector> Reach::postures(const world::Place& place, std::span<const double> heights_m) {
   const AxisVector& home = world_.robot.home;
   const auto far = [&](const AxisVector& q) { return (q - home).squaredNorm(); };
@@ -112,11 +113,13 @@ std::vector<AxisVector> Reach::postures(const world::Place& place, std::span<con
     found.erase(again.begin(), again.end());
     const auto joined = [&](const AxisVector& q) {
       const auto apart = [&](const AxisVector& other) { return (q - other).squaredNorm(); };
-      const auto lower = std::ranges::min_element(all, {}, apart);
-      return lower != all.end() && kept_off_->clear(q, *lower);
+      const auto before = std::ranges::min_element(all, {}, apart);
+      return before != all.end() && kept_off_->clear(q, *before);
     };
-    std::erase_if(found, [&](const AxisVector& q) { return !kept_off_->clear(q) || joined(q); });
-    all.insert(all.end(), found.begin(), found.end());
+    for (const AxisVector& q : found) {
+      if (!standing_->clear(q)) continue;
+      if (auto over = lifted(model_, *kept_off_, q); over && !joined(*over)) all.push_back(*std::move(over));
+    }
   }
   std::ranges::sort(all, {}, far);
   return all;

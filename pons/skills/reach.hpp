@@ -41,6 +41,7 @@ class Reach {
   // touches.
   [[nodiscard]] Expected<void> stands_free(const AxisVector& posture, const std::string& what);
 
+  [[nodiscard]] bool anything_stands() const { return standing_.has_value(); }
   // Whether the arm is free of it on that way, which begins at Time{}. Looks at so many postures that a tick bears it,
   // and no farther: a long way close beside something is looked at by the skill that goes it. When it touches what:
   struct Touch {

@@ -120,7 +120,7 @@ TEST_F(ReachTest, WhereAWayLeadsRoundIsNot) {
 TEST_F(ReachTest, AnArmWhoseHomeIsBlockedIsTold) {
   world::World world = world_;
   const Vector3 tip = cell_.model.world_from_tip(world.robot.home).translation();
-  world.places.push_back({"crate", world::PlaceKind::kObstacle, tip, {0.1, 0.1, 0.1}});
+  world.places.push_back({"crate", world::PlaceKind::kObstacle, tip, {0.1, 0.1, 1.5}});
   Reach reach(world, cell_.model);
   const auto led = reach.over("chute_1", kHeights_m);
   ASSERT_FALSE(led);

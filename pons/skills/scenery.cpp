@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kFront_m = 0.05;  // of what comes into view, so much must show
 constexpr double kAround_m = 3;    // farther out than any arm reaches
+constexpr double kRise_m = 0.05;
+constexpr int kRises = 8;
 
 // Between two corners, along the world's axes.
 model::Box between(const Vector3& low, const Vector3& high) {
@@ -68,6 +70,18 @@ std::vector<model::Box> standing(const world::World& world) {
     boxes.push_back(between(place.center_m - 0.5 * place.size_m, place.center_m + 0.5 * place.size_m));
   }
   return boxes;
+}
+
+std::optional<AxisVector> lifted(model::RobotModel& model, model::CollisionModel& judge, const AxisVector& q) {
+  if (judge.clear(q)) return q;
+  Pose pose = model.world_from_tip(q);
+  for (int step = 0; step < kRises; ++step) {
+    pose.translation().z() += kRise_m;
+    auto higher = model.inverse(pose, q);
+    if (!higher) break;
+    if (judge.clear(*higher)) return *std::move(higher);
+  }
+  return {};
 }
 
 std::string named(const world::World& world, std::string touching, std::string_view other) {

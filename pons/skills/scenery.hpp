@@ -33,6 +33,9 @@ inline constexpr double kSwing_rad = 0.06;
 inline constexpr double kKeepOff_m = 0.025;
 // The world's own obstacles.
 [[nodiscard]] std::vector<model::Box> standing(const world::World& world);
+// That posture (rad), or the first straight above it that is clear by `judge`; none is, or the arm gets no higher.
+[[nodiscard]] std::optional<AxisVector> lifted(model::RobotModel& model, model::CollisionModel& judge,
+                                               const AxisVector& q);
 // What CollisionModel::touching() says of these boxes, and of others after them, which are all called `other`: with the
 // obstacle's name in place of its number.
 [[nodiscard]] std::string named(const world::World& world, std::string touching, std::string_view other);

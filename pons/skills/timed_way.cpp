@@ -326,7 +326,7 @@ class FollowTimed final : public ArmSkill {
 // A way that says where it begins is known before it begins, but where it may take longer than asked for, and would:
 // that changes it between its points. Of others the skill alone can tell, which looks at all of the way, too.
 Expected<void> looked_through(Cell& cell, const TimedWay& way, bool may_take_longer) {
-  if (!way.begins) return {};
+  if (!way.begins || !cell.reach.anything_stands()) return {};
   const auto motion = way.make(*way.begins, way.points);
   if (!motion) return std::unexpected(motion.error());
   if (may_take_longer && !motion::excesses(*motion, way.points, cell.limits_timed()).empty()) return {};

@@ -203,10 +203,10 @@ class Place final : public ByArm {
   // Let go of, or lost, in a stop.
   Progress missing() {
     const bool was_held = cell_.lost && cell_.lost->code == object_;
-    const world::Place* const chute = was_held ? cell_.fallen_since(cell_.lost->falls) : nullptr;
-    if (chute == nullptr) return {Status::kFailed, "nothing is held"};
-    if (chute->name == place_) return {Status::kSucceeded};
-    return {Status::kException, "fell into " + chute->name};
+    const auto chutes = was_held ? cell_.mouths.fallen_since(cell_.lost->falls) : std::vector<const world::Place*>{};
+    if (chutes.empty()) return {Status::kFailed, "nothing is held"};
+    if (chutes.back()->name == place_) return {Status::kSucceeded};
+    return {Status::kException, "fell into " + chutes.back()->name};
   }
 
   // The cups are off, through every stop: what is over the mouth falls in.
