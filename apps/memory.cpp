@@ -14,11 +14,11 @@ constexpr double kMib = 1 << 20;
 
 }  // namespace
 
-double resident_mib() {
+double own_mib() {
   std::ifstream file("/proc/self/statm");
-  double size = 0, resident = 0;  // pages
-  if (!(file >> size >> resident)) return std::numeric_limits<double>::quiet_NaN();
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / kMib;
+  double size = 0, resident = 0, shared = 0;  // pages
+  if (!(file >> size >> resident >> shared)) return std::numeric_limits<double>::quiet_NaN();
+  return (resident - shared) * static_cast<double>(sysconf(_SC_PAGESIZE)) / kMib;
 }
 
 void MemoryWatch::settled(std::int64_t parcels) {

@@ -1,4 +1,4 @@
-// How much memory this process has resident, and how that goes in the course of a run.
+// How much memory this process has taken for itself, and how that goes in the course of a run.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,14 @@
 
 namespace pons::apps {
 
-// MiB, by the kernel; NaN where it does not say.
-[[nodiscard]] double resident_mib();
+// MiB resident, but for what files back: the kernel drops pages of programs and libraries when it likes, and gets them
+// again. NaN where it does not say.
+[[nodiscard]] double own_mib();
 
 // One thread at a time.
 class MemoryWatch {
  public:
-  explicit MemoryWatch(std::function<double()> read = resident_mib) : read_(std::move(read)) {}
+  explicit MemoryWatch(std::function<double()> read = own_mib) : read_(std::move(read)) {}
 
   // So many parcels are settled by now. Reads once for each more, from the 500th on.
   void settled(std::int64_t parcels);

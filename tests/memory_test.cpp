@@ -1,8 +1,11 @@
 #include "apps/memory.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <cstddef>
 #include <deque>
 
 namespace pons::apps {
@@ -38,10 +41,23 @@ TEST(Memory, OfAShortRunIsThatOfItsEnd) {
   EXPECT_EQ(watch.end().end_mib, 100);
 }
 
-// A test that could allocate and see it would be one of the allocator: that it is a size of this process is all.
-TEST(Memory, IsThatOfThisProcess) {
-  EXPECT_GT(resident_mib(), 1);
-  EXPECT_LT(resident_mib(), 10'000);
+TEST(Memory, IsWhatThisProcessHasTakenAndNoFile) {
+  constexpr std::size_t kSize = 64 << 20, kPage = 4096;
+  const double before_mib = own_mib();
+  EXPECT_GT(before_mib, 0);
+  const auto touched_mib = [&](int descriptor, int flags) {
+    void* const pages = mmap(nullptr, kSize, PROT_READ | PROT_WRITE, flags, descriptor, 0);
+    EXPECT_NE(pages, MAP_FAILED);
+    for (std::size_t i = 0; i < kSize; i += kPage) static_cast<volatile char*>(pages)[i] = 1;
+    const double mib = own_mib() - before_mib;
+    EXPECT_EQ(munmap(pages, kSize), 0);
+    return mib;
+  };
+  EXPECT_NEAR(touched_mib(-1, MAP_PRIVATE | MAP_ANONYMOUS), 64, 4);
+  const int file = memfd_create("pages", 0);
+  ASSERT_EQ(ftruncate(file, kSize), 0);
+  EXPECT_NEAR(touched_mib(file, MAP_SHARED), 0, 4);
+  close(file);
 }
 
 }  // namespace
