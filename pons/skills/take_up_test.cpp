@@ -132,6 +132,25 @@ TEST_F(TakeUpTest, TheLightCurtainsSayWhereItFell) {
   EXPECT_EQ(take_up_.fate(task(), 1), Fate::kAstray) << "the arm stands over its place without it";
 }
 
+// Another hung on it.
+TEST_F(TakeUpTest, OfTwoCountsThatOfItsOwnPlaceIsItsOwn) {
+  cups(kSealed_kpa, 15, over("chute_3"));
+  cell_.held = held_;
+  cell_.held->falls = cell_.falls();
+  const task::Json written = take_up_.carries();
+  cell_.held.reset();
+  cups(0, 0, world_.robot.home);
+  take_up_.restore(written);
+  fallen_into_ = {"chute_1", "chute_2"};
+  cups(0, 0, world_.robot.home);
+  for (const char* const own : {"chute_1", "chute_2"}) {
+    place_ = own;
+    EXPECT_EQ(take_up_.fate(task(), 1), Fate::kDone) << own;
+  }
+  place_ = "chute_3";
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kAstray);
+}
+
 TEST_F(TakeUpTest, WhatNobodyKnowsIsLetGoOnceArmed) {
   cups(kSealed_kpa, 15, world_.robot.home);
   take_up_.restore({});
