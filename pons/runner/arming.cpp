@@ -203,8 +203,9 @@ Expected<void> Arming::reset(Time now) {
 Expected<void> Arming::arm(Time now) {
   const link::State& state = skills_.state();
   if (state.safety != SafetyState::kDisarmed) {
-    return fail(fmt::format("the arm's state is: {}", link::name(state.safety)), "arm",
-                is_stopped(state) ? "reset it first: pons robot reset" : "only a disarmed arm is armed");
+    return fail(
+        fmt::format("the arm's state is: {}", link::name(state.safety)), "arm",
+        needs_person_ || is_stopped(state) ? "reset it first: pons robot reset" : "only a disarmed arm is armed");
   }
   note_person(kArm, now);
   needs_person_ = counted_ = false;
