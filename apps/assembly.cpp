@@ -38,12 +38,12 @@ constexpr std::string_view kAttached = "attached";  // a bridge to a body; in th
 
 // Whose bridge wrote this journal last, {"body", "link"}; empty in one that no bridge of such a body has opened.
 Expected<task::Json> body_in(const bridge::Journal& journal) {
-  const auto events = journal.notes();
-  if (!events) return std::unexpected(events.error());
   auto body = task::Json::object();
-  for (const bridge::Event& event : *events) {
+  const auto read = journal.each_note([&body](const bridge::Event& event) -> Expected<void> {
     if (event.kind == kAttached) body = event.detail;
-  }
+    return {};
+  });
+  if (!read) return std::unexpected(read.error());
   return body;
 }
 

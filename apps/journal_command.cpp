@@ -41,17 +41,17 @@ int check(const JournalOptions& options) {
 int refused(const JournalOptions& options) {
   const auto journal = Journal::open_to_read(options.file);
   if (!journal) return bad_input(journal.error());
-  const auto notes = (*journal)->notes();
-  if (!notes) return bad_run(notes.error());
   std::int64_t told = 0;
-  for (const bridge::Event& note : *notes) {
-    if (note.kind != bridge::kRefusedEvent) continue;
+  const auto read = (*journal)->each_note([&told](const bridge::Event& note) -> Expected<void> {
+    if (note.kind != bridge::kRefusedEvent) return {};
     ++told;
     say(stdout, story_line({{"time_s", note.stamp.s()},
                             {"task", task::text_of(note.detail, "id")},
                             {"kind", note.kind},
                             {"detail", note.detail}}));
-  }
+    return {};
+  });
+  if (!read) return bad_run(read.error());
   if (told == 0) say(stdout, "nothing was refused\n");
   return kExitGood;
 }

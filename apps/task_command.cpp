@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
+#include <limits>
 #include <set>
 #include <string>
 #include <string_view>
@@ -106,19 +106,18 @@ Expected<Json> story_from_journal(const std::string& file, const std::string& or
 Expected<Json> list_from_journal(const TaskOptions& options, std::string_view which, std::int64_t limit) {
   const auto journal = bridge::Journal::open_to_read(options.journal);
   if (!journal) return std::unexpected(journal.error());
-  auto tasks = (*journal)->tasks();
+  const auto counts = (*journal)->counts();
+  if (!counts) return std::unexpected(counts.error());
+  const bool open = which == "open";
+  const std::int64_t before = options.after == 0 ? std::numeric_limits<std::int64_t>::max() : options.after;
+  const auto tasks = open ? (*journal)->open_tasks() : (*journal)->ended_tasks(before, limit);
   if (!tasks) return std::unexpected(tasks.error());
-  const bool ended = which == "ended";
-  if (ended) std::ranges::reverse(*tasks);
-  std::map<std::string, std::int64_t> counts{{"open", 0}, {"ended", 0}};
   Json page = Json::array();
   for (const bridge::TaskRecord& record : *tasks) {
-    ++counts[record.outcome ? "ended" : "open"];
-    const bool further = options.after == 0 || (record.sequence > options.after) != ended;
-    const bool here = record.outcome.has_value() == ended && further && record.sequence != options.after;
+    const bool here = !open || record.sequence > options.after;
     if (here && std::ssize(page) < limit) page.push_back(to_json(record));
   }
-  Json answer{{"tasks", page}, {"open", counts["open"]}, {"ended", counts["ended"]}};
+  Json answer{{"tasks", page}, {"open", counts->open}, {"ended", counts->accepted - counts->open}};
   answer["after"] = page.empty() ? options.after : page.back().at("sequence").get<std::int64_t>();
   return answer;
 }

@@ -58,11 +58,9 @@ Expected<std::unique_ptr<TasksView>> TasksView::open(Outlets& outlets, const bri
   if (!statuses) return std::unexpected(statuses.error());
   std::unique_ptr<TasksView> view(new TasksView(*events, *statuses, bridge));
   // What an earlier bridge left open.
-  const auto tasks = bridge.journal().tasks();
+  const auto tasks = bridge.journal().open_tasks();
   if (!tasks) return std::unexpected(tasks.error());
-  for (const bridge::TaskRecord& record : *tasks) {
-    if (!record.outcome) view->add(record.sequence, record.task);
-  }
+  for (const bridge::TaskRecord& record : *tasks) view->add(record.sequence, record.task);
   tail.add([made = view.get()](const bridge::Event& event) { made->hear(event); });
   return view;
 }

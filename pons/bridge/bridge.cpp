@@ -73,10 +73,9 @@ void Bridge::enqueue(const Open& open, Time since) {
 // ---- after another bridge ----
 
 Expected<void> Bridge::recover(std::span<const Resume> resumes, Time now) {
-  auto tasks = journal_.tasks();
+  auto tasks = journal_.open_tasks();
   if (!tasks) return std::unexpected(tasks.error());
   for (TaskRecord& record : *tasks) {
-    if (record.outcome) continue;
     // An order may have been taken in the time of an earlier body, which was another.
     record.accepted = std::min(record.accepted, now);
     // Its skills and places are those of the program and the world that run now.

@@ -80,14 +80,12 @@ struct Story {
 Expected<Story> read(const bridge::Journal& journal) {
   Story story;
   auto& entries = story.entries;
-  const auto tasks = journal.tasks();
-  if (!tasks) return std::unexpected(tasks.error());
-  for (const bridge::TaskRecord& record : *tasks) {
+  const auto tasks = journal.each_task([&](const bridge::TaskRecord& record) -> Expected<void> {
     for (const auto& [object, place] : objects_of(record.task)) take_in(entries[object], place, record.outcome);
-  }
-  const auto events = journal.notes();
-  if (!events) return std::unexpected(events.error());
-  for (const bridge::Event& event : *events) {
+    return {};
+  });
+  if (!tasks) return std::unexpected(tasks.error());
+  const auto notes = journal.each_note([&](const bridge::Event& event) -> Expected<void> {
     const std::string code = task::text_of(event.detail, "code");
     if (event.kind == "stray") {
       const std::string place = task::text_of(event.detail, "fell_into");
@@ -100,13 +98,15 @@ Expected<Story> read(const bridge::Journal& journal) {
       int& most = story.counted[task::text_of(event.detail, "place")];
       most = std::max(most, event.detail.value("things", 0));
     }
-    if (event.kind != "ride") continue;
+    if (event.kind != "ride") return {};
     Entry& entry = entries[code];
     entry.ride = true;
     entry.unseen = !event.detail.value("seen", true);
     entry.rode_since = entry.succeeded && std::pair(event.run, event.stamp) > entry.done;
     if (entry.tasks == 0) entry.last_reason = task::text_of(event.detail, "reason");
-  }
+    return {};
+  });
+  if (!notes) return std::unexpected(notes.error());
   return story;
 }
 

@@ -1,7 +1,5 @@
 #include "pons/runner/bridge_side.hpp"
 
-#include <malloc.h>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -39,47 +37,45 @@ BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<
 }
 
 Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
-  auto taken = recall(journal, now);
-  malloc_trim(0);  // what reading a long day takes is not needed again, and would stay with the process
-  return taken;
-}
-
-Expected<void> BridgeSide::recall(const bridge::Journal& journal, Time now) {
-  auto events = journal.notes();
-  if (!events) return std::unexpected(events.error());
   // Of a body that is gone, only the ids that its tasks have taken are still so.
   std::int64_t since = 0;
-  for (const bridge::Event& event : *events) {
+  auto read = journal.each_note([&since](const bridge::Event& event) -> Expected<void> {
     if (event.kind == bridge::kBodyGoneEvent) since = event.run;
-  }
-  std::erase_if(*events, [&](const bridge::Event& event) { return event.run < since; });
-  const auto tasks = journal.tasks();
-  if (!tasks) return std::unexpected(tasks.error());
+    return {};
+  });
+  if (!read) return read;
   decided_ = brain_heard_ = now;  // nobody was there to hear it
-  for (const bridge::TaskRecord& record : *tasks) {
+  read = journal.each_task([&](const bridge::TaskRecord& record) -> Expected<void> {
     brain_.recall(record.task, record.outcome ? std::optional(record.outcome->outcome) : std::nullopt);
     if (!record.outcome) asked_.emplace(record.task.id, record.task.order);
     if (record.outcome && record.outcome->run >= since) last_outcome_ = std::max(last_outcome_, record.outcome->stamp);
-  }
-  for (const bridge::Event& event : *events) {
-    if (event.kind == "ride") brain_.recall_ride(task::text_of(event.detail, "code"));
-  }
+    return {};
+  });
+  if (!read) return read;
+  read = journal.each_note([&](const bridge::Event& event) -> Expected<void> {
+    if (event.run >= since) recall(event);
+    return {};
+  });
+  if (!read) return read;
   for (const auto& robot : robots_) {
-    bool armed_before = false;
-    for (const bridge::Event& event : *events) {
-      const std::string of = task::text_of(event.detail, "robot");
-      if (!of.empty() && of != robot->skills.name) continue;
-      armed_before = armed_before || event.kind == "armed";
-      if (event.kind == "person") robot->arming.recall(task::text_of(event.detail, "asks"));
-      if (event.kind == "carries") robot->carried = event.detail.value("load", Json{});
-    }
     robot->skills.refresh(now, {}, seen_.belt_seen);
-    robot->arming.take_over(now, armed_before);
+    robot->arming.take_over(now, robot->armed_before);
     robot->skills.restore(robot->carried);
   }
   std::vector<bridge::Resume> resumes;
   for (const auto& robot : robots_) resumes.push_back(robot->skills.resume);
   return bridge_.recover(resumes, now);
+}
+
+void BridgeSide::recall(const bridge::Event& note) {
+  if (note.kind == "ride") brain_.recall_ride(task::text_of(note.detail, "code"));
+  const std::string of = task::text_of(note.detail, "robot");
+  for (const auto& robot : robots_) {
+    if (!of.empty() && of != robot->skills.name) continue;
+    robot->armed_before = robot->armed_before || note.kind == "armed";
+    if (note.kind == "person") robot->arming.recall(task::text_of(note.detail, "asks"));
+    if (note.kind == "carries") robot->carried = note.detail.value("load", Json{});
+  }
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {

@@ -79,7 +79,7 @@ class BridgeSide {
   [[nodiscard]] Health& health() { return health_; }  // of every part
 
  private:
-  [[nodiscard]] Expected<void> recall(const bridge::Journal& journal, Time now);
+  void recall(const bridge::Event& note);
   void take_in(const Snapshot& snapshot, Time now);
   void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
@@ -104,6 +104,7 @@ class BridgeSide {
     Arming arming;
     RobotVitals vitals;
     bridge::Json carried = {};  // as last noted
+    bool armed_before = false;  // by an earlier bridge
     [[nodiscard]] bool operational() const { return skills.state().safety == link::SafetyState::kOperational; }
   };
 

@@ -19,6 +19,8 @@ task::Task order(const std::string& id, int priority = 50, const std::string& sk
   return {.id = id, .priority = priority, .steps = {{skill}}};
 }
 
+constexpr Duration kAgeing = std::chrono::seconds(30);  // as a world says it
+
 class BookTest : public testing::Test {
  protected:
   BookTest() {
@@ -90,13 +92,13 @@ TEST_F(BookTest, EachBridgeTakesWhatNoOtherIsAboutToTakeAndWaitsForNobody) {
   for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(senders->submit(order(id)));
   ASSERT_TRUE(senders->submit(order("first", 80)));
   const auto one = open("one"), two = open("two");
-  EXPECT_EQ(ids(one->claim(2)), "first a ") << "the most important, then the oldest";
-  EXPECT_EQ(ids(two->claim(9)), "b c ") << "before the other has committed";
+  EXPECT_EQ(ids(one->claim(2, 0, kAgeing)), "first a ") << "the most important, then the oldest";
+  EXPECT_EQ(ids(two->claim(9, 0, kAgeing)), "b c ") << "before the other has committed";
   EXPECT_EQ(found("a").claimed_by, "") << "nor is it so before";
   ASSERT_TRUE(one->commit() && two->commit());
   EXPECT_EQ(found("a").claimed_by, "one");
   EXPECT_EQ(found("b").claimed_by, "two");
-  EXPECT_EQ(ids(one->claim(9)) + ids(two->claim(9)), "");
+  EXPECT_EQ(ids(one->claim(9, 0, kAgeing)) + ids(two->claim(9, 0, kAgeing)), "");
 }
 
 TEST_F(BookTest, TheOldestComesFirstOnceItHasWaitedLongEnough) {
@@ -110,7 +112,7 @@ TEST_F(BookTest, TheOldestComesFirstOnceItHasWaitedLongEnough) {
   };
   const auto one = open("one");
   const auto takes = [&](int least) {
-    const std::string taken = ids(one->claim(1, least, from_s(30)));
+    const std::string taken = ids(one->claim(1, least, kAgeing));
     EXPECT_TRUE(one->commit());
     return taken;
   };
@@ -128,7 +130,7 @@ TEST_F(BookTest, TheTablesHoldThemselvesToIt) {
   for (const char* id : {"a", "b"}) ASSERT_TRUE(senders->submit(order(id)));
   {
     const auto journal = open("one");
-    EXPECT_EQ(ids(journal->claim(1)), "a ");
+    EXPECT_EQ(ids(journal->claim(1, 0, kAgeing)), "a ");
     ASSERT_TRUE(journal->accept(order("a"), at(1)));
     ASSERT_TRUE(journal->commit());
     const auto refused = [this](const std::string& sql) { return !server_.execute(database_, "pons", sql); };
@@ -150,7 +152,7 @@ TEST_F(BookTest, WhatWasNotCommittedIsNeitherInTheJournalNorInTheBook) {
   ASSERT_TRUE(book()->submit(order("a")));
   in_a_process_that_is_killed([this] {
     auto journal = Journal::open(place("one"));
-    const bool done = journal && ids((*journal)->claim(1)) == "a " && (*journal)->accept(order("a"), at(1));
+    const bool done = journal && ids((*journal)->claim(1, 0, kAgeing)) == "a " && (*journal)->accept(order("a"), at(1));
     return done && journal->release() != nullptr;
   });
   {
@@ -160,11 +162,12 @@ TEST_F(BookTest, WhatWasNotCommittedIsNeitherInTheJournalNorInTheBook) {
   }
   in_a_process_that_is_killed([this] {
     auto journal = Journal::open(place("one"));
-    const bool done = journal && ids((*journal)->claim(1)) == "a " && (*journal)->accept(order("a"), at(1)) &&
-                      (*journal)->commit() && (*journal)->outcome("a", task::Outcome::kFailed, "no", at(2));
+    const bool done = journal && ids((*journal)->claim(1, 0, kAgeing)) == "a " &&
+                      (*journal)->accept(order("a"), at(1)) && (*journal)->commit() &&
+                      (*journal)->outcome("a", task::Outcome::kFailed, "no", at(2));
     return done && journal->release() != nullptr;
   });
-  EXPECT_EQ(ids(open("two")->claim(9)), "") << "it waits for the next bridge of that name";
+  EXPECT_EQ(ids(open("two")->claim(9, 0, kAgeing)), "") << "it waits for the next bridge of that name";
   const auto journal = open("one");
   EXPECT_EQ(found("a").claimed_by, "one");
   EXPECT_FALSE(found("a").outcome);
@@ -188,7 +191,7 @@ TEST_F(BookTest, OrdersThatABodyHadNotBegunAreTheNextOnesAndWhatItHadBegunHasFai
     ASSERT_TRUE(journal->commit());
     journal->abandon();
   }
-  EXPECT_EQ(ids(open("two")->claim(9)), "") << "they wait for the next bridge of that name";
+  EXPECT_EQ(ids(open("two")->claim(9, 0, kAgeing)), "") << "they wait for the next bridge of that name";
   now_ = at(0.1);
   pick_.log.started.clear();
   const auto journal = open("one");

@@ -386,6 +386,38 @@ TEST_P(AnyJournal, TellsThoseThatHaveEndedPageByPage) {
   EXPECT_EQ(journal->newest(), 9);
 }
 
+// More than a page; and whoever is told may ask and write meanwhile.
+TEST_P(AnyJournal, TellsEachTaskAndNoteInTheirOrder) {
+  const auto journal = open();
+  for (int i = 0; i < 600; ++i) {
+    ASSERT_TRUE(journal->accept(sample(std::to_string(i)), at(1)));
+    ASSERT_TRUE(journal->note(at(1), "ride", {{"code", i}}));
+    if (i % 3 == 0) continue;
+    ASSERT_TRUE(journal->outcome(std::to_string(i), task::Outcome::kFailed, "no", at(1)));
+  }
+  int tasks = 0, open = 0, notes = 0;
+  ASSERT_TRUE(journal->each_task([&](const TaskRecord& record) -> Expected<void> {
+    EXPECT_EQ(record.task.id, std::to_string(tasks++));
+    if (record.outcome) return {};
+    ++open;
+    EXPECT_TRUE(journal->record(record.task.id).value());
+    return journal->outcome(record.task.id, task::Outcome::kFailed, "no", at(1));
+  }));
+  EXPECT_EQ(tasks, 600);
+  EXPECT_EQ(open, 200);
+  EXPECT_TRUE(journal->open_tasks()->empty());
+  ASSERT_TRUE(journal->accept(sample("late"), at(1)));
+  EXPECT_EQ(journal->open_tasks()->at(0).task.id, "late");
+  ASSERT_TRUE(journal->each_note([&](const Event& note) -> Expected<void> {
+    EXPECT_EQ(note.detail.at("code"), notes++);
+    return {};
+  }));
+  EXPECT_EQ(notes, 600);
+  const auto stopped =
+      journal->each_note([&](const Event&) -> Expected<void> { return fail("enough", "test", "stop"); });
+  EXPECT_NE(stopped.error().line().find("enough"), std::string::npos);
+}
+
 TEST_P(AnyJournal, KnowsHowManyHaveEndedBeforeItWasOpened) {
   {
     const auto journal = open();

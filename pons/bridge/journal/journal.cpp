@@ -77,16 +77,17 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
   };
   const std::string tasks = fmt::format(kTaskColumns, acceptances(database->dialect())), events(kEventColumns);
   const std::string in_order = fmt::format(kTaskColumns, in_their_order(database->dialect()));
-  const std::array<std::pair<Statement*, std::string>, 14> reads{{
+  const std::array<std::pair<Statement*, std::string>, 15> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
-      {&all_tasks, tasks + "ORDER BY a.sequence"},
+      {&tasks_after, in_order + "AND a.sequence > ?1 ORDER BY a.sequence LIMIT ?2"},
       {&one_task, tasks + "AND a.task = ?1"},
+      {&open_tasks, tasks + "AND e.sequence IS NULL ORDER BY a.sequence"},
       {&ended_tasks, in_order + "AND a.sequence < ?1 AND e.sequence IS NOT NULL ORDER BY a.sequence DESC LIMIT ?2"},
       {&events_of_task, events + "WHERE task = ?1 AND kind NOT IN ('accepted', 'ended') ORDER BY sequence"},
       {&outline,
        "SELECT sequence, run, stamp_ns, task, order_id, kind, CASE WHEN kind = ?1 THEN '{}' ELSE detail END FROM event "
        "WHERE task = ?2 ORDER BY sequence"},
-      {&notes, events + "WHERE task = '' ORDER BY sequence"},
+      {&notes_after, events + "WHERE task = '' AND sequence > ?1 ORDER BY sequence LIMIT ?2"},
       {&events_of_order, events + "WHERE ?1 <> '' AND sequence > ?2 AND sequence IN (SELECT sequence FROM event WHERE "
                                   "order_id = ?1 AND order_id <> '' "
                                   "UNION SELECT e.sequence FROM event a JOIN event e ON e.task = a.task "

@@ -10,7 +10,6 @@
 // One thread. One process at a time may own a file.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -132,8 +131,7 @@ class Journal {
   // the next commit(), so that it becomes durable together with their acceptance. Where anybody may come, the oldest
   // comes first once it counts more than all others, with one priority more for each `ageing` that it has waited by the
   // server's clock. None from a file. Error: as a write's.
-  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least = 0,
-                                                   Duration ageing = std::chrono::seconds(30));
+  [[nodiscard]] Expected<std::vector<Order>> claim(std::size_t most, int least, Duration ageing);
   // The ids of those that this bridge, or one of its name before it, has claimed and that have not ended. None of a
   // file. Error: as of a read.
   [[nodiscard]] Expected<std::set<std::string>> claimed();
@@ -141,14 +139,20 @@ class Journal {
   // has ended before. Error: as a write's.
   [[nodiscard]] Expected<void> close_order(std::string_view id, task::Outcome outcome, std::string_view reason);
 
-  // In the order of acceptance.
+  // In the order of acceptance, page by page: of a long day no more is in memory. `take` may read and write this
+  // journal; the first error that it gives back ends it.
+  [[nodiscard]] Expected<void> each_task(const std::function<Expected<void>(const TaskRecord&)>& take) const;
+  // Likewise, all at once.
   [[nodiscard]] Expected<std::vector<TaskRecord>> tasks() const;
+  // Likewise, those that have not ended.
+  [[nodiscard]] Expected<std::vector<TaskRecord>> open_tasks() const;
   // At most so many that have ended, of those accepted before the event of that sequence; the last accepted first.
   [[nodiscard]] Expected<std::vector<TaskRecord>> ended_tasks(std::int64_t before, std::int64_t most) const;
   // Nothing when there is no such task.
   [[nodiscard]] Expected<std::optional<TaskRecord>> record(std::string_view id) const;
   [[nodiscard]] Expected<std::optional<TaskHistory>> task(std::string_view id) const;
-  // Those of no task.
+  // Those of no task, in the order in which they were written; as each_task() and tasks().
+  [[nodiscard]] Expected<void> each_note(const std::function<Expected<void>(const Event&)>& take) const;
   [[nodiscard]] Expected<std::vector<Event>> notes() const;
   // All of a task, acceptance and outcome among them, but for the details of that kind of event.
   [[nodiscard]] Expected<std::vector<Event>> outline(std::string_view id, std::string_view without) const;

@@ -27,8 +27,8 @@ struct Journal::Impl {
   // what was to become durable together must not become so in part.
   std::optional<Error> failed;
   // Only open_to_read() leaves those that write unprepared.
-  mutable Statement find_task, all_tasks, one_task, ended_tasks, events_of_task, outline, notes, events_of_order,
-      events_since, every_event, count, count_ended, endings, newest;
+  mutable Statement find_task, tasks_after, one_task, open_tasks, ended_tasks, events_of_task, outline, notes_after,
+      events_of_order, events_since, every_event, count, count_ended, endings, newest;
   std::int64_t last_written = 0, durable = 0;  // sequences
   std::int64_t ended = 0;                      // tasks
   std::function<Time()> clock;                 // none: nobody asks how long a commit takes

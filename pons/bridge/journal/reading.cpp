@@ -16,6 +16,33 @@ Expected<OutcomeRecord> outcome_from(const Json& ending) {
   return OutcomeRecord{*outcome, task::text_of(ending, "reason"), ending.value("detail", Json::object())};
 }
 
+constexpr std::int64_t kPage = 256;
+
+// Of rows that have a sequence each, by which `page` gives back those that come after one.
+template <typename Row, typename Page>
+Expected<void> page_by_page(const Page& page, const std::function<Expected<void>(const Row&)>& take) {
+  for (std::int64_t after = 0;;) {
+    const auto rows = page(after);
+    if (!rows) return std::unexpected(rows.error());
+    for (const Row& row : *rows) {
+      if (auto taken = take(row); !taken) return taken;
+    }
+    if (std::ssize(*rows) < kPage) return {};
+    after = rows->back().sequence;
+  }
+}
+
+template <typename Row, typename Each>
+Expected<std::vector<Row>> all(const Each& each) {
+  std::vector<Row> rows;
+  const auto done = each([&rows](const Row& row) -> Expected<void> {
+    rows.push_back(row);
+    return {};
+  });
+  if (!done) return std::unexpected(done.error());
+  return rows;
+}
+
 }  // namespace
 
 Expected<TaskRecord> Journal::Impl::read_task(const Statement& row) const {
@@ -55,13 +82,7 @@ Expected<void> Journal::Impl::each_of(Statement& rows, const std::function<Expec
 }
 
 Expected<std::vector<Event>> Journal::Impl::all_of(Statement& rows) const {
-  std::vector<Event> events;
-  const auto done = each_of(rows, [&events](const Event& event) -> Expected<void> {
-    events.push_back(event);
-    return {};
-  });
-  if (!done) return std::unexpected(done.error());
-  return events;
+  return all<Event>([&](const auto& take) { return each_of(rows, take); });
 }
 
 Expected<std::vector<TaskRecord>> Journal::Impl::tasks_of(Statement& rows) const {
@@ -77,7 +98,16 @@ Expected<std::vector<TaskRecord>> Journal::Impl::tasks_of(Statement& rows) const
   }
 }
 
-Expected<std::vector<TaskRecord>> Journal::tasks() const { return impl_->tasks_of(impl_->all_tasks); }
+Expected<void> Journal::each_task(const std::function<Expected<void>(const TaskRecord&)>& take) const {
+  return page_by_page<TaskRecord>(
+      [this](std::int64_t after) { return impl_->tasks_of(impl_->tasks_after.bind(after).bind(kPage)); }, take);
+}
+
+Expected<std::vector<TaskRecord>> Journal::tasks() const {
+  return all<TaskRecord>([this](const auto& take) { return each_task(take); });
+}
+
+Expected<std::vector<TaskRecord>> Journal::open_tasks() const { return impl_->tasks_of(impl_->open_tasks); }
 
 Expected<std::vector<TaskRecord>> Journal::ended_tasks(std::int64_t before, std::int64_t most) const {
   return impl_->tasks_of(impl_->ended_tasks.bind(before).bind(most));
@@ -99,7 +129,14 @@ Expected<std::optional<TaskHistory>> Journal::task(std::string_view id) const {
   return TaskHistory{std::move(**found), std::move(*happened)};
 }
 
-Expected<std::vector<Event>> Journal::notes() const { return impl_->all_of(impl_->notes); }
+Expected<void> Journal::each_note(const std::function<Expected<void>(const Event&)>& take) const {
+  return page_by_page<Event>(
+      [this](std::int64_t after) { return impl_->all_of(impl_->notes_after.bind(after).bind(kPage)); }, take);
+}
+
+Expected<std::vector<Event>> Journal::notes() const {
+  return all<Event>([this](const auto& take) { return each_note(take); });
+}
 
 std::int64_t Journal::newest() const { return std::max(impl_->last_written, impl_->durable); }
 

@@ -169,13 +169,13 @@ Expected<void> shorten(Journal& journal, std::string_view id, std::size_t keep, 
 }
 
 Expected<void> end_with_body(Journal& journal, Time now) {
-  const auto tasks = journal.tasks();
+  const auto tasks = journal.open_tasks();
   if (!tasks) return std::unexpected(tasks.error());
   const auto orders = journal.claimed();
   if (!orders) return std::unexpected(orders.error());
   int ended = 0;
   for (const TaskRecord& record : *tasks) {
-    if (record.outcome || (!record.started && orders->contains(record.task.id))) continue;
+    if (!record.started && orders->contains(record.task.id)) continue;
     if (auto written = journal.outcome(record.task.id, task::Outcome::kFailed, "its body is gone", now); !written)
       return written;
     ++ended;
