@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "apps/commands.hpp"
+#include "apps/memory.hpp"
 
 namespace pons::apps {
 namespace {
@@ -83,6 +84,7 @@ bool said_all() { return std::fflush(stdout) == 0 || errno == EPIPE; }
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // a reader that leaves must not stop a robot,
   std::signal(SIGXFSZ, SIG_IGN);  // nor a file that may grow no more: who writes it hears of that
+  pons::apps::keep_large_blocks_off_the_heap();
   try {
     const int code = pons::apps::run_command_line(argc, argv);
     if (pons::apps::said_all()) return code;

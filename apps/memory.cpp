@@ -1,5 +1,6 @@
 #include "apps/memory.hpp"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -11,8 +12,11 @@ namespace {
 
 constexpr std::int64_t kFrom = 500;  // parcels: what fills by then is not what leaks
 constexpr double kMib = 1 << 20;
+constexpr int kLargeBlock = 512 << 10;
 
 }  // namespace
+
+void keep_large_blocks_off_the_heap() { mallopt(M_MMAP_THRESHOLD, kLargeBlock); }
 
 double own_mib() {
   std::ifstream file("/proc/self/statm");

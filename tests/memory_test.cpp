@@ -1,12 +1,14 @@
 #include "apps/memory.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstddef>
 #include <deque>
+#include <memory>
 
 namespace pons::apps {
 namespace {
@@ -58,6 +60,20 @@ TEST(Memory, IsWhatThisProcessHasTakenAndNoFile) {
   ASSERT_EQ(ftruncate(file, kSize), 0);
   EXPECT_NEAR(touched_mib(file, MAP_SHARED), 0, 4);
   close(file);
+}
+
+// glibc's own way, without it: blocks of a size that was once freed go on the heap from then on.
+TEST(Memory, OfALargeBlockGoesBackWhenItGoes) {
+  keep_large_blocks_off_the_heap();
+  const auto pages_of_its_own = [](std::size_t size) {
+    const std::size_t before = mallinfo2().hblks;
+    const std::unique_ptr<char[]> block(new char[size]);
+    static_cast<volatile char*>(block.get())[0] = 1;
+    return mallinfo2().hblks - before;
+  };
+  EXPECT_EQ(pages_of_its_own(8 << 20), 1U);
+  EXPECT_EQ(pages_of_its_own(1 << 20), 1U) << "though a larger one was freed before";
+  EXPECT_EQ(pages_of_its_own(100 << 10), 0U);
 }
 
 }  // namespace

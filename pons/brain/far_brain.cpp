@@ -98,7 +98,7 @@ bool FarBrain::waits() const {
   return brain_.waits() || !unanswered_.empty() || !untold_rides_.empty() || !untold_to_brain_.empty();
 }
 
-void FarBrain::transmit(Arrive arrive) {
+void FarBrain::transmit(const Arrive& arrive) {
   for (const Duration later : network_.send(now_)) under_way_.emplace(now_ + later, arrive);
 }
 

@@ -69,7 +69,7 @@ class FarBrain final : public Brain {
   };
   using Untold = std::map<std::uint64_t, Told>;
 
-  void transmit(Arrive arrive);
+  void transmit(const Arrive& arrive);
   void deliver();
   void tell(Untold& untold, Arrive arrive) { untold.emplace(++told_, Told{std::move(arrive), {}}); }
   void tell_again(Untold& untold);

@@ -247,6 +247,12 @@ class Judge {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
+std::string line(const sim::Breach& breach, std::size_t arm) {
+  return fmt::format("arm {}: joint {} at {:.1f} % of its {} limit, from {:.3f} to {:.3f} s", arm + 1, breach.axis + 1,
+                     100 * breach.worst_ratio, breach.of == sim::Breach::Of::kSpeed ? "speed" : "torque",
+                     breach.from.s(), breach.to.s());
+}
+
 }  // namespace
 
 std::string kind_of(std::string_view reason) {
@@ -283,7 +289,9 @@ Expected<Verdict> judge(const std::vector<ParcelTruth>& parcels, const std::vect
     }
   }
   judge.below_unread();
-  for (const sim::ArmTruth& arm : arms) {
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const sim::ArmTruth& arm = arms[i];
+    for (const sim::Breach& breach : arm.breaches) verdict.findings.push_back(line(breach, i));
     verdict.violations += arm.speed_violations + arm.torque_violations;
     verdict.worst_ratio = std::max({verdict.worst_ratio, arm.worst_speed_ratio, arm.worst_torque_ratio});
   }

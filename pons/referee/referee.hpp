@@ -36,10 +36,11 @@ struct Verdict {
   };
   std::map<std::string, Counts> reasons;  // of both, by kind_of the journal's reason
   int damaged = 0;
-  int unfinished = 0;                 // still on the belt or in the hand when the run was broken off
-  std::uint64_t violations = 0;       // axis-steps beyond a limit, as the simulator saw the arm
-  double worst_ratio = 0;             // of measured speed or commanded torque to its limit
-  std::vector<std::string> findings;  // one line for each parcel that is not sorted or deservedly excepted
+  int unfinished = 0;            // still on the belt or in the hand when the run was broken off
+  std::uint64_t violations = 0;  // axis-steps beyond a limit, as the simulator saw the arm
+  double worst_ratio = 0;        // of measured speed or commanded torque to its limit
+  // One line for each parcel that is not sorted or deservedly excepted, and for each breach of a limit.
+  std::vector<std::string> findings;
 };
 
 enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };

@@ -312,11 +312,13 @@ TEST_F(RefereeTest, DamageAndLimitsComeFromTruth) {
   pressed.max_press_n = 121;
   arm_.front().speed_violations = 2;
   arm_.front().worst_speed_ratio = 1.1;
+  arm_.front().breaches = {{sim::Breach::Of::kSpeed, 4, Time(from_s(2)), Time(from_s(2.002)), 1.1}};
   const Verdict verdict = judge({pressed});
   EXPECT_EQ(verdict.damaged, 1);
   EXPECT_EQ(verdict.sorted, 1);
   EXPECT_EQ(verdict.violations, 2U);
   EXPECT_DOUBLE_EQ(verdict.worst_ratio, 1.1);
+  EXPECT_EQ(verdict.findings.back(), "arm 1: joint 5 at 110.0 % of its speed limit, from 2.000 to 2.002 s");
 }
 
 TEST_F(RefereeTest, WhatWasNotOfferedDoesNotCount) {

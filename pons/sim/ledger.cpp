@@ -22,6 +22,8 @@ constexpr Duration kTrayCleared = from_s(6.0);   // long enough for the camera o
 constexpr Duration kStrayCleared = from_s(8.0);  // at rest where nothing belongs
 constexpr double kRimSlack_m = 0.02;
 constexpr double kWithinLimit = 1.001;
+constexpr Duration kSameBreach = from_s(0.1);  // so long apart, what is beyond a limit has come back to it meanwhile
+constexpr std::size_t kMostBreaches = 100;
 constexpr double kFarApart_m = 1;   // arms further from each other are not measured
 constexpr std::size_t kWindow = 5;  // steps of the mean acceleration at 2 ms
 
@@ -46,6 +48,19 @@ struct Track {
   Time moved;                            // last time it was not still
   bool settled = false;
 };
+
+void note(ArmTruth& arm, Breach::Of of, int axis, double ratio, Time now) {
+  const auto goes_on = [&](const Breach& last) {
+    return last.of == of && last.axis == axis && now - last.to <= kSameBreach;
+  };
+  const auto last = std::find_if(arm.breaches.rbegin(), arm.breaches.rend(), goes_on);
+  if (last != arm.breaches.rend()) {
+    last->to = now;
+    last->worst_ratio = std::max(last->worst_ratio, ratio);
+  } else if (arm.breaches.size() < kMostBreaches) {
+    arm.breaches.push_back({of, axis, now, now, ratio});
+  }
+}
 
 }  // namespace
 
@@ -74,7 +89,7 @@ struct Ledger::Impl {
   void locate(Track& track, ParcelTruth& parcel, const Vector3& at, const Vector3& speed, Time now) const;
   [[nodiscard]] const world::Place* place_around(const Vector3& at) const;
   [[nodiscard]] bool leaves(const Track& track, const ParcelTruth& parcel, Time now) const;
-  void work(std::size_t arm, const mjData* data, const ArmStep& step);
+  void work(std::size_t arm, const mjData* data, const ArmStep& step, Time now);
   void keep_apart(const Composed& cell, mjData* data, std::span<const ArmStep> arms);
 };
 
@@ -254,7 +269,7 @@ bool Ledger::Impl::leaves(const Track& track, const ParcelTruth& parcel, Time no
   }
 }
 
-void Ledger::Impl::work(std::size_t index, const mjData* data, const ArmStep& step) {
+void Ledger::Impl::work(std::size_t index, const mjData* data, const ArmStep& step, Time now) {
   const AxisLimits& limits = world.arms()[index].robot.limits;
   const auto axes = static_cast<Eigen::Index>(step.composed.dof.size());
   const double step_s = world.physics_step_s;
@@ -274,12 +289,16 @@ void Ledger::Impl::work(std::size_t index, const mjData* data, const ArmStep& st
     const double position = data->qpos[step.composed.qpos[static_cast<std::size_t>(i)]];
     const double outside = std::max(limits.position_min[i] - position, position - limits.position_max[i]);
     const double mean = (speed[i] - window[window_at][i]) / (static_cast<double>(kWindow) * step_s);
-    worst(arm.worst_speed_ratio, &arm.speed_violations, std::abs(speed[i]) / limits.speed_rad_s[i]);
+    const double speed_ratio = std::abs(speed[i]) / limits.speed_rad_s[i];
+    const double torque_ratio = std::abs(step.torque_nm[i]) / limits.torque_nm[i];
+    if (speed_ratio > kWithinLimit) note(arm, Breach::Of::kSpeed, static_cast<int>(i), speed_ratio, now);
+    if (torque_ratio > kWithinLimit) note(arm, Breach::Of::kTorque, static_cast<int>(i), torque_ratio, now);
+    worst(arm.worst_speed_ratio, &arm.speed_violations, speed_ratio);
     worst(arm.worst_acceleration_ratio, nullptr,
           std::abs(speed[i] - last_speed[i]) / step_s / limits.acceleration_rad_s2[i]);
     worst(arm.worst_mean_acceleration_ratio, &arm.acceleration_violations,
           std::abs(mean) / limits.acceleration_rad_s2[i]);
-    worst(arm.worst_torque_ratio, &arm.torque_violations, std::abs(step.torque_nm[i]) / limits.torque_nm[i]);
+    worst(arm.worst_torque_ratio, &arm.torque_violations, torque_ratio);
     if (outside > 0) worst(arm.worst_position_ratio, nullptr, 1 + outside);
   }
   window[window_at] = speed;
@@ -317,7 +336,7 @@ void Ledger::Impl::keep_apart(const Composed& cell, mjData* data, std::span<cons
 }
 
 void Ledger::update(const Composed& cell, mjData* data, std::span<const ArmStep> arms, Time now) {
-  for (std::size_t i = 0; i < arms.size(); ++i) impl_->work(i, data, arms[i]);
+  for (std::size_t i = 0; i < arms.size(); ++i) impl_->work(i, data, arms[i], now);
   impl_->window_at = (impl_->window_at + 1) % kWindow;
   if (arms.size() > 1 && impl_->window_at == 0) impl_->keep_apart(cell, data, arms);
   impl_->belt_stands = cell.model->geom_surfacevel[6 * cell.belt_geom] == 0;

@@ -257,6 +257,28 @@ TEST_P(Lift, CupsSealCarryAndReleaseIntoAChute) {
 
 INSTANTIATE_TEST_SUITE_P(Masses, Lift, testing::Values(0.3, 1.5, 3.5));
 
+TEST(Truth, AJointBeyondItsLimitIsToldWithItsTime) {
+  Bench bench(1.0);
+  const ArmTruth& arm = bench.cell.ledger.arms().front();
+  const auto too_quick = [&] {
+    std::vector<Breach> breaches = arm.breaches;
+    std::erase_if(breaches, [](const Breach& each) { return each.of != Breach::Of::kSpeed; });
+    return breaches;
+  };
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.05), 1.0, 0.2);
+  EXPECT_TRUE(too_quick().empty());
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.20), 0.06, 0.2);
+  EXPECT_GT(arm.speed_violations, 0U);
+  const std::vector<Breach> breaches = too_quick();
+  ASSERT_FALSE(breaches.empty());
+  const auto worst = std::ranges::max_element(breaches, {}, &Breach::worst_ratio);
+  EXPECT_DOUBLE_EQ(worst->worst_ratio, arm.worst_speed_ratio);
+  for (const Breach& breach : breaches) {
+    EXPECT_LE(breach.from, breach.to);
+    EXPECT_LT(breach.to, breach.from + from_s(0.35)) << "it has stopped since";
+  }
+}
+
 TEST(Truth, AParcelLostUnderVacuumIsADrop) {
   Bench bench(1.0);
   bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.05), 1.0, 0.1);

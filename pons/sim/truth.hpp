@@ -46,6 +46,15 @@ struct ParcelTruth {
   int arm = -1;              // whose cups last held it, in the order of world.arms(); -1: none has
 };
 
+// A joint beyond its limit, over steps that follow one another closely.
+struct Breach {
+  enum class Of : std::uint8_t { kSpeed, kTorque };
+  Of of = Of::kSpeed;
+  int axis = 0;
+  Time from, to;
+  double worst_ratio = 0;  // to the limit
+};
+
 // How hard the arm really worked, over every physics step so far. Ratios to world limits; above 1 is a violation.
 struct ArmTruth {
   std::uint64_t steps = 0;
@@ -57,6 +66,7 @@ struct ArmTruth {
   std::uint64_t speed_violations = 0;         // axis-steps above 1.001
   std::uint64_t acceleration_violations = 0;  // of the 10 ms mean
   std::uint64_t torque_violations = 0;
+  std::vector<Breach> breaches;  // by their beginning; the first hundred
 };
 
 // A read-only window on a simulation; use it on the thread that advances it. The simulation must outlive it.
