@@ -19,7 +19,7 @@ FUZZ_S ?= 30
 # Interfaces that real nodes need beside those of ROS 2's wheels.
 ROS_MESSAGES = ros2/pons_msgs $(addprefix ros2/interfaces/,control_msgs nav2_msgs tf2_msgs)
 
-.PHONY: help setup build demo test check format asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers ros-peers clean
+.PHONY: help setup build demo test check format format-check asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers ros-peers clean
 
 help: ## what there is
 	@echo "Pons: the bridge between a robot's brain and its body."
@@ -47,12 +47,16 @@ test: build ## set up, build, and run all tests
 check: ## format, clang-tidy, layers, style, then all tests
 	@tools/setup --check
 	cmake --preset release
-	$(SOURCES) | xargs clang-format-19 --dry-run -Werror
+	@$(MAKE) --no-print-directory format-check
 	tools/check_layers
 	tools/check_style
 	cmake --build --preset release --parallel $(JOBS)
 	tools/tidy build/release
 	ctest --preset release --parallel $(TEST_JOBS) --no-tests=error
+
+format-check: ## say which sources are not as .clang-format says
+	@tools/setup --check
+	$(SOURCES) | xargs clang-format-19 --dry-run -Werror
 
 format: ## rewrite the sources as .clang-format says
 	@tools/setup --check

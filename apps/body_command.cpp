@@ -119,7 +119,8 @@ void add_body(CLI::App& app, Chosen& chosen) {
                       "JSON file for the figures of the run, by the last bridge's journal");
   command->add_option("--log", options->log,
                       "Text file for what the control loop did: stops, arming, refused commands");
-  command->add_flag("--explain", options->explain, "A line for each parcel that was not sorted as ordered");
+  command->add_flag("--explain", options->explain,
+                    "A line for each parcel not sorted as ordered and each limit exceeded");
   command->add_flag("--quiet", options->quiet, "Not a word about bridges that come and go");
   refuse_empty(*command);
   command->callback([options, &chosen] { chosen = [options] { return body(*options); }; });

@@ -235,7 +235,8 @@ void add_options(CLI::App& command, RunOptions& options) {
   add_body_setup_options(command, options.body);
   add_keep_free(command, options.keep_free_mib);
   command.add_flag("--recover", options.recover, "Bring an arm that is found outside its position limits slowly in");
-  command.add_flag("--explain", options.explain, "A line for each parcel that was not sorted as ordered");
+  command.add_flag("--explain", options.explain,
+                   "A line for each parcel not sorted as ordered and each limit exceeded");
   command.add_flag("--quiet", options.quiet, "No progress");
   refuse_empty(command);
 }

@@ -22,7 +22,7 @@ enum class Urgency : std::uint8_t { kAny, kUrgent };
 
 class Questions {
  public:
-  static constexpr std::size_t kUrgentMost = 16;  // besides
+  static constexpr std::size_t kUrgentMost = 16;    // besides
   static constexpr std::size_t kPolledAtOnce = 32;  // besides: a period of the bridge is short
   using Answered = std::function<void(const Json&)>;
 
