@@ -44,10 +44,8 @@ demo: setup ## set up, build, and sort 200 parcels; report and picture land in b
 test: build ## set up, build, and run all tests
 	ctest --preset release --parallel $(TEST_JOBS) --no-tests=error
 
-check: ## format, clang-tidy, layers, style, then all tests
-	@tools/setup --check
+check: format-check ## format, clang-tidy, layers, style, then all tests
 	cmake --preset release
-	@$(MAKE) --no-print-directory format-check
 	tools/check_layers
 	tools/check_style
 	cmake --build --preset release --parallel $(JOBS)

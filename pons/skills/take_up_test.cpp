@@ -33,6 +33,16 @@ class TakeUpTest : public testing::Test {
     now_ += from_s(0.01);
     cell_.refresh(now_, {});
   }
+  // Written down by one bridge; the next finds nothing on the cups, and the arm at home.
+  void hung_over_chute_3_and_is_gone() {
+    cups(kSealed_kpa, 15, over("chute_3"));
+    cell_.held = held_;
+    cell_.held->falls = cell_.falls();
+    const task::Json written = take_up_.carries();
+    cell_.held.reset();
+    cups(0, 0, world_.robot.home);
+    take_up_.restore(written);
+  }
   // Over the middle of a place's mouth.
   [[nodiscard]] AxisVector over(const char* name) {
     const world::Place& place = *world_.place(name);
@@ -111,13 +121,7 @@ TEST_F(TakeUpTest, WhatTheCupsNoLongerHoldWasLetGoOrLost) {
 // Wherever the arm was stopped meanwhile.
 TEST_F(TakeUpTest, TheLightCurtainsSayWhereItFell) {
   fallen_into_ = {"chute_2"};
-  cups(kSealed_kpa, 15, over("chute_3"));
-  cell_.held = held_;
-  cell_.held->falls = cell_.falls();
-  const task::Json written = take_up_.carries();
-  cell_.held.reset();
-  cups(0, 0, world_.robot.home);
-  take_up_.restore(written);
+  hung_over_chute_3_and_is_gone();
   EXPECT_EQ(take_up_.fate(task(), 1), Fate::kLost) << "what fell there before is something else";
   fallen_into_.push_back("exception");
   cups(0, 0, world_.robot.home);
@@ -134,13 +138,7 @@ TEST_F(TakeUpTest, TheLightCurtainsSayWhereItFell) {
 
 // Another hung on it.
 TEST_F(TakeUpTest, OfTwoCountsThatOfItsOwnPlaceIsItsOwn) {
-  cups(kSealed_kpa, 15, over("chute_3"));
-  cell_.held = held_;
-  cell_.held->falls = cell_.falls();
-  const task::Json written = take_up_.carries();
-  cell_.held.reset();
-  cups(0, 0, world_.robot.home);
-  take_up_.restore(written);
+  hung_over_chute_3_and_is_gone();
   fallen_into_ = {"chute_1", "chute_2"};
   cups(0, 0, world_.robot.home);
   for (const char* const own : {"chute_1", "chute_2"}) {

@@ -303,6 +303,7 @@ TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
   const double fastest = speeds[speeds.size() * 98 / 100];
   EXPECT_GT(fastest, 0.08);
   EXPECT_LT(fastest, 0.3);
+  EXPECT_LT(speeds.back(), 25) << "not even half of the way to a set-point is jumped";
   EXPECT_GT(until_there, 1200U) << "500 in each of three seconds and more, less what was missed";
   EXPECT_THAT(stories(), HasSubstr("servo-"));
   EXPECT_THAT(run_.err(), HasSubstr("/brain/high_level_cmd: positions: 2 positions for 7 joints"));
