@@ -10,7 +10,7 @@ namespace pons::apps {
 
 // Pictures and what is made of them, of a size of half a megabyte and more, come and go by the thousand. The more such
 // blocks are freed, the larger are those that glibc puts on the heap, where they leave holes that grow for hours. From
-// now on each has pages of its own, which go back when it goes. It costs about 2 % of a simulated run's CPU time.
+// now on each has pages of its own, which go back when it goes. What it costs: docs/figures.md.
 void keep_large_blocks_off_the_heap();
 
 // MiB resident, but for what files back: the kernel drops pages of programs and libraries when it likes, and gets them
