@@ -1,12 +1,14 @@
 #include "pons/cerebellum/computed_torque.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace pons::cerebellum {
 namespace {
 
-// Times its speed limit: no motion of its own is as fast; then so many times as hard as its acceleration limit.
-constexpr double kThrown = 1.1, kThrownBrakes = 5;
+// An axis that gives way is braked the harder the nearer it comes to its speed limit: from this share on, up to so many
+// times its acceleration limit.
+constexpr double kFast = 0.7, kHardestBrake = 5;
 
 }  // namespace
 
@@ -42,8 +44,10 @@ void give_way(model::RobotModel& model, const Gains& gains, const ArmNow& arm, C
   const AxisVector& most = limits.acceleration_rad_s2;
   const AxisVector brake = -gains.brake_1_s * arm.speed;
   AxisVector wanted = brake.cwiseMin(most).cwiseMax(-most);
-  for (Eigen::Index i = 0; i < wanted.size(); ++i)
-    if (std::abs(arm.speed[i]) > kThrown * limits.speed_rad_s[i]) wanted[i] *= kThrownBrakes;
+  for (Eigen::Index i = 0; i < wanted.size(); ++i) {
+    const double fast = (std::abs(arm.speed[i]) / limits.speed_rad_s[i] - kFast) / (1 - kFast);
+    wanted[i] *= std::lerp(1, kHardestBrake, std::clamp(fast, 0.0, 1.0));
+  }
   corrections.sent.push(corrections.integral);
   model.inverse_dynamics(arm.position, arm.speed, wanted, arm.payload, torque_nm);
 }

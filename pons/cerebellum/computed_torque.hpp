@@ -54,7 +54,7 @@ void feed_forward(model::RobotModel& model, const AxisState& commanded, const mo
                   Corrections& corrections, AxisVector& torque_nm) PONS_NONBLOCKING;
 
 // Gives way to what pushes: weight alone is carried, and what moves is braked, by brake_1_s times its speed and no
-// harder than its acceleration limit, or five times as hard where a blow has thrown it far beyond its speed limit.
+// harder than its acceleration limit, but the harder the faster a blow makes it, five times as hard at its speed limit.
 void give_way(model::RobotModel& model, const Gains& gains, const ArmNow& arm, Corrections& corrections,
               AxisVector& torque_nm) PONS_NONBLOCKING;
 
