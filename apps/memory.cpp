@@ -18,6 +18,12 @@ constexpr int kLargeBlock = 512 << 10;
 
 void keep_large_blocks_off_the_heap() { mallopt(M_MMAP_THRESHOLD, kLargeBlock); }
 
+void HeapTrimmer::tick(Time now) {
+  if (now < next_) return;
+  next_ = now + std::chrono::minutes(1);
+  malloc_trim(0);
+}
+
 double own_mib() {
   std::ifstream file("/proc/self/statm");
   double size = 0, resident = 0, shared = 0;  // pages

@@ -1,9 +1,11 @@
 // How much memory this process has taken for itself, and how that goes in the course of a run.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 
+#include "pons/core/time.hpp"
 #include "pons/record/report.hpp"
 
 namespace pons::apps {
@@ -12,6 +14,16 @@ namespace pons::apps {
 // blocks are freed, the larger are those that glibc puts on the heap, where they leave holes that grow for hours. From
 // now on each has pages of its own, which go back when it goes. What it costs: docs/figures.md.
 void keep_large_blocks_off_the_heap();
+
+// Smaller ones leave holes, too, of which glibc gives back only what lies at a heap's end. One thread at a time.
+class HeapTrimmer {
+ public:
+  // Once a minute of a run, gives the pages of all holes back: some milliseconds.
+  void tick(Time now);
+
+ private:
+  Time next_{std::chrono::minutes(1)};
+};
 
 // MiB resident, but for what files back: the kernel drops pages of programs and libraries when it likes, and gets them
 // again. NaN where it does not say.

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "apps/memory.hpp"
 #include "apps/ros_options.hpp"
 #include "apps/views/log_view.hpp"
 
@@ -13,7 +14,8 @@ runner::Watch watch_for(Told told, const RunAlong& along) {
   const auto to = std::make_shared<const Told>(std::move(told));
   runner::Watch watch;
   watch.interrupted = [&along] { return along.asks_to_end(); };
-  watch.progress = [to, &along](Time now) {
+  watch.progress = [to, &along, heap = HeapTrimmer()](Time now) mutable {
+    heap.tick(now);
     for (const std::string& warning : along.take_warnings()) to->people(alert_line(warning));
     RosNode* const ros = to->ros();
     if (ros == nullptr) return;

@@ -5,13 +5,18 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <deque>
 #include <memory>
+#include <vector>
 
 namespace pons::apps {
 namespace {
+
+using namespace std::chrono_literals;
 
 TEST(Memory, IsWatchedFromThe500thParcelOn) {
   std::deque<double> reads{250, 240, 270, 255};
@@ -74,6 +79,29 @@ TEST(Memory, OfALargeBlockGoesBackWhenItGoes) {
   EXPECT_EQ(pages_of_its_own(8 << 20), 1U);
   EXPECT_EQ(pages_of_its_own(1 << 20), 1U) << "though a larger one was freed before";
   EXPECT_EQ(pages_of_its_own(100 << 10), 0U);
+}
+
+// Each minute of a run, and not at every tick of it.
+TEST(Memory, OfHolesGoesBackOnceAMinute) {
+  HeapTrimmer heap;
+  heap.tick(Time{});
+  std::vector<std::unique_ptr<char[]>> blocks(1024);
+  const auto leave_holes = [&] {
+    for (auto& block : blocks) std::fill_n((block = std::make_unique<char[]>(64 << 10)).get(), 64 << 10, 'x');
+    for (std::size_t i = 0; i < blocks.size(); ++i)
+      if (i % 8 != 7) blocks[i].reset();
+  };
+  leave_holes();
+  const double with_holes_mib = own_mib();
+  heap.tick(Time(59s));
+  EXPECT_NEAR(own_mib(), with_holes_mib, 4);
+  heap.tick(Time(60s));
+  EXPECT_LT(own_mib(), with_holes_mib - 50);
+  leave_holes();
+  heap.tick(Time(119s));
+  EXPECT_NEAR(own_mib(), with_holes_mib, 8);
+  heap.tick(Time(120s));
+  EXPECT_LT(own_mib(), with_holes_mib - 50);
 }
 
 }  // namespace

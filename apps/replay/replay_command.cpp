@@ -32,7 +32,7 @@ class Inputs {
   [[nodiscard]] Expected<fs::path> file(const std::string& name, const std::string& text) {
     const auto folder = folder_.file(fmt::format("{}", ++count_).c_str());
     if (!folder) return std::unexpected(folder.error());
-    const fs::path path = fs::path(*folder) / name;
+    fs::path path = fs::path(*folder) / name;
     std::error_code error;
     fs::create_directories(*folder, error);
     std::ofstream out(path, std::ios::binary);
