@@ -17,7 +17,7 @@ LOOP = rt_test link_test motion_test cerebellum_test
 FUZZERS = cdr foxglove journal mcap ros task tree
 FUZZ_S ?= 30
 # Interfaces that real nodes need beside those of ROS 2's wheels.
-ROS_MESSAGES = ros2/pons_msgs $(addprefix ros2/interfaces/,control_msgs nav2_msgs tf2_msgs)
+ROS_MESSAGES = ros2/pons_msgs $(wildcard ros2/dialects/*) $(addprefix ros2/interfaces/,control_msgs nav2_msgs tf2_msgs)
 
 .PHONY: help setup build demo test check format format-check asan asan-quick tsan tsan-quick rtsan fuzz gates bench bench-peers ros-peers clean
 
@@ -111,7 +111,7 @@ bench-peers: ## build what the benchmarks compare against
 ros-peers: .venv-ros/messages ## runs beside real nodes of ROS 2, as wheels (260 MB; wants a python3.12)
 	cmake --preset release
 	cmake --build --preset release --parallel $(JOBS) --target pons
-	for name in arm pictures rounds; do .venv-ros/bin/python tests/ros/real/$${name}_test.py build/release/apps/pons || exit 1; done
+	for name in arm dialects pictures rounds; do .venv-ros/bin/python tests/ros/real/$${name}_test.py build/release/apps/pons || exit 1; done
 
 .venv-ros/messages: tools/requirements-ros.txt tests/ros/real/messages.py $(shell find $(ROS_MESSAGES) -type f)
 	@tools/setup --ros

@@ -20,7 +20,7 @@ void keep_large_blocks_off_the_heap() { mallopt(M_MMAP_THRESHOLD, kLargeBlock); 
 
 void HeapTrimmer::tick(Time now) {
   if (now < next_) return;
-  next_ = now + std::chrono::minutes(1);
+  next_ = now + kEvery;
   malloc_trim(0);
 }
 

@@ -18,11 +18,13 @@ void keep_large_blocks_off_the_heap();
 // Smaller ones leave holes, too, of which glibc gives back only what lies at a heap's end. One thread at a time.
 class HeapTrimmer {
  public:
+  static constexpr Duration kEvery = std::chrono::seconds(10);
+
   // Once a minute of a run, gives the pages of all holes back: some milliseconds.
   void tick(Time now);
 
  private:
-  Time next_{std::chrono::minutes(1)};
+  Time next_{kEvery};
 };
 
 // MiB resident, but for what files back: the kernel drops pages of programs and libraries when it likes, and gets them

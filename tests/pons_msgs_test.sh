@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds ros2/pons_msgs with colcon as users do, with Debian's rosidl, and holds what comes of it against the structs
-# that Pons has of the same files. What Debian lacks is made in a workspace of the test's own: ROS 2's standard
-# packages, of ros2/interfaces/, and those in tests/ros_workspace/.
+# Builds ros2/pons_msgs and the packages of ros2/dialects/ with colcon as users do, with Debian's rosidl, and holds what
+# comes of pons_msgs against the structs that Pons has of the same files. What Debian lacks is made in a workspace of the
+# test's own: ROS 2's standard packages, of ros2/interfaces/, and those in tests/ros_workspace/.
 #
 # usage: tests/pons_msgs_test.sh TYPES OUT    TYPES: the folder that tools/ros_codecs has written; OUT: for the workspace
 set -euo pipefail
@@ -49,7 +49,7 @@ package action_msgs builtin_interfaces unique_identifier_msgs
 package std_msgs builtin_interfaces
 package geometry_msgs builtin_interfaces std_msgs
 cp -r tests/ros_workspace/* "$out/src/"
-ln -s "$PWD/ros2/pons_msgs" "$out/src/pons_msgs"
+ln -s "$PWD/ros2/pons_msgs" "$PWD"/ros2/dialects/* "$out/src/"
 
 colcon --log-base "$out/log" build --base-paths "$out/src" --build-base "$out/build" --install-base "$out/install" \
   --executor sequential --event-handlers console_direct+ \
@@ -57,6 +57,11 @@ colcon --log-base "$out/log" build --base-paths "$out/src" --build-base "$out/bu
 
 for name in msg/LinkCommand.msg msg/ObjectBelief.msg msg/ObjectBeliefArray.msg msg/RobotState.msg msg/TaskEvent.msg msg/TaskStatus.msg msg/TaskStatusArray.msg srv/CommandTask.srv srv/SubmitTask.srv action/ExecuteTask.action; do
   [ -e "$out/install/pons_msgs/share/pons_msgs/$name" ] || die "$name was not installed"
+done
+for package in ros2/dialects/*; do
+  (cd "$package" && find msg -type f) | while read -r name; do
+    [ -e "$out/install/${package##*/}/share/${package##*/}/$name" ] || die "${package##*/}: $name was not installed"
+  done || exit 1
 done
 libraries=$(find "$out/install" -name '*.so' -printf '%h\n' | sort -u | paste -sd:)
 LD_LIBRARY_PATH=$libraries "$out/install/pons_msgs_user/lib/pons_msgs_user/same_types" || die "rosidl reads it otherwise"

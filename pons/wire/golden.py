@@ -110,7 +110,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    interfaces = ros_interfaces.load_all([ROOT / "ros2" / "interfaces", ROOT / "ros2"])
+    interfaces = ros_interfaces.load_all([ROOT / "ros2" / "interfaces", ROOT / "ros2" / "dialects", ROOT / "ros2"])
     messages = {each.name: each for interface in interfaces.values() for each in interface.messages}
     theirs, store = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.EMPTY)
     store.register({each.name: described(each) for each in messages.values()})

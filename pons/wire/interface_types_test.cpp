@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 Expected<InterfaceText> own_file(const std::string& interface) {
   const std::size_t kind = interface.find('/') + 1;
   const std::string extension = interface.substr(kind, interface.rfind('/') - kind);
-  for (const char* const folder : {"ros2/interfaces/", "ros2/"}) {
+  for (const char* const folder : {"ros2/interfaces/", "ros2/dialects/", "ros2/"}) {
     const std::string path = folder + interface + "." + extension;
     if (std::ifstream stream(path, std::ios::binary); stream)
       return InterfaceText{std::string(std::istreambuf_iterator<char>(stream), {}), path};

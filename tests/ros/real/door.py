@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """A door that other nodes open: std_srvs/Trigger at /door/open. The second time it is jammed, the third time it never
-answers."""
+answers. It says when it stands, and each time it is asked."""
 
 import threading
 
@@ -23,6 +23,7 @@ def main():
     rclpy.init()
     node = rclpy.create_node("door")
     node.create_service(Trigger, "/door/open", open_door)
+    print("stands", flush=True)
     rclpy.spin(node)
 
 
