@@ -37,6 +37,7 @@ def take_domain() -> int:
 
 FOLDER = tempfile.TemporaryDirectory()
 DOMAIN = take_domain()
+os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)  # of whoever else is started
 os.environ.setdefault("ROS_LOG_DIR", FOLDER.name)
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
