@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace pons::referee {
 namespace {
@@ -15,6 +16,10 @@ using sim::LabelTruth;
 using sim::ParcelTruth;
 using sim::Whereabouts;
 using task::Outcome;
+
+// From when a camera sees one come, to when that lies at rest; and from then on to a picture of it, some of which the
+// arm may hide. What lies longer may have been carried off.
+constexpr Duration kComes = std::chrono::seconds(3), kIsSeen = std::chrono::seconds(9);
 
 // What the journal says of one parcel.
 struct Entry {
@@ -70,11 +75,17 @@ void stray(Entry& entry, const std::string& place, const std::pair<std::int64_t,
   entry.astray = entry.succeeded && when > entry.done;
 }
 
+// A camera saw so many more things in a place than before.
+struct Sight {
+  Time when;
+  int more;
+};
+
 // What it says of all of them.
 struct Story {
-  std::map<std::string, Entry> entries;     // by code
-  std::map<std::string, int> unread = {};   // by the place into which nobody knows whose parcels went
-  std::map<std::string, int> counted = {};  // by the place, how many a camera has seen there at once
+  std::map<std::string, Entry> entries;                   // by code
+  std::map<std::string, int> unread = {};                 // by the place into which nobody knows whose parcels went
+  std::map<std::string, std::vector<Sight>> sights = {};  // by the place
 };
 
 Expected<Story> read(const bridge::Journal& journal) {
@@ -94,10 +105,9 @@ Expected<Story> read(const bridge::Journal& journal) {
       else
         stray(entries[code], place, {event.run, event.stamp});
     }
-    if (event.kind == "fell") {
-      int& most = story.counted[task::text_of(event.detail, "place")];
-      most = std::max(most, event.detail.value("things", 0));
-    }
+    if (event.kind == "fell")
+      story.sights[task::text_of(event.detail, "place")].push_back(
+          {event.stamp, event.detail.value("things", 0) - event.detail.value("before", 0)});
     if (event.kind != "ride") return {};
     Entry& entry = entries[code];
     entry.ride = true;
@@ -141,15 +151,15 @@ class Judge {
   }
 
   // After the last parcel. That one was never identified says nothing of where it lies: of those below, as many are
-  // accounted for as something without a code was told to have fallen there, or as a camera has counted there beside
-  // those that have an entry of their own.
+  // accounted for as something without a code was told to have fallen there, or as a camera has seen come there then,
+  // beside those that have an entry of their own.
   void below_unread() {
+    for (const ParcelTruth* const parcel : with_entry_) (void)was_seen(*parcel);
     for (const auto& [parcel, entry] : unread_) {
       int& unread = story_.unread[parcel->place];
-      int& counted = story_.counted[parcel->place];
-      if (std::max(unread, counted - with_entry_[parcel->place]) > 0) {
-        --unread;
-        --counted;
+      const bool told = unread > 0;
+      if (told) --unread;
+      if (was_seen(*parcel) || told) {
         astray(*parcel, entry, "fell, as the journal says of one that nobody has read");
       } else {
         lost(*parcel, entry, "fell, and was never identified");
@@ -162,6 +172,16 @@ class Judge {
     const ParcelTruth* parcel;
     Entry entry;
   };
+
+  // Each that a camera has seen come is one.
+  bool was_seen(const ParcelTruth& parcel) {
+    for (Sight& sight : story_.sights[parcel.place]) {
+      if (sight.more == 0 || sight.when + kComes < parcel.arrived || sight.when > parcel.arrived + kIsSeen) continue;
+      --sight.more;
+      return true;
+    }
+    return false;
+  }
 
   // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is
   // nobody's.
@@ -204,7 +224,7 @@ class Judge {
   void below(const ParcelTruth& parcel, const Entry& entry) {
     const bool own = entry.succeeded ? entry.astray : (entry.ride && !entry.unseen) || entry.ended || entry.strayed;
     if (own) {
-      ++with_entry_[parcel.place];
+      with_entry_.push_back(&parcel);
       astray(parcel, entry, "fell, with an entry");
     } else if (entry.unseen) {
       unread_.push_back({&parcel, entry});
@@ -241,8 +261,8 @@ class Judge {
   Verdict& verdict_;
   Story story_;
   RunEnd end_;
-  std::vector<Unread> unread_;             // below
-  std::map<std::string, int> with_entry_;  // below, by place
+  std::vector<Unread> unread_;                  // below
+  std::vector<const ParcelTruth*> with_entry_;  // likewise
 };
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }

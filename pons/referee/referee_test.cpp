@@ -6,6 +6,8 @@
 namespace pons::referee {
 namespace {
 
+using namespace std::chrono_literals;
+
 using sim::ParcelTruth;
 using sim::Whereabouts;
 using task::Json;
@@ -47,8 +49,8 @@ class RefereeTest : public ::testing::Test {
     const bridge::Json detail{{"code", code}, {"reason", "never identified"}, {"seen", false}};
     ASSERT_TRUE(journal_->note(Time{}, "ride", detail));
   }
-  void seen_at(const std::string& place, int things) {
-    ASSERT_TRUE(journal_->note(Time{}, "fell", {{"place", place}, {"things", things}}));
+  void seen_at(const std::string& place, int before, int things, Time now = {}) {
+    ASSERT_TRUE(journal_->note(now, "fell", {{"place", place}, {"things", things}, {"before", before}}));
   }
   void ride(const std::string& code, Time now = {}) {
     ASSERT_TRUE(journal_->note(now, "ride", {{"code", code}, {"reason", "r"}}));
@@ -276,8 +278,8 @@ TEST_F(RefereeTest, OfTheUnreadBelowAsManyAreAccountedForAsACameraCountsBesideTh
   accept("A", "A");
   end("A", Outcome::kFailed);
   for (const char* const code : {"B", "C", "D"}) unseen(code);
-  seen_at("tray", 1);
-  seen_at("tray", 2);
+  seen_at("tray", 0, 1);
+  seen_at("tray", 1, 2);
   stray("", "floor");
   const std::vector<ParcelTruth> parcels{
       parcel("B", Whereabouts::kTray, "tray"), parcel("C", Whereabouts::kTray, "tray"),
@@ -285,8 +287,28 @@ TEST_F(RefereeTest, OfTheUnreadBelowAsManyAreAccountedForAsACameraCountsBesideTh
   const Verdict verdict = judge(parcels);
   EXPECT_EQ(verdict.lost, 1) << "one of two things on the tray is A";
   EXPECT_EQ(verdict.astray, 3);
-  seen_at("tray", 3);
+  seen_at("tray", 2, 3);
   EXPECT_EQ(judge(parcels).lost, 0);
+}
+
+// The tray is emptied: what it shows later is another.
+TEST_F(RefereeTest, OfTheUnreadBelowEachIsAccountedForByWhatACameraSawThen) {
+  for (const char* const code : {"A", "B"}) unseen(code);
+  std::vector<ParcelTruth> parcels{parcel("A", Whereabouts::kTray, "tray"), parcel("B", Whereabouts::kTray, "tray")};
+  parcels[0].arrived = Time(100s);
+  parcels[1].arrived = Time(200s);
+  seen_at("tray", 0, 1, Time(98s));
+  EXPECT_EQ(judge(parcels).lost, 1);
+  seen_at("tray", 0, 1, Time(110s));
+  seen_at("tray", 0, 1, Time(150s));
+  EXPECT_EQ(judge(parcels).lost, 1);
+  seen_at("tray", 0, 1, Time(205s));
+  EXPECT_EQ(judge(parcels).lost, 0);
+  accept("C", "C");
+  end("C", Outcome::kFailed);
+  parcels.push_back(parcel("C", Whereabouts::kTray, "tray"));
+  parcels[2].arrived = Time(201s);
+  EXPECT_EQ(judge(parcels).lost, 1) << "one thing was seen then, which C is";
 }
 
 TEST_F(RefereeTest, OnTheBeltIsLostUnlessTheRunWasBrokenOff) {

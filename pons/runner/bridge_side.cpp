@@ -132,10 +132,9 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
 
 void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
   for (const auto& [place, count] : snapshot.occupancy) {
-    const auto before = seen_.occupancy.find(place);
-    if (count > (before == seen_.occupancy.end() ? 0 : before->second)) {
-      bridge_.note("fell", {{"place", place}, {"things", count}}, now);
-    }
+    const auto seen = seen_.occupancy.find(place);
+    const int before = seen == seen_.occupancy.end() ? 0 : seen->second;
+    if (count > before) bridge_.note("fell", {{"place", place}, {"things", count}, {"before", before}}, now);
   }
   seen_ = snapshot;
   seen_behind_ = now - snapshot.due;

@@ -302,6 +302,7 @@ class Place final : public ArmSkill {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
     watched_ = cell_.watched();
+    beside_.clear();
     if (cell_.held) cell_.dropped();
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
@@ -313,6 +314,7 @@ class Place final : public ArmSkill {
   // is seen again.
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
+    if (beside_.empty()) beside_ = lies_beside();
     if (const auto chutes = cell_.mouths.fallen_since(fallen_.falls); !chutes.empty()) {
       cell_.await_no_more(fallen_.code);
       cell_.mouths.expect_anywhere(now);  // it may have grazed the last one
@@ -321,10 +323,9 @@ class Place final : public ArmSkill {
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
-      const std::string* const beside = lies_beside();
-      if (beside != nullptr) {
-        detail["fell_into"] = *beside;
-        return {Status::kException, "fell into " + *beside, std::move(detail)};
+      if (!beside_.empty()) {
+        detail["fell_into"] = beside_;
+        return {Status::kException, "fell into " + beside_, std::move(detail)};
       }
       cell_.strays->let_go(fallen_.code, into_->name, now);
       if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
@@ -356,13 +357,14 @@ class Place final : public ArmSkill {
     const auto has = [&](const Cell::Watched& one) { return one.seen >= fell_at_ + kFallsWithin; };
     return now >= fell_at_ + kLooksWithin || std::ranges::all_of(cell_.watched(), has);
   }
-  // Where one more lies than before, though nothing should; nullptr: nowhere.
-  [[nodiscard]] const std::string* lies_beside() const {
+  // Where one more lies than before, though nothing should; empty: nowhere. Of what lies there the next picture may
+  // show nothing: the arm hides it.
+  [[nodiscard]] std::string lies_beside() const {
     for (const Cell::Watched& before : watched_) {
       const auto one = std::ranges::find(cell_.watched(), before.place, &Cell::Watched::place);
-      if (one->things > before.things) return &one->place;
+      if (one->things > before.things) return one->place;
     }
-    return nullptr;
+    return {};
   }
 
   // On the belt, where it is asked for again once it is seen.
@@ -430,6 +432,7 @@ class Place final : public ArmSkill {
   Cell::Search search_;
   world::Entry entry_;
   std::vector<Cell::Watched> watched_;  // when it fell
+  std::string beside_;                  // where one more has lain since
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
   Time counted_at_;

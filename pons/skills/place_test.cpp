@@ -59,6 +59,17 @@ TEST_F(LostOverItsChuteTest, WithOneThingMoreOnTheTrayItLiesThere) {
   EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
 }
 
+TEST_F(LostOverItsChuteTest, ThoughTheArmHidesItThereafter) {
+  while (now_ < fell_ + from_s(0.8)) {
+    pass();
+    if (now_ >= fell_ + from_s(0.7)) cell_.watch("tray", kThings + 1, fell_ + from_s(0.6));
+    ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  }
+  const Progress progress = ends(2.6, kThings);
+  EXPECT_EQ(progress.status, Status::kException) << progress.reason;
+  EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
+}
+
 TEST_F(LostOverItsChuteTest, ThoughThePictureComesLate) {
   const Progress progress = ends(3.0, kThings + 1);
   EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
