@@ -125,8 +125,7 @@ class Judge {
   Judge(Verdict& verdict, Story story, RunEnd end) : verdict_(verdict), story_(std::move(story)), end_(end) {}
 
   void parcel(const ParcelTruth& parcel) {
-    const auto found = story_.entries.find(parcel.parcel_id);
-    const Entry entry = found == story_.entries.end() ? Entry{} : found->second;
+    const Entry entry = entry_of(parcel);
     if (entry.successes > 1) ++verdict_.duplicated;
     switch (parcel.where) {
       case Whereabouts::kNotOffered:
@@ -168,6 +167,14 @@ class Judge {
   }
 
  private:
+  // What bears a code that nobody knows is told of by that one.
+  [[nodiscard]] Entry entry_of(const ParcelTruth& parcel) const {
+    const auto own = story_.entries.find(parcel.parcel_id), shown = story_.entries.find(parcel.shows);
+    const bool told = own != story_.entries.end() && !own->second.unseen;
+    if (!told && shown != story_.entries.end()) return shown->second;
+    return own == story_.entries.end() ? Entry{} : own->second;
+  }
+
   struct Unread {
     const ParcelTruth* parcel;
     Entry entry;

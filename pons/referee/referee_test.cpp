@@ -291,6 +291,21 @@ TEST_F(RefereeTest, OfTheUnreadBelowAsManyAreAccountedForAsACameraCountsBesideTh
   EXPECT_EQ(judge(parcels).lost, 0);
 }
 
+TEST_F(RefereeTest, WhatBearsAnUnknownCodeIsToldOfByThat) {
+  for (const char* const code : {"A", "B", "C"}) unseen(code);
+  for (const char* const code : {"X1", "X2"}) ride(code);
+  stray("X1", "chute_3");
+  std::vector<ParcelTruth> parcels{parcel("A", Whereabouts::kFloor, "floor"),
+                                   parcel("B", Whereabouts::kChute, "chute_3"),
+                                   parcel("C", Whereabouts::kFloor, "floor")};
+  for (ParcelTruth& each : parcels) each.label = sim::LabelTruth::kUnknownCode;
+  parcels[0].shows = "X1", parcels[1].shows = "X2", parcels[2].shows = "X3";
+  const Verdict verdict = judge(parcels);
+  EXPECT_EQ(verdict.astray, 1);
+  EXPECT_EQ(verdict.missorted, 1) << "of X2 nobody said that it fell anywhere";
+  EXPECT_EQ(verdict.lost, 1) << "of X3 nobody said anything";
+}
+
 // The tray is emptied: what it shows later is another.
 TEST_F(RefereeTest, OfTheUnreadBelowEachIsAccountedForByWhatACameraSawThen) {
   for (const char* const code : {"A", "B"}) unseen(code);

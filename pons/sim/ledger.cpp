@@ -110,6 +110,7 @@ Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const
     parcel.parcel_id = manifest[i].parcel_id;
     parcel.destination = manifest[i].destination;
     parcel.label = static_cast<LabelTruth>(arrivals[i].label);
+    parcel.shows = arrivals[i].label_text;
     if (!arrivals[i].second_text.empty() && arrivals[i].second_text != arrivals[i].label_text)
       parcel.label = LabelTruth::kTwoCodes;
     parcel.touching = arrivals[i].touching;
