@@ -252,7 +252,8 @@ class Course {
   }
   Guid any_guid() {
     Guid guid{};
-    std::ranges::transform(input_.take(guid.size()), guid.begin(), [](std::byte each) { return std::uint8_t(each); });
+    std::ranges::transform(input_.take(guid.size()), guid.begin(),
+                           [](std::byte each) { return std::to_integer<std::uint8_t>(each); });
     return guid;
   }
   FakeReader& reader() { return *wire_.readers.at(topics_[input_.byte() % topics_.size()]); }
@@ -276,10 +277,11 @@ class Course {
     FakeReader& to = reader();
     const std::size_t encapsulation = wire::kEncapsulation;
     const Bytes bytes = input_.sized();
-    std::vector<std::byte> answer(bytes.begin(), bytes.begin() + std::ptrdiff_t(std::min(encapsulation, bytes.size())));
+    std::vector<std::byte> answer(bytes.begin(),
+                                  bytes.begin() + static_cast<std::ptrdiff_t>(std::min(encapsulation, bytes.size())));
     if (wire_.asked && bytes.size() >= encapsulation) {
       answer.insert(answer.end(), wire_.asked->begin(), wire_.asked->end());
-      answer.insert(answer.end(), bytes.begin() + std::ptrdiff_t(encapsulation), bytes.end());
+      answer.insert(answer.end(), bytes.begin() + static_cast<std::ptrdiff_t>(encapsulation), bytes.end());
     }
     put(to, guid_of(kCyclone, 1, kWriterKind), {}, std::move(answer));
   }

@@ -35,9 +35,9 @@ class TreesOfTasks : public BridgeTest {
     skills_.add(aside_.type());
     std::filesystem::create_directory(folder_ / "trees");
     std::ofstream(folder_ / "trees/sort.xml") << kSort;
-    reopen();
+    reopen_with_trees();
   }
-  void reopen() {
+  void reopen_with_trees() {
     BridgeTest::reopen();
     tree::Library trees(skills_);
     const auto loaded = trees.load(folder_ / "trees");
@@ -55,7 +55,7 @@ class TreesOfTasks : public BridgeTest {
   }
   // The bridge dies, and another takes over.
   void recover(const Resume& resume) {
-    reopen();
+    reopen_with_trees();
     const auto recovered = bridge_->recover(resume, now_);
     ASSERT_TRUE(recovered) << recovered.error().line();
     EXPECT_THAT(audit(*journal_), testing::IsEmpty());
@@ -110,7 +110,7 @@ TEST_F(TreesOfTasks, WhatCannotRunIsRefusedWithALineThatHelps) {
   EXPECT_EQ(refusal({{"xml", many + "</Sequence></BehaviorTree></root>"}}),
             "/tree/xml: the tree has 2001 nodes, 2000 are taken; divide it, or give it to the world");
   world_.resources.clear();
-  reopen();
+  reopen_with_trees();
   EXPECT_THAT(refusal({{"name", "sort"}}), HasSubstr("needs 'arm', which this world does not have"));
   EXPECT_TRUE(journal_->tasks()->empty());
 }
@@ -135,7 +135,7 @@ TEST_F(TreesOfTasks, ABrokenFolderOfTreesIsRefusedWhole) {
 TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {
   Actor swift("swift", {{.ticks = 3}});
   skills_.add(swift.type());
-  reopen();
+  reopen_with_trees();
   ASSERT_TRUE(submit_sort("T1"));
   tick(2);
   ASSERT_TRUE(bridge_->submit(R"({"id":"U1","priority":99,"steps":[{"skill":"swift"}]})", now_));
@@ -150,7 +150,7 @@ TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {
 TEST_F(TreesOfTasks, WhatGoesRoundForEverTellsTheLastOfIt) {
   Actor swift("swift", {{.ticks = 1}});
   skills_.add(swift.type());
-  reopen();
+  reopen_with_trees();
   const std::string xml = R"(<root BTCPP_format="4"><BehaviorTree><Repeat num_cycles="100"><swift/></Repeat>
       </BehaviorTree></root>)";
   ASSERT_TRUE(submit_tree("T1", {{"xml", xml}}));
@@ -222,7 +222,7 @@ TEST_F(TreesOfTasks, AfterACrashItIsAskedWhatWasStartedNotWhatWouldBe) {
   scan.name = "scan";
   scan.resources = {};
   skills_.add(scan);
-  reopen();
+  reopen_with_trees();
   const std::string xml = R"(<root BTCPP_format="4"><BehaviorTree><Sequence>
       <Parallel success_count="1"><Sequence><slow object="{code}"/></Sequence>
         <Sequence><scan/><Script code="code := 'P2'"/><Sleep msec="200"/></Sequence></Parallel>

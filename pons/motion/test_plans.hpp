@@ -121,7 +121,7 @@ class SampledPlan {
   std::vector<AxisVector> corners{from};
   for (int side = 0; side < sides; ++side) {
     const AxisVector& along = side % 2 == 0 ? one : other;
-    corners.push_back(corners.back() + (side % 4 < 2 ? 1.0 : -1.0) * along);
+    corners.emplace_back(corners.back() + (side % 4 < 2 ? 1.0 : -1.0) * along);
   }
   return corners;
 }

@@ -13,6 +13,7 @@
 namespace pons::record::mcap {
 
 enum class Opcode : std::uint8_t {
+  kNone = 0x00,  // of no record
   kHeader = 0x01,
   kFooter = 0x02,
   kSchema = 0x03,

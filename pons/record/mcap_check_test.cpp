@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pons/record/mcap_records.hpp"
 #include "pons/record/test_recording.hpp"
 
 namespace pons::record {
@@ -59,6 +60,21 @@ TEST_F(CheckTest, WhatIsWrittenIsWhole) {
 
 TEST_F(CheckTest, AnyByteThatIsOtherThanItWasIsFound) {
   for (std::size_t at = 8; at < whole_.size(); ++at) EXPECT_FALSE(spoilt(at).whole()) << at;
+}
+
+// Fewer bytes than a record's prefix, where a chunk's records should go on.
+TEST_F(CheckTest, WhatIsNoWholeRecordInAChunkIsNamed) {
+  for (std::size_t stray = 1; stray < mcap::kPrefix; ++stray) {
+    mcap::Bytes bytes;
+    bytes.raw(mcap::kMagic);
+    write(bytes, mcap::Header{"", "a test"});
+    const std::size_t chunk_at = bytes.span().size();
+    write(bytes, mcap::ChunkHead{.uncompressed_size = stray, .compression = "", .records_size = stray});
+    for (std::size_t i = 0; i < stray; ++i) bytes.number(static_cast<std::uint8_t>(mcap::Opcode::kSchema));
+    const auto* const text = reinterpret_cast<const char*>(bytes.span().data());
+    EXPECT_THAT(first_line(check_text({text, bytes.span().size()})),
+                HasSubstr(fmt::format("byte {}: byte 0 of the chunk's records: there is no whole record", chunk_at)));
+  }
 }
 
 TEST_F(CheckTest, TheFirstWrongByteIsNamed) {

@@ -116,7 +116,7 @@ class Fields {
 [[nodiscard]] std::optional<std::size_t> read(std::span<const std::byte> content, ChunkHead& head);
 
 struct Prefix {
-  Opcode opcode = Opcode::kHeader;
+  Opcode opcode = Opcode::kNone;
   std::uint64_t length = 0;  // of what follows
 };
 [[nodiscard]] Prefix read_prefix(std::span<const std::byte, kPrefix> bytes);

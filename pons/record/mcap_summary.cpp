@@ -74,7 +74,7 @@ class SummaryReader {
     const std::uint64_t left = summary_.footer_at - at;
     if (left < kPrefix) damaged(at, "there is no whole record in the summary");
     const mcap::Prefix prefix = mcap::read_prefix(view(at, kPrefix).first<kPrefix>());
-    if (prefix.opcode == Opcode{} || prefix.length > left - kPrefix)
+    if (prefix.opcode == Opcode::kNone || prefix.length > left - kPrefix)
       damaged(at, "there is no whole record in the summary");
     if (prefix.length > limits_.record_bytes) damaged(at, "a record of the summary is too long");
     const std::uint64_t next = at + kPrefix + prefix.length;

@@ -61,7 +61,7 @@ class Walk {
     const auto bytes = window_.view(at_, kPrefix);
     if (!bytes) return std::unexpected(bytes.error());
     const mcap::Prefix prefix = mcap::read_prefix(bytes->first<kPrefix>());
-    if (prefix.opcode == Opcode{} || prefix.length > left - kPrefix) return find_again(prefix);
+    if (prefix.opcode == Opcode::kNone || prefix.length > left - kPrefix) return find_again(prefix);
     if (at_ == mcap::kMagic.size() && prefix.opcode != Opcode::kHeader) damaged(at_, "the first record is no Header");
     const std::uint64_t next = at_ + kPrefix + prefix.length;
     auto taken = take(prefix);
@@ -71,7 +71,7 @@ class Walk {
   }
 
   Expected<void> find_again(const mcap::Prefix& prefix) {
-    const std::string what = prefix.opcode == Opcode{}
+    const std::string what = prefix.opcode == Opcode::kNone
                                  ? "there is no record: its opcode is 0"
                                  : fmt::format("the {} record of {} bytes goes beyond the end of the file",
                                                name_of(prefix.opcode), prefix.length);
@@ -250,7 +250,7 @@ class Walk {
       const auto rest = records.subspan(at);
       mcap::Prefix prefix;
       if (rest.size() >= kPrefix) prefix = mcap::read_prefix(rest.first<kPrefix>());
-      const bool fits = prefix.opcode != Opcode{} && prefix.length <= rest.size() - kPrefix;
+      const bool fits = prefix.opcode != Opcode::kNone && prefix.length <= rest.size() - kPrefix;
       if (!fits || !take_inner(prefix.opcode, rest.subspan(kPrefix, prefix.length), at, place)) {
         damaged(place.offset, fmt::format("byte {} of the chunk's records: {}", at,
                                           fits ? malformed(prefix.opcode) : "there is no whole record"));

@@ -272,7 +272,7 @@ TEST_F(FoxgloveServer, AThousandConnectionsLeaveItAsItWas) {
   std::unique_ptr<Client> second;
   await([&] {
     second = std::make_unique<Client>(*server_);
-    return second->join() == "";
+    return second->join().empty();
   });
   await([&] { return server_->clients() == 2; });
   EXPECT_THAT(Client(*server_).join(), AllOf(HasSubstr("503"), HasSubstr("2 viewers are connected already")));
