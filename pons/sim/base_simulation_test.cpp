@@ -26,9 +26,9 @@ TEST(BaseWay, OfWhatIsLongAgoItKnowsWhereItStood) {
   constexpr std::int64_t kHour = 360'000, kDrives = 3000;  // places
   BaseWay way;
   const auto place = [&](std::int64_t i) {
-    const std::int64_t in_hour = std::min(i % kHour, kDrives);
+    const std::int64_t driven = i / kHour * kDrives + std::min(i % kHour, kDrives);
     const double tremble_m = 1e-6 * static_cast<double>(i % 3);
-    const double driven_m = 0.005 * static_cast<double>((i / kHour) * kDrives + in_hour);
+    const double driven_m = 0.005 * static_cast<double>(driven);
     return BasePlace{Time(i * kApart), {driven_m + tremble_m, 0, 0.3}};
   };
   constexpr std::int64_t kDay = 24 * kHour;
