@@ -231,7 +231,7 @@ class HeldSize : public PickTest, public ::testing::WithParamInterface<Vector3> 
 INSTANTIATE_TEST_SUITE_P(SmallAndLarge, HeldSize, ::testing::Values(Vector3(0.1, 0.1, 0.1), Vector3(0.40, 0.34, 0.18)));
 
 TEST_P(HeldSize, IsPutOnTheBeltFirst) {
-  const Vector3 size_m = GetParam();
+  const Vector3& size_m = GetParam();
   cell_.held = Held{"P9", {.size_m = size_m}, 1.0};
   tick_with({parcel(1, -0.6, 0, {0.2, 0.11, 0.11})});
   const auto skill = start("P1");

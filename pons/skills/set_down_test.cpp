@@ -13,7 +13,7 @@ namespace {
 class SetDownTest : public ObedientArmTest {
  protected:
   // Between the belt and the load's underside, when it is let go of.
-  double let_go_over_belt_m(double mass_kg, std::optional<Vector3> lifted_from_m = {}) {
+  double let_go_over_belt_m(double mass_kg, const std::optional<Vector3>& lifted_from_m = {}) {
     is_stopped_at({0.2, 0, 1.3});
     opened_ = false;
     cell_.held = held_;

@@ -13,7 +13,6 @@
 namespace pons::world {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class TwoArms : public ::testing::Test {

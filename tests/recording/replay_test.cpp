@@ -33,7 +33,6 @@ namespace fs = std::filesystem;
 namespace mcap = record::mcap;
 using record::McapReader;
 using ::testing::AllOf;
-using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 using wire::sensor_msgs::msg::JointState;

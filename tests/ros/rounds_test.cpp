@@ -39,7 +39,6 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using wire::geometry_msgs::msg::PoseStamped;
 using wire::nav2_msgs::action::NavigateToPose;
 using wire::nav_msgs::msg::OccupancyGrid;
