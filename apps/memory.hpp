@@ -20,7 +20,7 @@ class HeapTrimmer {
  public:
   static constexpr Duration kEvery = std::chrono::seconds(10);
 
-  // Once a minute of a run, gives the pages of all holes back: some milliseconds.
+  // So often, in a run's time, gives the pages of all holes back: that takes less than a millisecond.
   void tick(Time now);
 
  private:
