@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "pons/skills/grasp.hpp"
 #include "pons/skills/scale.hpp"
@@ -26,6 +27,7 @@ constexpr double kBeside_m = 0.01;       // from over its place, coming down wou
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
 constexpr Duration kOpensWithin = std::chrono::milliseconds(250);
 constexpr Duration kSpringsUp = std::chrono::milliseconds(60);  // the arm, rid of a heavy load: no collision
+constexpr double kComesFree_m = 0.02;                           // of what it was pressed on
 
 }  // namespace
 
@@ -88,7 +90,7 @@ Expected<void> SetDown::go_back(Time now) {
 
 void SetDown::begin_at(Time released_at) {
   released_at_ = released_at;
-  emptied_at_.reset();
+  free_at_.reset();
   (void)delay_.take();
 }
 
@@ -133,8 +135,8 @@ Vector3 SetDown::free_spot(Time time, double over_belt_m) const {
 }
 
 Expected<bool> SetDown::tick(Time now) {
-  if (emptied_at_) {
-    if (now < *emptied_at_ + kSpringsUp) return false;
+  if (free_at_) {
+    if (now < *free_at_ || comes_free(now)) return false;
     cell_.arm.expect_contact(0);
     return true;
   }
@@ -146,7 +148,8 @@ Expected<bool> SetDown::tick(Time now) {
   }
   if (now < released_at_) {
     if (weigh_now(cell_) > kPushedBack_kg) return false;
-    released_at_ = now;  // it stands already: its size was misjudged
+    released_at_ = now;  // it stands already: its size was misjudged, or on something
+    top_z_m_ = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
     if (auto stopped = cell_.arm.stop(now); !stopped) return std::unexpected(stopped.error());
   }
   cell_.arm.vacuum(false);
@@ -154,8 +157,22 @@ Expected<bool> SetDown::tick(Time now) {
   if (!cell_.arm.cups().open && now < released_at_ + kOpensWithin) return false;
   cell_.left_on_belt(cell_.model.world_from_tip(cell_.arm.state().position), top_z_m_);
   cell_.holds_nothing();
-  emptied_at_ = now;
+  free_at_ = now + kSpringsUp;
+  rises_ = false;
   return false;
+}
+
+// The stop that standing too early calls for leaves the arm pressed on what it let go of: taken for a collision as soon
+// as no contact is expected.
+bool SetDown::comes_free(Time now) {
+  if (weigh_now(cell_) > kPushedBack_kg || std::exchange(rises_, true)) return false;
+  const Time from = cell_.arm.splice_time(now);
+  const AxisState state = cell_.arm.planned(from);
+  const auto up = nudge(cell_, state, from, cell_.model.world_from_tip(state.position).linear(),
+                        kComesFree_m * Vector3::UnitZ(), Vector3::Zero(), cell_.limits_empty());
+  if (!up || !cell_.arm.stream(*up)) return false;
+  free_at_ = up->back().end();
+  return true;
 }
 
 }  // namespace pons::skills

@@ -25,7 +25,8 @@ class SetDown {
   // known: it may lie on another. Error: out of reach.
   [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation,
                                           std::optional<double> top_z_m = {});
-  // Once a period after that: true when the cups are empty. Error: the arm does not obey, or down is out of reach.
+  // Once a period after that: true when the cups are empty, and off what they pressed on. Error: the arm does not obey,
+  // or down is out of reach.
   [[nodiscard]] Expected<bool> tick(Time now);
 
  private:
@@ -33,6 +34,8 @@ class SetDown {
   // To over the place if it is not there yet, else down.
   [[nodiscard]] Expected<void> go_back(Time now);
   void begin_at(Time released_at);
+  // What it let go of pushes the arm back, and it rises off that now.
+  [[nodiscard]] bool comes_free(Time now);
   [[nodiscard]] bool heavy() const { return cell_.held->mass_kg > cell_.world.rules.max_mass_kg; }
   [[nodiscard]] Expected<motion::Trajectory> way_to_belt(Time now, double over_belt_m);
   [[nodiscard]] Vector3 free_spot(Time time, double over_belt_m) const;
@@ -49,7 +52,8 @@ class SetDown {
   std::optional<Back> back_;
   std::optional<double> top_z_m_;
   Time released_at_;
-  std::optional<Time> emptied_at_;
+  std::optional<Time> free_at_;  // the cups are empty; the arm no longer springs up, or rises, from then on
+  bool rises_ = false;
 };
 
 }  // namespace pons::skills

@@ -77,5 +77,53 @@ TEST_F(SetDownTest, WhatIsTooHeavyIsBroughtBackSoftly) {
   EXPECT_LT(hardest_m_s2(5.5), 1.0);
 }
 
+// A load that stands before it should, on another that came down with it, leaves the arm pressed on it.
+TEST_F(SetDownTest, WhatIsPressedOnTheLoadRisesOffItBeforeItIsDone) {
+  const auto rises_m = [&](double feels_kg) {
+    opened_ = false;
+    hangs_kg_ = 1;
+    is_stopped_at({0.2, 0, 1.3});
+    cell_.held = held_;
+    cell_.held->alone = true;
+    SetDown set_down(cell_);
+    for (int i = 0; i < 100 && !set_down.begin(now_); ++i) pass();
+    std::optional<double> let_go_m;
+    Expected<bool> done = false;
+    for (int i = 0; i < 1000 && done && !*done; ++i) {
+      pass();
+      done = set_down.tick(now_);
+      if (!cell_.held && !let_go_m) let_go_m = tip_now().z();
+      if (let_go_m) hangs_kg_ = tip_now().z() < *let_go_m + 0.01 ? feels_kg : 0.01;
+    }
+    EXPECT_TRUE(done && *done);
+    return tip_now().z() - let_go_m.value_or(9);
+  };
+  EXPECT_NEAR(rises_m(-9), 0.02, 0.002);
+  EXPECT_NEAR(rises_m(-0.5), 0, 0.002);
+}
+
+// On another that came down with it: the next try would drive the cups into it, were it believed to lie on the belt.
+TEST_F(SetDownTest, WhatStandsBeforeItShouldIsAsHighAsItWasLetGoOf) {
+  const double on_belt_m = world_.belt.surface_z_m + held_.load.size_m.z();
+  for (const double stands_m : {on_belt_m, on_belt_m + 0.06}) {
+    opened_ = false;
+    hangs_kg_ = 1;
+    is_stopped_at({0.2, 0, 1.3});
+    cell_.held = held_;
+    cell_.held->alone = false;
+    cell_.held->from_m = Vector3(0.2, 0, on_belt_m);
+    SetDown set_down(cell_);
+    ASSERT_TRUE(set_down.begin(now_));
+    Expected<bool> done = false;
+    for (int i = 0; i < 1000 && done && !*done; ++i) {
+      pass();
+      hangs_kg_ = tip_now().z() < stands_m ? -9 : 1;
+      done = set_down.tick(now_);
+    }
+    ASSERT_TRUE(done && *done);
+    EXPECT_NEAR(cell_.left().back().world_from_top.translation().z(), stands_m, 0.01);
+  }
+}
+
 }  // namespace
 }  // namespace pons::skills

@@ -71,7 +71,7 @@ class ObedientArmTest : public testing::Test {
   std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
   Duration late_{0};     // the motion is, behind the clock
-  double hangs_kg_ = 0;  // stiffly; 0: the wrist feels nothing, not even the tool
+  double hangs_kg_ = 0;  // stiffly; less than 0: it is pushed; 0: the wrist feels nothing, not even the tool
   Eigen::Vector2d wrist_nm_ = Eigen::Vector2d::Zero();
   Falls falls_{};  // into each of the world's places
   std::vector<ObjectBelief> seen_;
@@ -89,7 +89,7 @@ class ObedientArmTest : public testing::Test {
     state.belt_speed_m_s = belt_m_s_;
     state.late = late_;
     state.fallen_into = falls_;
-    if (hangs_kg_ > 0) Vector3::Map(state.wrist_force_n.data()) = pull_n(at.position);
+    if (hangs_kg_ != 0) Vector3::Map(state.wrist_force_n.data()) = pull_n(at.position);
     std::ranges::copy(wrist_nm_, state.wrist_torque_nm.begin());
     if (!opened_) {
       state.vacuum_on = 15;
