@@ -43,6 +43,7 @@ bool SetDown::goes_back(Time now) {
 
 Expected<void> SetDown::begin(Time now) {
   if (goes_back(now)) return {};
+  beside_others_ = false;
   back_.reset();
   top_z_m_.reset();
   if (heavy()) height_ = std::max(height_, kHeavyFrom);
@@ -63,6 +64,7 @@ Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::
                                    std::optional<double> top_z_m) {
   back_ = Back{tip_m, orientation};
   top_z_m_ = top_z_m;
+  beside_others_ = true;
   if (!heavy()) return go_back(now);
   if (auto stopped = cell_.stop(now); !stopped) return stopped;
   begin_at(cell_.arm.motion_end() + kSwingsOut);
@@ -148,8 +150,8 @@ Expected<bool> SetDown::tick(Time now) {
   }
   if (now < released_at_) {
     if (weigh_now(cell_) > kPushedBack_kg) return false;
-    released_at_ = now;  // it stands already: its size was misjudged, or on something
-    top_z_m_ = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
+    released_at_ = now;  // it stands already: its size was misjudged, or it stands on what came down with it
+    if (beside_others_) top_z_m_ = cell_.model.world_from_tip(cell_.arm.state().position).translation().z();
     if (auto stopped = cell_.arm.stop(now); !stopped) return std::unexpected(stopped.error());
   }
   cell_.arm.vacuum(false);

@@ -51,6 +51,7 @@ class SetDown {
   };
   std::optional<Back> back_;
   std::optional<double> top_z_m_;
+  bool beside_others_ = false;  // which may lie under it; elsewhere it would not stay on what it met
   Time released_at_;
   std::optional<Time> free_at_;  // the cups are empty; the arm no longer springs up, or rises, from then on
   bool rises_ = false;
