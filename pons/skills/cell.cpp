@@ -370,6 +370,8 @@ bool Cell::step_aside(Time now) {
 
 // Before the last arm the belt waits; by the others things ride.
 task::Chance Cell::chance(std::string_view code) const {
+  const auto holds_it = [&](const Cell* other) { return other->held && other->held->code == code; };
+  if (std::ranges::any_of(others_, holds_it)) return task::Chance::kGone;
   const ObjectBelief* const object = find(code);
   if (object == nullptr) return task::Chance::kNow;
   const double x_m = object->world_from_top.translation().x();

@@ -221,8 +221,8 @@ class Cell {
   void keep_clear(Time now);
 
   // Whether the arm could set out now to take that object off the belt. What is upstream of the pick zone of a belt
-  // that stands does not come: it may stand for something that this arm is to take first. Of what nobody sees nothing
-  // is known: it could.
+  // that stands does not come: it may stand for something that this arm is to take first. What another arm holds is
+  // that arm's. Of what nobody sees nothing is known: it could.
   [[nodiscard]] task::Chance chance(std::string_view code) const;
   // Whether it stands where another arm may come once nobody holds the resource of that zone any more; any such zone.
   [[nodiscard]] bool stands_in(std::string_view zone);

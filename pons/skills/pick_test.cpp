@@ -350,5 +350,20 @@ TEST_F(PickTest, WhatDoesNotComeIsLeftForWhatTheBeltWaitsFor) {
   EXPECT_EQ(cell_.chance("P2"), task::Chance::kNow);
 }
 
+// An arm that waits for the same would find that it is gone, and its task had failed.
+TEST_F(PickTest, WhatAnotherArmHoldsIsThatArms) {
+  const auto link = std::make_unique<link::Link>();
+  link::BridgeEnd end(*link);
+  Cell other(end, world_, model::RobotModel::load(world_.robot).value());
+  cell_.beside(other);
+  other.beside(cell_);
+  other.held = Held{"P1", {.size_m = {0.2, 0.15, 0.1}}, 0.5};
+  EXPECT_EQ(cell_.chance("P1"), task::Chance::kGone);
+  EXPECT_EQ(cell_.chance("P2"), task::Chance::kNow);
+  EXPECT_EQ(other.chance("P1"), task::Chance::kNow);
+  other.held.reset();
+  EXPECT_EQ(cell_.chance("P1"), task::Chance::kNow);
+}
+
 }  // namespace
 }  // namespace pons::skills
