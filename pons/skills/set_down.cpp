@@ -19,9 +19,10 @@ constexpr double kSpotStep_m = 0.02;
 constexpr double kRoom_m = 0.02;                              // to the next parcel is enough
 constexpr Duration kTakes = std::chrono::milliseconds(1200);  // a first guess
 constexpr int kRounds = 3;
-constexpr double kBack_m_s2 = 2.5;       // the less, the softer it is lowered
-constexpr double kHeavyBack_m_s2 = 0.8;  // sideways, where bellows let what is heavy swing like a pendulum,
-constexpr Duration kSwingsOut = std::chrono::milliseconds(350);  // before that, and after it
+constexpr double kBack_m_s2 = 2.5;  // the less, the softer it is lowered
+// Sideways, where bellows let what is heavy swing like a pendulum; and down on what may hang on it, and stand below.
+constexpr double kSoft_m_s2 = 0.8;
+constexpr Duration kSwingsOut = std::chrono::milliseconds(350);  // what is heavy, before and after
 constexpr double kNear_m = 0.4;          // of its place: from further away the straight way is not clear
 constexpr double kBeside_m = 0.01;       // from over its place, coming down would bring it against what stands there
 constexpr double kPushedBack_kg = -1.0;  // what the wrist feels when the load stands on something
@@ -78,15 +79,16 @@ Expected<void> SetDown::go_back(Time now) {
   Vector3 offset = back_->tip_m + cell_.belt_travel_m(from) * Vector3::UnitX() - tip;
   const bool aside = !back_->over && offset.head<2>().norm() > kBeside_m;
   if (aside) offset.z() = 0;
-  const bool softly = aside && heavy();
-  const auto way = lift(cell_, start, from, back_->orientation, offset, softly ? kHeavyBack_m_s2 : kBack_m_s2);
+  const bool swings = aside && heavy();
+  const bool may_stand = !aside && !cell_.held->alone;
+  const auto way = lift(cell_, start, from, back_->orientation, offset, swings || may_stand ? kSoft_m_s2 : kBack_m_s2);
   if (!way) return std::unexpected(way.error());
   if (auto sent = cell_.arm.stream(way->trajectory); !sent) return sent;
   if (aside)
     back_->over = true;
   else
     back_.reset();
-  begin_at(way->top + (softly ? kSwingsOut : Duration{0}));
+  begin_at(way->top + (swings ? kSwingsOut : Duration{0}));
   return {};
 }
 

@@ -125,5 +125,29 @@ TEST_F(SetDownTest, WhatStandsBeforeItShouldIsAsHighAsItWasLetGoOf) {
   }
 }
 
+// It may come to stand on what came along; at full speed it was pressed on that with up to 370 N.
+TEST_F(SetDownTest, WhatDoesNotHangAloneIsLoweredSoftly) {
+  const auto fastest_m_s = [&](bool alone) {
+    opened_ = false;
+    is_stopped_at({0.1, 0, 1.2});
+    cell_.held = held_;
+    cell_.held->alone = alone;
+    SetDown set_down(cell_);
+    EXPECT_TRUE(set_down.begin_back(now_, {0.1, 0, 1.0}, Cell::tip_down({}, 0).linear()));
+    double most_m_s = 0, last_m = tip_now().z();
+    for (int i = 0; i < 1000 && cell_.held; ++i) {
+      pass();
+      EXPECT_TRUE(set_down.tick(now_));
+      most_m_s = std::max(most_m_s, (last_m - tip_now().z()) / 0.01);
+      last_m = tip_now().z();
+    }
+    EXPECT_FALSE(cell_.held);
+    EXPECT_NEAR(last_m, 1.0, 0.002);
+    return most_m_s;
+  };
+  EXPECT_GT(fastest_m_s(true), 0.45);
+  EXPECT_LT(fastest_m_s(false), 0.40);
+}
+
 }  // namespace
 }  // namespace pons::skills
