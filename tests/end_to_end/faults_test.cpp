@@ -71,7 +71,7 @@ TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
 // In this one an unreadable one does, which no task asks for: it is not missorted only because the journal says where
 // an unread one went.
 TEST(Faults, WhatNobodyAsksForIsNamedWhereItFell) {
-  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 48);
+  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 65);
   EXPECT_NE(run.said.find("of which the journal says that an unread one did"), std::string::npos) << run.said;
 }
 
