@@ -140,6 +140,7 @@ Vector3 SetDown::free_spot(Time time, double over_belt_m) const {
 
 Expected<bool> SetDown::tick(Time now) {
   if (free_at_) {
+    *free_at_ += delay_.take();
     if (now < *free_at_ || comes_free(now)) return false;
     cell_.arm.expect_contact(0);
     return true;
