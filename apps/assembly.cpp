@@ -89,14 +89,14 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
                 fmt::format("the link has places for {}", link::kMaxCameras));
   }
   auto self = std::make_unique<BodyHalf>();
-  const cerebellum::Settings settings = settings_of(world);
+  self->settings = settings_of(world);
   const auto stations = world.arms();
   for (std::size_t i = 0; i < stations.size(); ++i) {
     auto model = model::RobotModel::load(stations[i].robot);
     if (!model) return std::unexpected(model.error());
-    if (auto good = cerebellum::check(*model, settings); !good) return std::unexpected(good.error());
+    if (auto good = cerebellum::check(*model, self->settings); !good) return std::unexpected(good.error());
     self->arms.push_back(std::make_unique<Arm>(stations.size() > 1 ? stations[i].arm : std::string(), *meeting.links[i],
-                                               std::move(*model), settings));
+                                               std::move(*model), self->settings));
   }
   auto simulation = sim::Simulation::create(world, manifest, setup.seed, setup.faults);
   if (!simulation) return std::unexpected(simulation.error());
@@ -112,10 +112,24 @@ Expected<std::unique_ptr<BodyHalf>> BodyHalf::build(const world::World& world, c
   return self;
 }
 
+cerebellum::Statistics BodyHalf::Arm::statistics() const {
+  cerebellum::Statistics all = before;
+  all.add(cerebellum->statistics());
+  return all;
+}
+
+void BodyHalf::replace_loops(Time now) {
+  for (const auto& arm : arms) {
+    arm->before = arm->statistics();
+    arm->cerebellum.emplace(arm->model.copy(), settings, now - runner::kControlPeriod);
+    arm->end.take_over();
+  }
+}
+
 runner::BodyParts BodyHalf::parts() {
   std::vector<runner::RobotParts> robots;
   for (std::size_t i = 0; i < arms.size(); ++i)
-    robots.push_back({arms[i]->name, &simulation->body(i), &arms[i]->cerebellum, &arms[i]->end});
+    robots.push_back({arms[i]->name, &simulation->body(i), &*arms[i]->cerebellum, &arms[i]->end});
   return {.plant = {.cameras = simulation->cameras(),
                     .advance = [this](Time now) { simulation->advance_to(now); },
                     .finished = [this] { return !stays && simulation->finished(); },
@@ -387,6 +401,13 @@ Expected<std::unique_ptr<Assembly>> Assembly::build(world::World world, const wo
         [cell = self.get()] { cell->kill_above(); },
         [cell = self.get()](Time now) { return cell->replace_above(now); });
   }
+  constexpr auto kLoopCrash = world::Fault::kLoopCrash;
+  const world::FaultRate& loop_crash = options.body.faults[kLoopCrash];
+  if (options.pace == runner::Pace::kLockstep && loop_crash.often > 0) {
+    self->loop_crashes_.emplace(
+        runner::Deaths(world::Spells(loop_crash, world::fault_stream(options.body.seed, kLoopCrash))),
+        [half = self->body.get()](Time now) { half->replace_loops(now); });
+  }
   if (auto built = self->build_above(BridgeOptions::Comes::kFirst); !built) return std::unexpected(built.error());
   return self;
 }
@@ -425,13 +446,15 @@ Expected<runner::Above> Assembly::replace_above(Time now) {
 void Assembly::count_injected(world::FaultCounts& counts) const {
   faults_.count(counts);
   if (crashes_) counts[world::Fault::kBridgeCrash] = crashes_->count();
+  if (loop_crashes_) counts[world::Fault::kLoopCrash] = loop_crashes_->deaths.count();
 }
 
 runner::Parts Assembly::parts() {
   return {.body = body->parts(),
           .bridge_side = above->bridge_side.get(),
           .observer = above->observer.get(),
-          .crashes = crashes_ ? &*crashes_ : nullptr};
+          .crashes = crashes_ ? &*crashes_ : nullptr,
+          .loop_crashes = loop_crashes_ ? &*loop_crashes_ : nullptr};
 }
 
 }  // namespace pons::apps

@@ -78,16 +78,24 @@ class BodyHalf {
 
   world::FaultPlan faults;
   bool stays = false;
+  cerebellum::Settings settings;
   runner::Helper helper;  // the cameras'
   std::unique_ptr<sim::Simulation> simulation;
   // What is one an arm, below the link.
   struct Arm {
-    Arm(std::string the_name, link::Link& link, model::RobotModel model, const cerebellum::Settings& settings)
-        : name(std::move(the_name)), end(link), cerebellum(std::move(model), settings, Time{}) {}
+    Arm(std::string the_name, link::Link& link, model::RobotModel the_model, const cerebellum::Settings& settings)
+        : name(std::move(the_name)), end(link), model(std::move(the_model)) {
+      cerebellum.emplace(model.copy(), settings, Time{});
+    }
     std::string name;  // empty where there is no other
     link::CerebellumEnd end;
-    cerebellum::Cerebellum cerebellum;
+    model::RobotModel model;
+    std::optional<cerebellum::Cerebellum> cerebellum;  // always there; another one, at the same address, after a crash
+    cerebellum::Statistics before;                     // of those before it
+    [[nodiscard]] cerebellum::Statistics statistics() const;  // of all together
   };
+  // Nothing of the loops that there were is left but their links. The first step of the new ones is the one at `now`.
+  void replace_loops(Time now);
   std::vector<std::unique_ptr<Arm>> arms;  // in the order of world.arms()
   std::unique_ptr<runner::Photographer> photographer;
 };
@@ -222,6 +230,7 @@ class Assembly {
   const AssemblyOptions options_;
   BrainFaults faults_;
   std::optional<runner::Crashes> crashes_;
+  std::optional<runner::LoopCrashes> loop_crashes_;
   runner::BridgeSide::Account account_;  // of the bridges that were killed
 };
 

@@ -61,7 +61,7 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   auto setup = body_setup(options.setup, options.parcels.seed, world);
   if (!setup) return bad_input(setup.error());
   setup->faults.leave_out(world::Strikes::kBrain);
-  setup->faults.leave_out(world::Strikes::kBridge);
+  setup->faults.leave_out(world::Strikes::kProcess);
   const std::string name = options.link.empty() ? default_link(world.name) : options.link;
   const auto identity = identity_of(world, manifest);
   if (!identity) return bad_input(identity.error());

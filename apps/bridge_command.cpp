@@ -184,7 +184,7 @@ int bridge(const BridgeCommandOptions& options) {
   auto plan = world::load_faults(*world, options.faults);
   if (!plan) return bad_input(plan.error());
   plan->leave_out(world::Strikes::kBody);
-  plan->leave_out(world::Strikes::kBridge);
+  plan->leave_out(world::Strikes::kProcess);
   // Before it waits: the files may have changed by then.
   const auto identity = identity_of(*world, *manifest);
   if (!identity) return bad_input(identity.error());

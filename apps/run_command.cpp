@@ -206,7 +206,7 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
   auto setup = body_setup(options.body, options.parcels.seed, world);
   if (!setup) return std::unexpected(setup.error());
   setup->stays = options.stay;
-  if (options.realtime) setup->faults.leave_out(world::Strikes::kBridge);
+  if (options.realtime) setup->faults.leave_out(world::Strikes::kProcess);
   return CellInputs{std::move(*manifest), std::move(*setup)};
 }
 

@@ -260,7 +260,7 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   for (const world::Fault fault : body.faults.left_out) report.faults_left_out.emplace_back(world::name(fault));
   report.limits = {.violations = static_cast<std::int64_t>(verdict->violations), .worst_ratio = verdict->worst_ratio};
   for (const auto& arm : body.arms) {
-    const cerebellum::Statistics& loop = arm->cerebellum.statistics();
+    const cerebellum::Statistics loop = arm->statistics();
     report.limits.violations += static_cast<std::int64_t>(loop.violations);
     report.limits.saturated += static_cast<std::int64_t>(loop.saturated);
     report.limits.worst_ratio = std::max({report.limits.worst_ratio, loop.commanded.speed, loop.commanded.acceleration,

@@ -99,6 +99,7 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
   const bool good = fresh && !leaps(sensors);
   if (fresh) heard_stamp_ = sensors.stamp;
   if (good) {
+    if (!seen_) hold_what_hangs(sensors);
     const AxisVector share = sensors.speed.cwiseAbs().cwiseQuotient(robot_limits().speed_rad_s);
     Eigen::Index fastest = 0;
     const double most = share.maxCoeff(&fastest);
@@ -146,6 +147,11 @@ bool Cerebellum::leaps(const body::Sensors& sensors) const {
   const Duration unheard = sensors.stamp - heard_stamp_, passed = sensors.stamp - measured_stamp_;
   return !body::follows({measured_position_, measured_speed_}, {sensors.position, sensors.speed},
                         std::min(passed, std::max(unheard, settings_.silence_timeout)));
+}
+
+void Cerebellum::hold_what_hangs(const body::Sensors& sensors) {
+  for (std::size_t cup = 0; cup < model_.robot().tool.cups_m.size(); ++cup)
+    if (holds(vacuum_settings_, sensors.cup_vacuum_kpa[cup])) vacuum_on_ |= 1U << cup;
 }
 
 void Cerebellum::feel(const body::Sensors& sensors, WristSense::Bias bias) {

@@ -66,6 +66,7 @@ struct Settings {
 class Cerebellum {
  public:
   // `start` is the time of the step before the first. The model's robot gives the limits. Both as check() wants them.
+  // Begins disarmed. What its first measurement finds on the cups, the cups go on holding: one before it had taken it.
   Cerebellum(model::RobotModel model, const Settings& settings, Time start);
   Cerebellum(const Cerebellum&) = delete;
   Cerebellum& operator=(const Cerebellum&) = delete;
@@ -112,6 +113,7 @@ class Cerebellum {
   void watch_loop(Time now);
   void take_measurement(Time now, const body::Sensors& sensors);
   [[nodiscard]] bool leaps(const body::Sensors& sensors) const;
+  void hold_what_hangs(const body::Sensors& sensors);
   void feel(const body::Sensors& sensors, WristSense::Bias bias);
   void watch(Time now, const link::CerebellumEnd& link);
   void watch_following(Time now);

@@ -21,6 +21,24 @@ bool follows(double change, double before, double after, double limit, double dt
 
 }  // namespace
 
+void Statistics::add(const Statistics& other) {
+  const auto most = [](double& mine, double theirs) { mine = std::max(mine, theirs); };
+  most(commanded.speed, other.commanded.speed);
+  most(commanded.acceleration, other.commanded.acceleration);
+  most(commanded.jerk, other.commanded.jerk);
+  most(commanded.torque, other.commanded.torque);
+  most(asked_torque, other.asked_torque);
+  most(measured_speed, other.measured_speed);
+  most(measured_acceleration, other.measured_acceleration);
+  most(following_error_rad, other.following_error_rad);
+  most(contact, other.contact);
+  violations += other.violations;
+  measured_overspeed += other.measured_overspeed;
+  saturated += other.saturated;
+  refused += other.refused;
+  stops += other.stops;
+}
+
 std::string_view name(Limit limit) {
   switch (limit) {
     case Limit::kPosition:

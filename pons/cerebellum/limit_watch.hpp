@@ -28,6 +28,9 @@ struct Statistics {
   std::uint64_t saturated = 0;           // ticks with a torque clamped
   std::uint64_t refused = 0;             // ticks in which a sample was refused before it was sent
   std::uint64_t stops = 0;               // of any kind
+
+  // Of another loop of the same run.
+  void add(const Statistics& other);
 };
 
 enum class Limit : std::uint8_t { kPosition, kSpeed, kAcceleration, kJerk, kContinuity, kStoppingDistance };

@@ -33,8 +33,7 @@ VacuumState next(const VacuumSettings& settings, const VacuumState& before, std:
       state.steady_since[cup] = now;
     }
     if (state.sealed[cup]) ++state.seen.sealed_cups;
-    // Written so that a value that is not a number does not count as open.
-    if (!(kpa < settings.open_share * settings.sealed_kpa)) state.seen.open = false;
+    if (holds(settings, kpa)) state.seen.open = false;
   }
   if (state.seen.sealed_cups > 0) state.held_at = now;
   state.seen.phase = next_phase(settings, state, before.seen.phase, vacuum_on, now);

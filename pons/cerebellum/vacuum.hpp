@@ -33,6 +33,11 @@ struct VacuumState {
   Time held_at;                               // when a cup was last sealed
 };
 
+// Whether a cup with that pressure may hold something. A value that is not a number may.
+[[nodiscard]] inline bool holds(const VacuumSettings& settings, double vacuum_kpa) PONS_NONBLOCKING {
+  return !(vacuum_kpa < settings.open_share * settings.sealed_kpa);
+}
+
 // The state at `now`, a tick after `before`.
 [[nodiscard]] VacuumState next(const VacuumSettings& settings, const VacuumState& before, std::uint32_t vacuum_on,
                                const std::array<double, kMaxCups>& vacuum_kpa, Time now) PONS_NONBLOCKING;

@@ -103,6 +103,25 @@ TEST(Vacuum, ALostLoadIsLoggedInItsTickAndPublished) {
   EXPECT_TRUE(told);
 }
 
+// A loop that follows one that was killed in the middle of a carry.
+TEST(Vacuum, WhatHangsThereWhenALoopBeginsGoesOnBeingHeld) {
+  Bench bench;
+  bench.plant.sensors.cup_vacuum_kpa = kTwo;
+  bench.tick();
+  EXPECT_EQ(bench.plant.set_points.vacuum_on, 3U) << "the two that hold, not those that draw air";
+  bench.plant.sensors.cup_vacuum_kpa = kHeld;
+  bench.run(20ms);
+  EXPECT_EQ(bench.plant.set_points.vacuum_on, 3U) << "only what it begins with";
+  EXPECT_EQ(bench.state().vacuum.phase, VacuumPhase::kSealed);
+  EXPECT_FALSE(bench.plant.set_points.power);
+  bench.arm();
+  bench.run(20ms);
+  EXPECT_EQ(bench.plant.set_points.vacuum_on, 3U);
+  bench.send(plain_command(link::CommandKind::kVacuum));
+  bench.run(5ms);
+  EXPECT_EQ(bench.plant.set_points.vacuum_on, 0U);
+}
+
 struct Lost {
   double error_rad = 0, speed_share = 0;  // the most, once it can be known
 };

@@ -62,6 +62,8 @@ class BridgeEnd {
 class CerebellumEnd {
  public:
   explicit CerebellumEnd(Link& link) : link_(link) {}
+  // Instead of a loop that is no more, before the first receive(): what was sent to that one is never taken in.
+  void take_over() PONS_NONBLOCKING { link_.commands_.drop_all(); }
 
   // False when there is none.
   [[nodiscard]] bool receive(Command& command) PONS_NONBLOCKING {

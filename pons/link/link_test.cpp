@@ -52,6 +52,21 @@ TEST(Link, ANewBridgesEndLeavesItsPredecessorsCommandsBehind) {
   EXPECT_EQ(command.sequence, 5000U);
 }
 
+TEST(Link, ALoopThatFollowsAnotherTakesInNothingThatWasSentToThatOne) {
+  const auto link = std::make_unique<Link>();
+  BridgeEnd bridge(*link);
+  Command command;
+  for (command.sequence = 0; command.sequence < 5; ++command.sequence) ASSERT_TRUE(bridge.send(command));
+  CerebellumEnd next(*link);
+  next.take_over();
+  EXPECT_FALSE(next.receive(command));
+  EXPECT_EQ(bridge.room(), Link::kCommands) << "and it takes no room";
+  command.sequence = 7;
+  ASSERT_TRUE(bridge.send(command));
+  ASSERT_TRUE(next.receive(command));
+  EXPECT_EQ(command.sequence, 7U);
+}
+
 TEST(Link, TheNewestStateComesUp) {
   const auto link = std::make_unique<Link>();
   BridgeEnd bridge(*link);

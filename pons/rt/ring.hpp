@@ -14,7 +14,8 @@ namespace pons::rt {
 // or pop touches the other side's cache line only when it must. T is copied; give it a copy that cannot throw.
 //
 // In shared memory a producer may be killed at any instant: half an element is never seen, and the next producer begins
-// with take_over(). A consumer that is killed in pop() leaves an element that its successor would get once more.
+// with take_over(). A consumer that is killed in pop() leaves an element that its successor would get once more; it
+// begins with drop_all() where that matters.
 template <typename T, std::size_t Capacity>
 class SpscRing {
   static_assert(Capacity > 0 && (Capacity & (Capacity - 1)) == 0, "a power of two");
@@ -58,6 +59,8 @@ class SpscRing {
     if (tail_seen_ < position) tail_seen_ = position;
     head_.store(position, std::memory_order_release);
   }
+  // Consumer only: nothing that was pushed so far is ever popped.
+  void drop_all() PONS_NONBLOCKING { drop_before(tail_.load(std::memory_order_acquire)); }
 
   // Producer only: how many elements push() is sure to take now.
   [[nodiscard]] std::size_t free() const PONS_NONBLOCKING {

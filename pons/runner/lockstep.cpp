@@ -7,21 +7,43 @@
 namespace pons::runner {
 namespace {
 
+// Whether there are control loops in this tick.
+bool loops_live(const Parts& parts, const Watch& watch, Time now) {
+  if (parts.loop_crashes == nullptr) return true;
+  const auto say = [&](std::string_view what) {
+    if (watch.said) watch.said(now, what);
+  };
+  switch (parts.loop_crashes->deaths.look(now)) {
+    case Deaths::Now::kLives:
+      return true;
+    case Deaths::Now::kDies:
+      say("the control loops are killed");
+      return false;
+    case Deaths::Now::kDead:
+      return false;
+    case Deaths::Now::kFollows:
+      break;
+  }
+  parts.loop_crashes->replace(now);
+  say("other control loops have begun");
+  return true;
+}
+
 // Whether there is a bridge in this period. Error: none follows the one that was killed.
 Expected<bool> bridge_lives(Parts& parts, Ending& ending, const Watch& watch, Time now) {
   if (parts.crashes == nullptr) return true;
   const auto look = parts.crashes->look(now);
   if (!look) return std::unexpected(look.error());
   switch (*look) {
-    case Crashes::Now::kLives:
+    case Deaths::Now::kLives:
       return true;
-    case Crashes::Now::kDies:
+    case Deaths::Now::kDies:
       parts.body.photographer->nobody_looks();
       if (watch.said) watch.said(now, "the bridge is killed");
       return false;
-    case Crashes::Now::kDead:
+    case Deaths::Now::kDead:
       return false;
-    case Crashes::Now::kFollows:
+    case Deaths::Now::kFollows:
       break;
   }
   parts.bridge_side = parts.crashes->follower().bridge_side;
@@ -46,13 +68,14 @@ Expected<RunResult> run_lockstep(Parts& parts, const Watch& watch) {
     parts.body.plant.advance(now);
     for (std::size_t i = 0; i < robots.size(); ++i) robots[i].body->read(sensors[i]);
     parts.body.photographer->open_shutters(now, sensors);
-    for (std::size_t i = 0; i < robots.size(); ++i) {
+    const bool loops = loops_live(parts, watch, now);
+    if (loops) ++result.loop.ticks;
+    for (std::size_t i = 0; i < robots.size() && loops; ++i) {
       const Time before = clock.now();
       robots[i].cerebellum->step(now, sensors[i], *robots[i].link, set_points[i]);
       step_time.record(clock.now() - before);
       robots[i].body->write(set_points[i]);
     }
-    ++result.loop.ticks;
 
     if (now.ns() % kBridgePeriod.count() != 0) continue;
     const auto lives = bridge_lives(parts, ending, watch, now);

@@ -95,9 +95,11 @@ Grip RobotVitals::vacuum(const link::State& state, Time now) {
 
 // By the count of its ticks: what it does in time crosses the link.
 void RobotVitals::loop(const link::State& state, Time now) {
-  if (!ticks_) {
+  const bool anew = ticks_ && state.tick < ticks_->count;
+  if (!ticks_ || anew) {
     ticks_ = Ticks{now, state.tick};
-    return health_.tell(loop_, Condition::kGood, "", now);
+    return health_.tell(loop_, anew ? Condition::kBad : Condition::kGood, anew ? "it ended, and another began" : "",
+                        now);
   }
   const Duration passed = now - ticks_->at;
   if (passed < kCountedOver) return;

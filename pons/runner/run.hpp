@@ -41,7 +41,9 @@ struct Parts {
   BodyParts body;
   BridgeSide* bridge_side = nullptr;
   Observer* observer = nullptr;
-  Crashes* crashes = nullptr;  // in lockstep only: these kill and replace the two above
+  // In lockstep only: these kill and replace the two above, those the robots' loops.
+  Crashes* crashes = nullptr;
+  LoopCrashes* loop_crashes = nullptr;
 };
 
 // How the run is broken off and watched. All are called in every bridge period, on the bridge's thread; may be empty.

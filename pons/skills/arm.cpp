@@ -10,6 +10,7 @@ constexpr Duration kSpliceStep = std::chrono::milliseconds(5);
 // Of an arm that is brought in from outside its limits: so slowly, so far inside, and at rest so long before it is
 // asked where it stands.
 constexpr double kRecoverySpeed = 0.05, kInside_rad = 0.02;
+constexpr Duration kSurelyOff = std::chrono::milliseconds(30);  // after the body's watchdog: some ticks of the bridge
 constexpr Duration kRecoveredRest = std::chrono::milliseconds(200);
 
 std::int64_t tick_of(Time time) { return time.ns() / std::chrono::nanoseconds(std::chrono::milliseconds(1)).count(); }
@@ -20,11 +21,13 @@ Arm::Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead)
     : link_(link),
       world_(world),
       splice_lead_(splice_lead + from_s(world.robot.drive_delay_s)),
+      unheard_(from_s(world.robot.watchdog_s) + kSurelyOff),
       rest_(at_rest(world.robot.home)) {}
 
 void Arm::refresh(Time now) {
   now_ = now;
   link_.latest(state_);
+  listen(now);
   if (state_.safety != safety_before_ || state_.controller != controlled_before_) {
     // After a stop the arm is where it came to rest, whatever was planned; after it gave way, where that brought it.
     asked_.clear();
@@ -43,6 +46,16 @@ void Arm::refresh(Time now) {
     asked_.erase(asked_.begin(), live);
   }
   send({.kind = link::CommandKind::kHeartbeat});
+}
+
+// One that counts from the beginning is another, and knows nothing of what hangs on the cups.
+void Arm::listen(Time now) {
+  if (state_.tick != heard_tick_) {
+    if (state_.tick < heard_tick_ && !state_.vacuum.open) tell_payload();
+    heard_tick_ = state_.tick;
+    heard_ = now;
+  }
+  if (heard_tick_ > 0 && now - heard_ >= unheard_) state_.safety = link::SafetyState::kDisarmed;
 }
 
 AxisState Arm::planned(Time time) const {
@@ -96,9 +109,15 @@ void Arm::vacuum(bool on) {
 }
 
 void Arm::payload(double mass_kg, const Vector3& com_in_flange_m) {
+  payload_kg_ = mass_kg;
+  payload_com_m_ = com_in_flange_m;
+  tell_payload();
+}
+
+void Arm::tell_payload() {
   send({.kind = link::CommandKind::kPayload,
-        .payload_kg = mass_kg,
-        .payload_com_m = {com_in_flange_m.x(), com_in_flange_m.y(), com_in_flange_m.z()}});
+        .payload_kg = payload_kg_,
+        .payload_com_m = {payload_com_m_.x(), payload_com_m_.y(), payload_com_m_.z()}});
 }
 
 void Arm::expect_contact(double force_n) {

@@ -30,9 +30,12 @@ class Arm {
   // late `splice_lead` must be longer than they do. The robot's drive delay is added: so far ahead the loop commands.
   Arm(link::BridgeEnd& link, const world::World& world, Duration splice_lead = kSpliceLead);
 
-  // Once a bridge tick, before any skill: takes in the newest state and shows the cerebellum that the bridge lives.
+  // Once a bridge tick, before any skill: takes in the newest state and shows the cerebellum that the bridge lives. A
+  // loop of which nothing new has come for unheard() counts as disarmed: the body's watchdog has taken the power off.
   void refresh(Time now);
 
+  // Without a new state for so long the loop is taken for dead: see refresh().
+  [[nodiscard]] Duration unheard() const { return unheard_; }
   [[nodiscard]] const link::State& state() const { return state_; }
   [[nodiscard]] bool operational() const { return state_.safety == link::SafetyState::kOperational; }
   // Stopped by what it met: a blow, or something that held it off its way.
@@ -87,10 +90,12 @@ class Arm {
 
  private:
   bool send(link::Command command);
+  void listen(Time now);
+  void tell_payload();
 
   link::BridgeEnd& link_;
   const world::World& world_;
-  Duration splice_lead_;
+  Duration splice_lead_, unheard_;
   link::State state_;
   motion::Trajectory asked_;  // in the motion's time
   std::vector<SentMotion> sent_;
@@ -98,7 +103,10 @@ class Arm {
   Time now_;        // of the last refresh
   AxisState rest_;  // in force when nothing was asked for since arming
   std::uint64_t sequence_ = 0;
-  double contact_n_ = 0;
+  double contact_n_ = 0, payload_kg_ = 0;
+  Vector3 payload_com_m_ = Vector3::Zero();  // flange frame
+  std::uint64_t heard_tick_ = 0;             // of the loop,
+  Time heard_;                               // and when
   link::Controller controlled_before_ = link::Controller::kTracking;
   link::SafetyState safety_before_ = link::SafetyState::kDisarmed;
 };

@@ -178,6 +178,47 @@ TEST_F(ArmTest, RecoversFromOutsideItsLimitsSlowlyAndArmsThen) {
   EXPECT_EQ(commands[0].kind, CommandKind::kReset);
 }
 
+TEST_F(ArmTest, ALoopThatSaysNothingNewCountsAsDisarmed) {
+  state_.tick = 10;
+  hear(Time(kTick), SafetyState::kOperational);
+  ASSERT_TRUE(arm_.stream(way(arm_.splice_time(Time(kTick)), 0.4)));
+  arm_.refresh(Time(kTick) + arm_.unheard() - kTick);
+  EXPECT_TRUE(arm_.operational()) << "a few periods are nothing";
+  arm_.refresh(Time(kTick) + arm_.unheard());
+  EXPECT_FALSE(arm_.operational());
+  EXPECT_EQ(arm_.state().safety, SafetyState::kDisarmed);
+  EXPECT_TRUE(arm_.planned(Time(from_s(0.2))).speed.isZero()) << "what it was sent moves nothing any more";
+  ++state_.tick;
+  hear(Time(from_s(1)), SafetyState::kOperational);
+  EXPECT_TRUE(arm_.operational()) << "it was only held up";
+}
+
+TEST_F(ArmTest, AnotherLoopIsToldOfTheLoad) {
+  const auto payloads = [&] {
+    std::vector<link::Command> told = received();
+    std::erase_if(told, [](const link::Command& command) { return command.kind != CommandKind::kPayload; });
+    return told;
+  };
+  state_.tick = 1000;
+  state_.vacuum.open = false;
+  hear(Time(kTick), SafetyState::kOperational);
+  arm_.payload(1.5, {0, 0, 0.1});
+  EXPECT_EQ(payloads().size(), 1U);
+  state_.tick = 1010;
+  hear(Time(2 * kTick), SafetyState::kOperational);
+  EXPECT_TRUE(payloads().empty());
+  state_.tick = 3;
+  hear(Time(3 * kTick), SafetyState::kDisarmed);
+  const auto told = payloads();
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].payload_kg, 1.5);
+  EXPECT_EQ(told[0].payload_com_m[2], 0.1);
+  state_.tick = 1;
+  state_.vacuum.open = true;
+  hear(Time(4 * kTick), SafetyState::kDisarmed);
+  EXPECT_TRUE(payloads().empty()) << "it hangs there no more";
+}
+
 TEST_F(ArmTest, AfterAStopItPlansFromWhereTheArmCameToRest) {
   hear(Time(kTick), SafetyState::kOperational);
   ASSERT_TRUE(arm_.stream(way(arm_.splice_time(Time(kTick)), 0.4)));

@@ -37,9 +37,10 @@ constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick, Strike
                                             {"shifted_view", Unit::kHour, Strikes::kBody},
                                             {"brain_stall", Unit::kHour, Strikes::kBrain},
                                             {"vacuum_weak", Unit::kHour, Strikes::kBody},
-                                            {"bridge_crash", Unit::kHour, Strikes::kBridge},
+                                            {"bridge_crash", Unit::kHour, Strikes::kProcess},
                                             {"brain_lie", Unit::kMoment, Strikes::kBrain},
-                                            {"network_loss", Unit::kHour, Strikes::kBrain}}};
+                                            {"network_loss", Unit::kHour, Strikes::kBrain},
+                                            {"loop_crash", Unit::kHour, Strikes::kProcess}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;
@@ -114,7 +115,7 @@ FaultPlan read_plan(const fs::path& file, const Plans& known) {
   const YamlMap map(value, {},
                     {"base", "times", kKinds[0].name, kKinds[1].name, kKinds[2].name, kKinds[3].name, kKinds[4].name,
                      kKinds[5].name, kKinds[6].name, kKinds[7].name, kKinds[8].name, kKinds[9].name, kKinds[10].name,
-                     kKinds[11].name, kKinds[12].name, kKinds[13].name});
+                     kKinds[11].name, kKinds[12].name, kKinds[13].name, kKinds[14].name});
   FaultPlan plan;
   if (map.has("base")) plan = read_base(map, file, known);
   if (map.has("times")) {

@@ -33,16 +33,17 @@ enum class Fault : std::uint8_t {
   kBridgeCrash,  // an hour: the bridge is killed; lasts until the next one is there
   kBrainLie,     // an hour, a moment each: the brain asks for something wrong beside its work
   kNetworkLoss,  // an hour: between brain and bridge messages are lost, late, and come twice
+  kLoopCrash,    // an hour: the control loops are killed; lasts until new ones are there
 };
-inline constexpr std::size_t kFaults = 14;
+inline constexpr std::size_t kFaults = 15;
 // As the file and the report have it: "missed_grasp".
 [[nodiscard]] std::string_view name(Fault fault);
 
 // Where a fault strikes, and so which process can inject it.
 enum class Strikes : std::uint8_t {
-  kBody,    // the body, its cameras, its belt
-  kBrain,   // the brain, or between it and the bridge
-  kBridge,  // the whole bridge: in virtual time only; by the clock it is a process that can be killed
+  kBody,     // the body, its cameras, its belt
+  kBrain,    // the brain, or between it and the bridge
+  kProcess,  // one of the two halves as a whole: in virtual time only; by the clock it is a process to be killed
 };
 [[nodiscard]] Strikes strikes(Fault fault);
 

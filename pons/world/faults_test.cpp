@@ -44,7 +44,8 @@ TEST_F(FaultsTest, StormIsTenTimesRobin) {
   ASSERT_TRUE(storm) << storm.error().line();
   EXPECT_EQ(storm->name, "storm");
   for (std::size_t i = 0; i < kFaults; ++i) {
-    if (static_cast<Fault>(i) == Fault::kVacuumWeak) continue;  // an ordinary day has none
+    // An ordinary day has neither.
+    if (static_cast<Fault>(i) == Fault::kVacuumWeak || static_cast<Fault>(i) == Fault::kLoopCrash) continue;
     EXPECT_GT(robin->rates[i].often, 0) << name(static_cast<Fault>(i));
     EXPECT_DOUBLE_EQ(storm->rates[i].often, 10 * robin->rates[i].often);
     EXPECT_DOUBLE_EQ(storm->rates[i].longest_s, robin->rates[i].longest_s);
@@ -66,16 +67,18 @@ TEST_F(FaultsTest, AWeakPumpHasAShare) {
 }
 
 TEST_F(FaultsTest, ALieIsAMomentAndACrashLasts) {
-  const auto plan =
-      load_faults(world_, folder_
-                              .write("far.yaml",
-                                     "brain_lie: {an_hour: 60}\nbridge_crash: {an_hour: 2, lasts_s: [1, 5]}\n"
-                                     "network_loss: {an_hour: 3, lasts_s: [2, 4]}\n")
-                              .string());
+  const auto plan = load_faults(
+      world_, folder_
+                  .write("far.yaml",
+                         "brain_lie: {an_hour: 60}\nbridge_crash: {an_hour: 2, lasts_s: [1, 5]}\n"
+                         "network_loss: {an_hour: 3, lasts_s: [2, 4]}\nloop_crash: {an_hour: 1, lasts_s: [1, 3]}\n")
+                  .string());
   ASSERT_TRUE(plan) << plan.error().line();
   EXPECT_DOUBLE_EQ((*plan)[Fault::kBrainLie].often, 60);
   EXPECT_DOUBLE_EQ((*plan)[Fault::kBridgeCrash].longest_s, 5);
   EXPECT_DOUBLE_EQ((*plan)[Fault::kNetworkLoss].shortest_s, 2);
+  EXPECT_DOUBLE_EQ((*plan)[Fault::kLoopCrash].longest_s, 3);
+  EXPECT_EQ(strikes(Fault::kLoopCrash), Strikes::kProcess);
   expect_says(refusal("brain_lie: {an_hour: 6, lasts_s: [5, 9]}\n"), {"brain_lie", "lasts_s"});
   expect_says(refusal("brain_lie: {an_hour: 4000}\n"), {"brain_lie.an_hour", "0 to 3600"});
   expect_says(refusal("bridge_crash: {an_hour: 2}\n"), {"bridge_crash", "lasts_s", "missing"});

@@ -125,6 +125,17 @@ TEST(Faults, ABridgeThatIsKilledCostsTimeOnly) {
   EXPECT_GE(run.report["parcels"]["sorted"], 24) << run.said;
 }
 
+// The body's watchdog takes the power off, the cups hold on; each next loop begins from nothing and is armed anew.
+TEST(Faults, ControlLoopsThatAreKilledCostTimeOnly) {
+  const Faulty run = run_with("loop_crash: {an_hour: 240, lasts_s: [0.3, 3]}\n", 30, 1);
+  EXPECT_GE(run.injected("loop_crash"), 6);
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_EQ(run.report["parcels"]["damaged"], 0) << run.said;
+  EXPECT_LE(run.report["parcels"]["exceptions"]["undeserved"], 2) << run.said;
+  EXPECT_NE(run.said.find("loop "), std::string::npos) << run.said;
+}
+
 // Beside its work it asks for what is wrong in some twenty ways: what is refused is refused by name, and what is not
 // costs time.
 TEST(Faults, ABrainThatLiesChangesNothingOfWhatIsSorted) {
@@ -168,13 +179,16 @@ TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {
 // By the clock a bridge that crashes is a process that somebody kills.
 TEST(Faults, WhatNeverComesByTheClockIsNamedAtOnceAndInTheReport) {
   const Folder folder;
-  write_text(folder / "plan.yaml", "bridge_crash: {an_hour: 3600, lasts_s: [1, 2]}\nmissed_grasp: {a_pick: 0}\n");
+  write_text(folder / "plan.yaml",
+             "bridge_crash: {an_hour: 3600, lasts_s: [1, 2]}\nmissed_grasp: {a_pick: 0}\n"
+             "loop_crash: {an_hour: 3600, lasts_s: [1, 2]}\n");
   const Finished run =
       run_pons({"run", "parcel_cell", "--realtime", "--parcels", "1", "--seed", "1", "--quiet", "--faults",
                 folder / "plan.yaml", "--socket", folder / "s", "--report", folder / "report.json"});
-  EXPECT_NE(run.err.find("pons: faults of plan that never come here: bridge_crash; "), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("pons: faults of plan that never come here: bridge_crash, loop_crash; "), std::string::npos)
+      << run.err;
   const json report = read_json(folder / "report.json");
-  EXPECT_EQ(report["faults_left_out"], json::array({"bridge_crash"}));
+  EXPECT_EQ(report["faults_left_out"], json::array({"bridge_crash", "loop_crash"}));
   EXPECT_TRUE(report["faults"].empty()) << "it was not injected no times: it could not be";
 }
 

@@ -268,8 +268,9 @@ TEST_F(Replay, WhatIsAnotherIsFoundAndNamed) {
 }
 
 // With all that options say of a run, a file's plan and a file's orders among it, which need not be there any more.
-TEST_F(Replay, ABridgeThatIsKilledIsKilledAgain) {
-  write_text(folder_ / "plan.yaml", "bridge_crash: {an_hour: 900, lasts_s: [0.3, 1]}\n");
+TEST_F(Replay, WhatIsKilledIsKilledAgain) {
+  write_text(folder_ / "plan.yaml",
+             "bridge_crash: {an_hour: 900, lasts_s: [0.3, 1]}\nloop_crash: {an_hour: 400, lasts_s: [0.3, 1]}\n");
   fs::copy_file("tests/end_to_end/any_size.csv", folder_ / "orders.csv");
   const Words options{"--faults",  file("plan.yaml"), "--visit",    "aisle@3+2",        "--seed",   "3",
                       "--journal", file("j.db"),      "--manifest", file("orders.csv"), "--report", file("r.json")};
@@ -278,6 +279,7 @@ TEST_F(Replay, ABridgeThatIsKilledIsKilledAgain) {
   const Finished run = run_pons(words);
   ASSERT_EQ(run.code, 0) << run.err << run.out;
   EXPECT_GE(read_json(folder_ / "r.json")["faults"]["bridge_crash"], 2);
+  EXPECT_GE(read_json(folder_ / "r.json")["faults"]["loop_crash"], 1);
   EXPECT_GE(counts_of(folder_ / "a.mcap").at("/robot_description"), 3U) << "each bridge says it anew";
   fs::remove(folder_ / "plan.yaml");
   fs::remove(folder_ / "orders.csv");

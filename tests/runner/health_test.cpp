@@ -231,6 +231,12 @@ TEST_F(VitalsTest, ALoopIsHeldAgainstItsTicks) {
   EXPECT_EQ(fares("loop"), "poor: 5.0 % of its ticks missed");
   robot_.loop(state_, ms(3000));
   EXPECT_EQ(fares("loop"), "bad: 100.0 % of its ticks missed");
+  state_.tick += 1000;
+  for (int i = 4; i <= 6; ++i, state_.tick += 1000) robot_.loop(state_, ms(1000 * i));
+  EXPECT_EQ(fares("loop"), "good");
+  state_.tick = 7;
+  robot_.loop(state_, ms(6100));
+  EXPECT_EQ(fares("loop"), "bad: it ended, and another began");
 }
 
 TEST_F(VitalsTest, ABridgeIsPoorWhenItIsLateOrHasMuchToDo) {
