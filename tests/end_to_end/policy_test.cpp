@@ -43,7 +43,7 @@ class PolicyRun {
       parts.body.plant.advance(now);
       parts.body.robots.front().body->read(sensors);
       parts.body.photographer->open_shutters(now, {&sensors, 1});
-      cell->body->arms.front()->cerebellum.step(now, sensors, *parts.body.robots.front().link, set_points);
+      cell->body->arms.front()->cerebellum->step(now, sensors, *parts.body.robots.front().link, set_points);
       parts.body.robots.front().body->write(set_points);
       if (now.ns() % runner::kBridgePeriod.count() != 0) continue;
       if (first) first(now);
@@ -65,8 +65,8 @@ class PolicyRun {
 
   [[nodiscard]] std::int64_t told(const char* name) const { return detail.at(name).get<std::int64_t>(); }
   void expect_no_limit_broken() const {
-    EXPECT_EQ(cell->body->arms.front()->cerebellum.statistics().violations, 0u);
-    EXPECT_EQ(cell->body->arms.front()->cerebellum.statistics().refused, 0u);
+    EXPECT_EQ(cell->body->arms.front()->cerebellum->statistics().violations, 0u);
+    EXPECT_EQ(cell->body->arms.front()->cerebellum->statistics().refused, 0u);
   }
 
   [[nodiscard]] task::ChunkStream* stream() const { return cell->above->cell().stream; }
@@ -89,7 +89,7 @@ class PolicyRun {
     const auto top = sim::Truth(*cell->body->simulation).top(0);
     if (!top || top->translation().x() < 0 || top->translation().x() > world.belt.pick_x_max_m - 0.05) return;
     const Vector3 tip =
-        cell->above->cell().model.world_from_tip(cell->body->arms.front()->cerebellum.state().position).translation();
+        cell->above->cell().model.world_from_tip(cell->body->arms.front()->cerebellum->state().position).translation();
     ++over_it;
     worst_off_m = std::max(worst_off_m, (tip - top->translation()).head<2>().norm());
     worst_height_m = std::max(worst_height_m, std::abs(tip.z() - top->translation().z() - 0.20));
@@ -123,7 +123,7 @@ TEST_P(PolicyAtPace, KeepsTheToolOverAParcelThatRidesBy) {
   EXPECT_GE(run.over_it, 150);
   EXPECT_LT(run.worst_off_m, 0.015);
   EXPECT_LT(run.worst_height_m, 0.01);
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 0u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 0u);
   run.expect_no_limit_broken();
 }
 INSTANTIATE_TEST_SUITE_P(Paces, PolicyAtPace,
@@ -153,7 +153,7 @@ TEST(Policy, StarvesWhereItIsTooLateAndGoesOnWhenMoreComes) {
     EXPECT_GE(run.told("starved_ticks"), least);
     EXPECT_LE(run.told("starved_ticks"), most);
     EXPECT_GE(run.told("executed"), 100);
-    EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 0u);
+    EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 0u);
     run.expect_no_limit_broken();
   }
 }
@@ -196,7 +196,7 @@ TEST(Policy, ThatIsOutsideSendsItsChunksAndItsLast) {
   EXPECT_EQ(run.told("starved_ticks"), 0);
   EXPECT_LT(run.now, Time(from_s(5)));
   const AxisVector end = run.world.robot.home.array() + 0.1;
-  EXPECT_TRUE(run.cell->body->arms.front()->cerebellum.state().commanded.position.isApprox(end, 1e-9));
+  EXPECT_TRUE(run.cell->body->arms.front()->cerebellum->state().commanded.position.isApprox(end, 1e-9));
   run.expect_no_limit_broken();
 }
 
@@ -218,7 +218,7 @@ TEST(Policy, WhoseLastChunkIsTooRoughToBeQueuedWholeIsNotSaidToHaveSucceeded) {
   EXPECT_EQ(run.outcome, task::Outcome::kFailed);
   EXPECT_EQ(run.reason, "the limits make the last chunk too slow to be queued whole");
   EXPECT_GE(run.told("executed"), 3);
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 0u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 0u);
   run.expect_no_limit_broken();
 }
 
@@ -247,7 +247,7 @@ TEST(Policy, WhoseChunksAreRefusedDoesNotMoveTheArm) {
   EXPECT_EQ(run.outcome, task::Outcome::kFailed);
   EXPECT_EQ(run.reason, "no chunk came for 10 s");
   EXPECT_EQ(run.told("refused"), 4);
-  EXPECT_LT(run.cell->body->arms.front()->cerebellum.statistics().commanded.speed, 1e-12);
+  EXPECT_LT(run.cell->body->arms.front()->cerebellum->statistics().commanded.speed, 1e-12);
   run.expect_no_limit_broken();
 }
 
@@ -260,7 +260,7 @@ TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
     task::ChunkStream* const stream = run.cell->above->cell().stream;
     if (stream == nullptr || now < Time(from_s(1))) return;
     const double executed = stream->observe(now).executed;
-    const double at = run.cell->body->arms.front()->cerebellum.state().commanded.position[0] - run.world.robot.home[0];
+    const double at = run.cell->body->arms.front()->cerebellum->state().commanded.position[0] - run.world.robot.home[0];
     off = std::max(off, std::abs(at - sway(executed)));
     if (now.ns() % std::chrono::nanoseconds(std::chrono::milliseconds(200)).count() != 0) return;
     const auto taken = stream->take(swaying(run, executed, 20), now);
@@ -272,7 +272,7 @@ TEST(Policy, SlowedByAZoneKeepsItsPlaceInTheStream) {
   EXPECT_GT(run.told("executed"), 120);
   EXPECT_EQ(run.told("starved_ticks"), 0);
   EXPECT_LT(off, 0.01);
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 0u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 0u);
   run.expect_no_limit_broken();
 }
 
@@ -292,7 +292,7 @@ TEST(Policy, GoesOnAfterAStopButNotWithWhatItSawBefore) {
   });
   EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
   EXPECT_EQ(stale, "chunk_stale");
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 1u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 1u);
   EXPECT_GE(run.told("executed"), 200);
   EXPECT_GE(run.over_it, 20);
   EXPECT_LT(run.worst_height_m, 0.2);
@@ -331,7 +331,7 @@ TEST(Policy, StoppedWhileItIsLateCountsOnlyWhatItDid) {
   });
   std::printf("stopped %.2f s late after %.2f actions, goes on at %.2f\n", to_s(late), did, on);
   EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 1u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 1u);
   EXPECT_GT(late, from_s(0.3));
   EXPECT_LT(leap, 1e-9);
   // Above what was observed before, and the action under way is not said to have been executed.
@@ -348,7 +348,7 @@ TEST(Policy, StoppedWhileItsLastChunkIsLateHasNotSucceeded) {
   bool sent = false;
   run.follow({{"policy", "outside"}, {"seconds", 40}}, [&](Time now) {
     if (run.stream() == nullptr || now < Time(from_s(1))) return;
-    if (run.arm().operational() && run.cell->body->arms.front()->cerebellum.statistics().stops == 0) {
+    if (run.arm().operational() && run.cell->body->arms.front()->cerebellum->statistics().stops == 0) {
       did = run.stream()->observe(now).executed;
       late = run.arm().late();
     }
@@ -360,7 +360,7 @@ TEST(Policy, StoppedWhileItsLastChunkIsLateHasNotSucceeded) {
     sent = true;
   });
   std::printf("stopped %.2f s late after %.2f of 80 actions: %s\n", to_s(late), did, run.detail.dump().c_str());
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 1u);
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 1u);
   EXPECT_LT(did, 79);
   EXPECT_GT(did + to_s(late) / 0.05, 80);  // at the clock's time all would seem to have been executed
   EXPECT_EQ(run.outcome, task::Outcome::kFailed);
@@ -378,7 +378,7 @@ TEST(Policy, StoppedInItsLastChunkSendsTheRest) {
     run.follow({{"policy", "outside"}, {"seconds", 40}}, [&](Time now) {
       if (run.stream() == nullptr || now < Time(from_s(1)) || !run.arm().operational()) return;
       const double executed = run.stream()->observe(now).executed;
-      const bool stopped = run.cell->body->arms.front()->cerebellum.statistics().stops > 0;
+      const bool stopped = run.cell->body->arms.front()->cerebellum->statistics().stops > 0;
       if (sent == 1 && !stopped) {
         did = executed;
         if (executed >= stop_at) run.arm().halt();
@@ -394,14 +394,14 @@ TEST(Policy, StoppedInItsLastChunkSendsTheRest) {
       }
     });
     std::printf("stopped after %.2f of 20 actions, goes on at %.2f: %s\n", did, on, run.detail.dump().c_str());
-    EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 1u);
+    EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 1u);
     EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
     EXPECT_GT(on, did);
     EXPECT_LT(on, std::floor(did) + 1);
     EXPECT_EQ(run.told("executed"), 20);
     EXPECT_EQ(run.told("chunks"), 2);
     const AxisVector end = run.world.robot.home.array() + 0.1;
-    EXPECT_TRUE(run.cell->body->arms.front()->cerebellum.state().commanded.position.isApprox(end, 1e-9));
+    EXPECT_TRUE(run.cell->body->arms.front()->cerebellum->state().commanded.position.isApprox(end, 1e-9));
     run.expect_no_limit_broken();
   }
 }
@@ -417,7 +417,7 @@ TEST(Policy, StoppedInItsLastChunkAndSilentFailsForThat) {
       follows = run.arm().operational() ? follows + 1 : 0;
       if (follows == 0) return;
       const double executed = run.stream()->observe(now).executed;
-      const auto stops = static_cast<int>(run.cell->body->arms.front()->cerebellum.statistics().stops);
+      const auto stops = static_cast<int>(run.cell->body->arms.front()->cerebellum->statistics().stops);
       if (stops == 0) did = executed;
       if (sent == 0 || (sent == 1 && executed >= 2.5)) {
         Chunk chunk = chunk_of(run, executed, 20 - 2 * static_cast<std::size_t>(sent), 0.1);
@@ -439,7 +439,7 @@ TEST(Policy, StoppedInItsLastChunkAndSilentFailsForThat) {
       }
     });
     std::printf("stopped after %.3f of %.3f actions, and at %.3f again\n", did, total, on);
-    EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 3u);
+    EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 3u);
     EXPECT_LT(on, std::min(total, std::floor(did) + 1));
     EXPECT_EQ(run.outcome, task::Outcome::kFailed);
     EXPECT_EQ(run.reason, "no chunk came for 10 s");
@@ -469,7 +469,7 @@ TEST(Policy, StoppedAtTheVeryEndOfItsLastChunkHasSucceeded) {
     });
     EXPECT_EQ(run.outcome, task::Outcome::kSucceeded) << run.reason;
     EXPECT_EQ(run.told("executed"), count);
-    EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, static_cast<std::uint64_t>(ended));
+    EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, static_cast<std::uint64_t>(ended));
   }
   EXPECT_EQ(ended, 1);
 }
@@ -481,8 +481,8 @@ TEST(Policy, CancelledComesToRestAlongItsWay) {
   });
   EXPECT_EQ(run.outcome, task::Outcome::kCancelled) << run.reason;
   EXPECT_LT(run.now, Time(from_s(12.5)));
-  EXPECT_TRUE(run.cell->body->arms.front()->cerebellum.state().commanded.speed.isZero(1e-9));
-  EXPECT_EQ(run.cell->body->arms.front()->cerebellum.statistics().stops, 0u);
+  EXPECT_TRUE(run.cell->body->arms.front()->cerebellum->state().commanded.speed.isZero(1e-9));
+  EXPECT_EQ(run.cell->body->arms.front()->cerebellum->statistics().stops, 0u);
   run.expect_no_limit_broken();
 }
 

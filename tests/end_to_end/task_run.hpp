@@ -31,7 +31,7 @@ class TaskRun {
 
   [[nodiscard]] Time now() const { return now_; }
   [[nodiscard]] sim::Simulation& simulation() { return *cell_->body->simulation; }
-  [[nodiscard]] const cerebellum::Cerebellum& cerebellum() const { return cell_->body->arms.front()->cerebellum; }
+  [[nodiscard]] const cerebellum::Cerebellum& cerebellum() const { return *cell_->body->arms.front()->cerebellum; }
   [[nodiscard]] const world::World& world() const { return world_; }
   [[nodiscard]] bridge::Bridge& bridge() { return *cell_->above->bridge; }
   [[nodiscard]] const bridge::Journal& journal() const { return *cell_->above->journal; }
