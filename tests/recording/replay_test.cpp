@@ -270,7 +270,7 @@ TEST_F(Replay, WhatIsAnotherIsFoundAndNamed) {
 // With all that options say of a run, a file's plan and a file's orders among it, which need not be there any more.
 TEST_F(Replay, WhatIsKilledIsKilledAgain) {
   write_text(folder_ / "plan.yaml",
-             "bridge_crash: {an_hour: 900, lasts_s: [0.3, 1]}\nloop_crash: {an_hour: 400, lasts_s: [0.3, 1]}\n");
+             "bridge_crash: {an_hour: 900, lasts_s: [0.3, 1]}\nloop_crash: {an_hour: 150, lasts_s: [0.3, 1]}\n");
   fs::copy_file("tests/end_to_end/any_size.csv", folder_ / "orders.csv");
   const Words options{"--faults",  file("plan.yaml"), "--visit",    "aisle@3+2",        "--seed",   "3",
                       "--journal", file("j.db"),      "--manifest", file("orders.csv"), "--report", file("r.json")};
