@@ -50,7 +50,7 @@ struct SimArm final : body::Body {
   Vector3 push_n = Vector3::Zero();  // of a person on the tip
   Time heard;                        // when set-points last reached the drives
   bool watchdog_tripped = false;     // until set-points without power are heard
-  AxisVector held;                   // where the brakes hold the arm; empty while it moves
+  AxisVector held;                   // where the brakes hold the arm; empty with power
 
  private:
   std::vector<double> brake_acceleration_, brake_torque_;  // scratch, one a degree of freedom

@@ -17,7 +17,6 @@ constexpr std::uint64_t kNoiseStream = 0x6e6f6973;
 constexpr double kForceNoise_n = 0.15, kTorqueNoise_nm = 0.01, kVacuumNoise_kpa = 0.3;
 constexpr double kBrake = 1.5;                                 // holding torque of a brake, in drive torques
 constexpr double kBrakeStiffness = 3600, kBrakeDamping = 120;  // 1/s², 1/s: 60 rad/s, critically damped
-constexpr double kBrakeHolds_rad_s = 0.02;
 
 std::vector<Arrival> arriving(const world::World& world, const world::Manifest& manifest, std::uint64_t seed,
                               Faults& faults) {
@@ -156,31 +155,41 @@ void SimArm::push() {
   std::copy_n(moment.data(), 3, applied + 3);
 }
 
-// Brakes slow the joints at once and then hold them where they stand, with at most kBrake times the drives' torque. Dry
-// friction as a constraint creeps under the arm's weight, or makes the solver stumble when it is made stiff.
+// Brakes hold the joints where they are, with at most kBrake times the drives' torque. What they cannot stop at once
+// slips, every joint by the same share: brakes only take energy, and a wrist that was braked as if the other joints
+// stood already was thrown by it. Held by a spring, so that what the model does not know of, a load, moves the arm a
+// little and not for ever. Dry friction as a constraint creeps under the arm's weight, or makes the solver stumble when
+// it is made stiff.
 void SimArm::brake() {
   const mjModel* model = cell.composed.model.get();
   mjData* data = cell.data.get();
   const auto axes = static_cast<Eigen::Index>(composed.dof.size());
-  double fastest = 0;
-  for (const int dof : composed.dof) fastest = std::max(fastest, std::abs(data->qvel[dof]));
-  if (held.size() == 0 && fastest < kBrakeHolds_rad_s) {
+  const auto stay_here = [&] {
     held.resize(axes);
     for (Eigen::Index i = 0; i < axes; ++i) held[i] = data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
-  }
+  };
+  if (held.size() == 0) stay_here();
   std::fill(brake_acceleration_.begin(), brake_acceleration_.end(), 0.0);
   for (Eigen::Index i = 0; i < axes; ++i) {
     const int dof = composed.dof[static_cast<std::size_t>(i)];
-    const double away = held.size() == 0 ? 0 : held[i] - data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
+    const double away = held[i] - data->qpos[composed.qpos[static_cast<std::size_t>(i)]];
     brake_acceleration_[static_cast<std::size_t>(dof)] = kBrakeStiffness * away - kBrakeDamping * data->qvel[dof];
   }
   mj_mulM(model, data, brake_torque_.data(), brake_acceleration_.data());
+  const AxisVector most = kBrake * station.robot.limits.torque_nm;
+  double share = 1;
   for (Eigen::Index i = 0; i < axes; ++i) {
     const int dof = composed.dof[static_cast<std::size_t>(i)];
-    const double most = kBrake * station.robot.limits.torque_nm[i];
-    data->qfrc_applied[dof] =
-        std::clamp(brake_torque_[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof], -most, most);
+    const double asked = brake_torque_[static_cast<std::size_t>(dof)];
+    const double left = std::max(0.0, most[i] - std::copysign(data->qfrc_bias[dof], data->qfrc_bias[dof] * asked));
+    if (std::abs(asked) > left) share = std::min(share, left / std::abs(asked));
   }
+  for (Eigen::Index i = 0; i < axes; ++i) {
+    const int dof = composed.dof[static_cast<std::size_t>(i)];
+    const double torque = share * brake_torque_[static_cast<std::size_t>(dof)] + data->qfrc_bias[dof];
+    data->qfrc_applied[dof] = std::clamp(torque, -most[i], most[i]);
+  }
+  if (share < 1) stay_here();
 }
 
 void SimArm::measure() {
