@@ -167,7 +167,7 @@ TEST(Faults, AStormOfOneSeedIsOneResult) {
   const json one = storm("one.json"), two = storm("two.json");
   EXPECT_EQ(one["state_hash"], two["state_hash"]);
   EXPECT_EQ(one["faults"], two["faults"]);
-  EXPECT_EQ(one["faults"].size(), 13U) << "all but a weak pump";
+  EXPECT_EQ(one["faults"].size(), 14U) << "all but a weak pump";
 }
 
 TEST(Faults, APlanThatDoesNotExistIsAnsweredWithThoseThatDo) {
