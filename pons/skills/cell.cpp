@@ -107,6 +107,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   seen_ = view_end_m_ ? seen.value_or(now) : now;
   objects_ = std::move(objects);
   watch_strays();
+  dragged_.look(objects_, speed * passed_s, world.belt.x_end_m);
   recognise(speed * passed_s);
   take_in_cut();
   add_unseen();
@@ -159,6 +160,7 @@ void Cell::add_unseen() {
   }
   if (hidden_) objects_.push_back(*hidden_);
   fallen_.add_unseen(objects_, belt_speed_m_s(), now_);
+  dragged_.add_unseen(objects_, belt_speed_m_s(), now_);
   objects_.insert(objects_.end(), left_.begin(), left_.end());
 }
 
@@ -185,6 +187,7 @@ void Cell::left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_
   object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
   strays->put_back(world.arm, held->code, now_);
+  if (!held->alone) dragged_.put_back(held->company, held->ahead_m, objects_, now_);
   left_.push_back(object);
   objects_.push_back(object);
 }

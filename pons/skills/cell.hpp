@@ -18,6 +18,7 @@
 #include "pons/model/robot_model.hpp"
 #include "pons/skills/arm.hpp"
 #include "pons/skills/company.hpp"
+#include "pons/skills/dragged.hpp"
 #include "pons/skills/fallen.hpp"
 #include "pons/skills/mouths.hpp"
 #include "pons/skills/reach.hpp"
@@ -44,6 +45,7 @@ struct Held {
   bool alone = true;                   // nobody was near, or the lift has shown that nobody came along
   std::optional<Vector3> from_m = {};  // where the tip was when it was lifted, world frame less the belt's travel
   Falls falls = {};                    // when it was lifted
+  double ahead_m = 0;                  // the farthest that its lift went beyond from_m, which rides
   // Put back before, unseen since, and lifted from among others: until it is weighed in that lift, it may be one of
   // these.
   bool doubtful = false;
@@ -287,6 +289,7 @@ class Cell {
   std::vector<ObjectBelief> objects_;
   std::vector<Watched> watched_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
+  Dragged dragged_;
   Fallen fallen_{view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m};
   std::optional<Felt> felt_;                       // of the last one
   std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since

@@ -384,6 +384,7 @@ class Pick final : public ArmSkill {
       return {};
     }
     const double back_to_m = cell_.held->from_m->x() + cell_.belt_travel_m(now);
+    cell_.held->ahead_m = std::max(cell_.held->ahead_m, tip.x() - back_to_m);
     if (cell_.world.belt.must_wait_for(back_to_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
     bear_at_least(std::min(cell_.world.rules.max_mass_kg, weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2)));
     if (height < kLifted_m) return {};
