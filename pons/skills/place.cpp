@@ -50,11 +50,10 @@ constexpr Duration kBlockedFor = std::chrono::milliseconds(400);
 constexpr Duration kLookEvery = std::chrono::milliseconds(60);
 constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
 constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
-constexpr double kGoneShare = 0.4;                                    // of the load's mass
-constexpr double kGoneLeast_kg = 0.08;
-constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);  // off a rim, too
-constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);  // a camera that watches the tray, every 2 s
-constexpr Duration kBounces = std::chrono::milliseconds(400);       // from one mouth into the next
+constexpr double kGoneShare = 0.4, kGoneLeast_kg = 0.08;              // of the load's mass, and at least
+constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);    // off a rim, too
+constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);    // a camera that watches the tray, every 2 s
+constexpr Duration kBounces = std::chrono::milliseconds(400);         // from one mouth into the next
 
 constexpr const char* kCancelled = "cancelled; still held";
 
@@ -323,11 +322,13 @@ class Place final : public ArmSkill {
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
-      if (!beside_.empty()) {
-        detail["fell_into"] = beside_;
-        return {Status::kException, "fell into " + beside_, std::move(detail)};
+      const std::string on = beside_.empty() && into_->name == name_ ? may_lie_on() : beside_;
+      if (!on.empty()) {
+        detail["fell_into"] = on;
+        return {Status::kException, (beside_.empty() ? "may lie on what fell into " : "fell into ") + on, detail};
       }
       cell_.strays->let_go(fallen_.code, into_->name, now);
+      cell_.strays->counted(cell_.world.arm, fallen_.code, into_->name, now);
       if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
       detail["fell_into"] = into_->name;
       return {Status::kException, "fell into " + into_->name, std::move(detail)};
@@ -367,6 +368,11 @@ class Place final : public ArmSkill {
     return {};
   }
 
+  // On what lies there already it would be counted as one thing with that.
+  [[nodiscard]] std::string may_lie_on() const {
+    const auto one = std::ranges::find_if(watched_, [](int things) { return things > 0; }, &Cell::Watched::things);
+    return one != watched_.end() ? one->place : std::string();
+  }
   // On the belt, where it is asked for again once it is seen.
   Progress look_for_it(Time now) {
     cell_.hold_belt(now);

@@ -40,7 +40,7 @@ class LostOverItsChuteTest : public ObedientArmTest {
     return progress;
   }
 
-  static constexpr int kThings = 2;
+  static constexpr int kThings = 0;
   task::SkillType type_ = place(cell_);
   std::unique_ptr<task::Skill> skill_;
   Time fell_;
@@ -56,6 +56,20 @@ TEST_F(LostOverItsChuteTest, ItIsSortedOnceTheTrayIsSeenAsItWas) {
 TEST_F(LostOverItsChuteTest, WithOneThingMoreOnTheTrayItLiesThere) {
   const Progress progress = ends(1.2, kThings + 1);
   EXPECT_EQ(progress.status, Status::kException) << progress.reason;
+  EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
+}
+
+// A box of 0.27 kg came to lie on one that was on the tray already, and both were seen as one thing.
+TEST_F(LostOverItsChuteTest, WhereSomethingLiesOnTheTrayItMayLieOnThat) {
+  cell_.watch("tray", 1, now_);
+  cell_.lost = held_;
+  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+  fell_ = now_;
+  ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  ++falls_[0];
+  const Progress progress = ends(1.2, 1);
+  EXPECT_EQ(progress.status, Status::kException) << progress.reason;
+  EXPECT_EQ(progress.reason, "may lie on what fell into tray");
   EXPECT_EQ(progress.detail.value("fell_into", std::string()), "tray");
 }
 
@@ -89,6 +103,17 @@ TEST_F(LostOverItsChuteTest, WhatIsCountedOnceItWasGivenUpIsNamed) {
   ASSERT_EQ(strays.size(), 1U);
   EXPECT_EQ(strays[0].code, "P1");
   EXPECT_EQ(strays[0].place, "chute_2");
+}
+
+TEST_F(LostOverItsChuteTest, WhatSlidesOffTheRimOnceItCountsAsSortedIsNamed) {
+  ASSERT_EQ(ends(1.2, kThings).status, Status::kSucceeded);
+  for (int i = 0; i < 60; ++i) pass();
+  ++falls_[4];
+  pass();
+  const std::vector<Stray> strays = cell_.strays->take_found_gone();
+  ASSERT_EQ(strays.size(), 1U);
+  EXPECT_EQ(strays[0].code, "P1");
+  EXPECT_EQ(strays[0].place, "chute_5");
 }
 
 // One that lay on a rim falls off it when another load comes down.

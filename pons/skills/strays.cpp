@@ -91,6 +91,11 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   }
 }
 
+void Strays::counted(const std::string& arm, const std::string& load, const std::string& place, Time now) {
+  std::erase_if(counted_, [&](const Fall& one) { return now > one.time + kTornOff; });
+  counted_.push_back({arm, place, now, load});
+}
+
 // With others, whatever is counted next may be one of them.
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
   const bool with_others = std::ranges::any_of(
@@ -105,10 +110,7 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
     const bool there = one.arm == arm || one.put_back;  // the belt carries it on to the next arm
     return there && !told && !(one.let_go && now > *one.let_go + within);
   });
-  if (torn == doubted_.rend()) {
-    nobodys_.push_back({arm, place, now});
-    return;
-  }
+  if (torn == doubted_.rend()) return fell_off_rim(arm, place, now);
   if (torn->put_back) return fell_beside(torn->load, place, now);
   // Who grazes one mouth and falls into the next is counted twice.
   const auto of_load = [&](const auto& one) { return one.load == torn->load; };
@@ -121,6 +123,15 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
   found_gone(*torn);
+}
+
+void Strays::fell_off_rim(const std::string& arm, const std::string& place, Time now) {
+  const auto counted = std::ranges::find_if(counted_.rbegin(), counted_.rend(), [&](const Fall& one) {
+    return one.arm == arm && one.place != place && now <= one.time + kTornOff;
+  });
+  if (counted == counted_.rend()) return nobodys_.push_back({arm, place, now});
+  found_gone_.push_back({counted->load, place});
+  counted->place = place;
 }
 
 void Strays::uncounted(const std::string& arm, const std::string& load, Time let_go) {

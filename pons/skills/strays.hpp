@@ -34,6 +34,9 @@ class Strays {
   void put_back(const std::string& arm, const std::string& load, Time now);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
+  // What the arm lost was counted in that place. It may lie on its rim: what another place of the arm's counts soon,
+  // and is nobody else's, is it.
+  void counted(const std::string& arm, const std::string& load, const std::string& place, Time now);
   // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
   // load. Once it is lifted again, it is not astray.
   void dropped(const std::string& arm, const std::string& load, Time now);
@@ -78,10 +81,11 @@ class Strays {
     Time seen;  // since its load was let go of
     bool missed = false, gone = false, told = false, put_back = false;
   };
-  // What fell into a place of an arm's, and was nobody's.
+  // What fell into a place of an arm's, and was nobody's; or that load, as counted() there.
   struct Fall {
     std::string arm, place;
     Time time;
+    std::string load = {};
   };
   // One of a load's company, where a light curtain has told.
   struct Torn {
@@ -90,6 +94,7 @@ class Strays {
   };
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
+  void fell_off_rim(const std::string& arm, const std::string& place, Time now);
   void fell_beside(const std::string& load, const std::string& place, Time now);
   [[nodiscard]] static bool has_stayed(const Doubted& one);
   void forget_stayed();
@@ -104,7 +109,7 @@ class Strays {
 
   std::vector<Doubted> doubted_;
   std::vector<Torn> torn_;  // and not found gone yet
-  std::vector<Fall> nobodys_;
+  std::vector<Fall> nobodys_, counted_;
   std::vector<Stray> found_gone_;
   std::vector<double> rode_off_;  // the belt's travel each time
 };

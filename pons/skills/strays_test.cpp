@@ -282,6 +282,21 @@ TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
 }
 
 // Out of the cameras' view what should have ridden off and did not is not on the belt any more.
+// A load that was lost over its mouth lay on the rim for two seconds, and slid into the next one.
+TEST_F(StraysTest, WhatWasCountedAndLayOnTheRimIsNamedWhereItFell) {
+  strays_.counted("arm", "A", "chute_3", at(11));
+  strays_.fell("arm_2", "chute_4", at(11.5));
+  strays_.fell("arm", "chute_3", at(11.5));
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "another arm's mouth, or its own once more";
+  strays_.fell("arm", "chute_5", at(11.6));
+  auto gone = strays_.take_found_gone();
+  ASSERT_EQ(gone.size(), 1U);
+  EXPECT_EQ(gone[0].code, "A");
+  EXPECT_EQ(gone[0].place, "chute_5");
+  strays_.fell("arm", "chute_6", at(14.5));
+  EXPECT_TRUE(strays_.take_found_gone().empty()) << "much later it is another";
+}
+
 TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
   carry({{2, "B", {0, 0}}, {3, "C", {0, 0}}});
   look({box(2, "B", 0.4), box(3, "C", 0.7)}, 5.0);  // at the end at a travel of 5.6 and 5.3 m
