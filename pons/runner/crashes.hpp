@@ -1,5 +1,5 @@
-// One of the two halves that is killed within a run in lockstep, as `kill -9` kills one in a process of its own, and
-// the next one that takes over: a bridge from its journal, control loops from nothing. Faults
+// A bridge, or the control loops, killed within a run in lockstep, as `kill -9` kills those in a process of their own,
+// and the next that take over: a bridge from its journal, control loops from nothing. Faults
 // (docs/decisions/0029-faults-as-data.md); who really has two processes kills one of them.
 #pragma once
 

@@ -71,6 +71,24 @@ class RestTest : public CarryTest {
   }
 };
 
+// A lift rides along: what came off on the way back lies further on, and no camera sees it there.
+TEST_F(RestTest, WhoHungOnWhatWasPutBackIsInTheWayFurtherOn) {
+  const auto rooms = [&](const std::vector<ObjectBelief>& seen, Time now) {
+    cell_.refresh(now, seen);
+    return std::ranges::count(cell_.objects(), 0U, &ObjectBelief::track);
+  };
+  const ObjectBelief beside = coming(0.4, 0.2);
+  EXPECT_EQ(rooms({beside}, now_), 0);
+  cell_.held = Held{"P000001", {.size_m = {0.2, 0.15, 0.15}}, 1.0};
+  cell_.held->company = {{beside.track, "", {0.3, 0}}};
+  cell_.held->alone = false;
+  cell_.held->ahead_m = 0.2;
+  cell_.left_on_belt(Cell::tip_down({0, 0, 1.1}, 0));
+  cell_.holds_nothing();
+  EXPECT_EQ(rooms({beside}, now_ + from_s(0.01)), 0);
+  EXPECT_EQ(rooms({}, now_ + from_s(0.02)), 1);
+}
+
 TEST_F(RestTest, AnArmThatWaitsMakesRoomForWhatIsTallAndNearOnly) {
   const Time rested = cell_.arm.motion_end();
   Time now = now_;

@@ -43,7 +43,7 @@ inline constexpr std::size_t kFaults = 15;
 enum class Strikes : std::uint8_t {
   kBody,     // the body, its cameras, its belt
   kBrain,    // the brain, or between it and the bridge
-  kProcess,  // one of the two halves as a whole: in virtual time only; by the clock it is a process to be killed
+  kProcess,  // the bridge or the loops as a whole: in virtual time only; by the clock, processes that can be killed
 };
 [[nodiscard]] Strikes strikes(Fault fault);
 
