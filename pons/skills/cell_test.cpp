@@ -79,10 +79,7 @@ TEST_F(RestTest, WhoHungOnWhatWasPutBackIsInTheWayFurtherOn) {
   };
   const ObjectBelief beside = coming(0.4, 0.2);
   EXPECT_EQ(rooms({beside}, now_), 0);
-  cell_.held = Held{"P000001", {.size_m = {0.2, 0.15, 0.15}}, 1.0};
-  cell_.held->company = {{beside.track, "", {0.3, 0}}};
-  cell_.held->alone = false;
-  cell_.held->ahead_m = 0.2;
+  cell_.held = Held{.code = "P1", .company = {{beside.track, "", {0.3, 0}}}, .alone = false, .ahead_m = 0.2};
   cell_.left_on_belt(Cell::tip_down({0, 0, 1.1}, 0));
   cell_.holds_nothing();
   EXPECT_EQ(rooms({beside}, now_ + from_s(0.01)), 0);
