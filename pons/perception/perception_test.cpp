@@ -124,7 +124,7 @@ TEST(PerceptionTest, TellsFlushBoxesOfOneColourApartByTheirLabels) {
                         {.x_m = -1.0 + left.x() + 0.5 * right.x(), .size_m = right, .code = "P000002"}};
     eyes.belt.watch(eyes.perception, 2);
     ASSERT_EQ(eyes.beliefs().size(), 1u) << "told apart without labels, this shows nothing";
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < 3; ++i) {  // the one that showed two codes, its halves, their codes
       eyes.belt.wait(0.2);
       eyes.belt.show(eyes.perception, "label");
       eyes.belt.watch(eyes.perception, 2);

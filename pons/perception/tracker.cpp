@@ -402,9 +402,18 @@ bool Tracker::shows(const Track& track, const Eigen::Vector2d& label_m) const {
   return expected(track, stamp, travel_m).covers(label_m.x() + travel_m, label_m.y(), kBesideLabel_m);
 }
 
+bool Tracker::shown_beside_another(const Track& track, std::string_view code) const {
+  const auto at = [this](const Track& one) { return one.estimate.at(passages_.back().stamp); };
+  return std::ranges::any_of(tracks_, [&](const Track& other) {
+    const std::vector<std::string>& codes = other.label.disputed();
+    return other.id != track.id && !other.forgotten && std::ranges::find(codes, code) != codes.end() &&
+           (at(other) - at(track)).norm() < other.estimate.size_m.maxCoeff();
+  });
+}
+
 void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m) {
   Track* const found = find(track);
-  if (found == nullptr || code.empty() || !shows(*found, middle_m)) return;
+  if (found == nullptr || code.empty() || !shows(*found, middle_m) || shown_beside_another(*found, code)) return;
   found->label.read(code, middle_m, passages_.back().stamp);
   if (found->label.code() != code) return;
   // One code is on one parcel: whoever else has it got it from a bad cut or was this parcel before.

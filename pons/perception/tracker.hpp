@@ -28,7 +28,8 @@ class Tracker {
   // The newest frame shows all of it, good enough to read its label, and was searched for one or not.
   void label_shown(std::uint32_t track, bool searched);
   // A code was read on it in the newest frame, with the label's middle there, relative to the belt: see TrackLabel. No
-  // two tracks keep one code, and none keeps the code of a label that turns out to lie beside it.
+  // two tracks keep one code, none keeps the code of a label that turns out to lie beside it, and none takes one of the
+  // two that something close by shows.
   void label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m);
   struct Label {
     std::string_view code;
@@ -112,6 +113,9 @@ class Tracker {
 
   [[nodiscard]] bool wants_label(const Track& track) const;
   [[nodiscard]] bool shows(const Track& track, const Eigen::Vector2d& label_m) const;
+  // Whether one close by shows that code and another. What a bad frame cuts off such a one shows no more than it does;
+  // where it really was two, it is soon none of them, or of another size.
+  [[nodiscard]] bool shown_beside_another(const Track& track, std::string_view code) const;
 
   world::Belt belt_;
   world::Rules rules_;

@@ -256,6 +256,24 @@ TEST(TrackerTest, OneThatShowsTwoCodesHasNoneOfThem) {
   EXPECT_EQ(disputed(), (std::vector<std::string>{"A", "C"}));
 }
 
+// For a moment it seemed to be two.
+TEST(TrackerTest, APieceOfOneThatShowsTwoCodesHasNoneOfThem) {
+  Bench bench;
+  const std::uint32_t whole = bench.update({Bench::sighting(-0.5, 0, 0.3, {0.36, 0.12, 0.1})}).at(0);
+  bench.tracker.labels_read(whole, {"A", {-0.6, -0.03}}, {"B", {-0.4, 0.03}});
+  const auto pieces = bench.update({Bench::sighting(-0.53, -0.05, 0.05, {0.36, 0.11, 0.1}),
+                                    Bench::sighting(-0.47, 0.05, 0.05, {0.3, 0.085, 0.1}), Bench::sighting(0.2, 0)});
+  ASSERT_EQ(pieces[0], whole);
+  const auto read = [&](std::uint32_t track, const char* code) {
+    bench.read(track, code);
+    const auto beliefs = bench.tracker.beliefs(bench.now, 0);
+    return std::ranges::find(beliefs, track, &ObjectBelief::track)->code;
+  };
+  EXPECT_EQ(read(pieces[1], "B"), "");
+  EXPECT_EQ(read(pieces[2], "B"), "B") << "far from it";
+  EXPECT_EQ(read(pieces[1], "C"), "C");
+}
+
 TEST(TrackerTest, WantsLabelsOfWhatCouldBeReadAndIsNotSure) {
   Bench bench;
   EXPECT_FALSE(bench.tracker.wants_labels());
