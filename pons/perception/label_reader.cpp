@@ -100,7 +100,6 @@ std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& 
                                          const std::vector<std::size_t>& wanted) {
   std::vector<LabelRead> reads;
   for (const std::size_t index : wanted) {
-    if (std::ranges::find(reads, index, &LabelRead::sighting) != reads.end()) continue;
     const double top_z_m = sightings[index].world_from_top.translation().z();
     const cv::Rect area = print_area(frame, view, texture, segments.regions[index], top_z_m);
     if (area.width < 20 || area.height < 20) continue;

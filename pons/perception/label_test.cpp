@@ -61,6 +61,41 @@ TEST(LabelTest, GivesEachOfTwoTouchingParcelsItsOwnCode) {
   EXPECT_EQ(code_at(belt, perception, belt.things[1]), "P000002");
 }
 
+// One of its labels is found where its neighbour's are looked for.
+TEST(LabelTest, LooksForTheOtherLabelOfOneThatANeighboursPictureShows) {
+  SyntheticBelt belt;
+  Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
+  const auto stuck_on = [](const Thing& thing, const char* code, Vector3 offset_m) {
+    const Vector3 at_m = Eigen::AngleAxisd(thing.yaw_rad, Vector3::UnitZ()) * offset_m;
+    return Thing{.x_m = thing.x_m + at_m.x(),
+                 .y_m = thing.y_m + at_m.y(),
+                 .yaw_rad = thing.yaw_rad,
+                 .size_m = {0.07, 0.07, 0.001},
+                 .colour = thing.colour,
+                 .code = code,
+                 .base_m = thing.size_m.z()};
+  };
+  const double yaw_rad = 0.785, c = std::cos(yaw_rad), s = std::sin(yaw_rad);
+  const Thing one{.x_m = -0.6, .y_m = -0.05, .yaw_rad = yaw_rad, .size_m = {0.34, 0.1, 0.1}, .colour = {160, 120, 80}};
+  const Thing other{.x_m = one.x_m - 0.15 * s,
+                    .y_m = one.y_m + 0.15 * c,
+                    .yaw_rad = yaw_rad,
+                    .size_m = {0.2, 0.2, 0.1},
+                    .colour = {110, 130, 150}};
+  belt.things = {one,
+                 other,
+                 stuck_on(one, "P000001", {-0.12, 0, 0}),
+                 stuck_on(one, "P000002", {0.12, 0, 0}),
+                 stuck_on(other, "P000003", {0, -0.06, 0}),
+                 stuck_on(other, "P000004", {0, 0.06, 0})};
+  belt.show(perception, "label");
+  const auto beliefs = perception.beliefs(belt.now, belt.travel_m);
+  ASSERT_EQ(beliefs.size(), 2u);
+  std::set<std::string> codes;
+  for (const ObjectBelief& belief : beliefs) codes.insert(belief.disputed.begin(), belief.disputed.end());
+  EXPECT_EQ(codes, (std::set<std::string>{"P000001", "P000002", "P000003", "P000004"}));
+}
+
 TEST(LabelTest, CountsFramesThatShowedAnUnlabelledTopWhole) {
   SyntheticBelt belt;
   Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
