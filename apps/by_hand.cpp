@@ -25,6 +25,8 @@ Expected<ByHand::Taken> ByHand::take(const bridge::Json& arguments, Time now) {
       {"id", id}, {"priority", kGoesLast}, {"steps", {{{"skill", skill_}, {"arguments", arguments}}}}};
   if (const auto admitted = bridge_.submit(task.dump(), now); !admitted) return std::unexpected(admitted.error());
   id_ = id;
+  // Nobody hears of a task before the disk has it.
+  if (const auto kept = bridge_.commit(now); !kept) return std::unexpected(kept.error());
   return Taken{id_, true};
 }
 

@@ -308,8 +308,11 @@ void Bridge::start(Open& open, Time now) {
   if (!std::exchange(open.begun, true))
     tell(open, now, kStartedEvent, {{"robot", robots_[open.robot].name}, {"waited_s", to_s(now - open.accepted)}});
   if (!open.tree) {
-    // It was seen to be good when it was taken.
-    if (open.task.tree && !open.program) open.program = review_.program(open.task).value_or(nullptr);
+    if (open.task.tree && !open.program) {
+      const auto program = review_.program(open.task);
+      if (!program) set_fault(program.error());  // though it was seen to be good when it was taken: it is not begun
+      open.program = program.value_or(nullptr);
+    }
     const std::vector<task::Step> left(open.task.steps.begin() + static_cast<std::ptrdiff_t>(open.done),
                                        open.task.steps.end());
     open.tree = tree_of(open.task, open.program ? open.program : tree::program_of(left, *robots_[open.robot].skills));

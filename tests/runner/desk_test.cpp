@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/by_hand.hpp"
 #include "pons/bridge/test_kit.hpp"
 
 namespace pons::apps {
@@ -57,6 +58,23 @@ TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
   desk.attend(Time{});
   EXPECT_EQ(answered, (std::vector{stop, emergency, look, look}));
   EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
+}
+
+TEST(ByHand, NobodyHearsOfATaskBeforeTheDiskHasIt) {
+  const bridge::TemporaryFolder folder;
+  const auto journal = bridge::Journal::open(folder / "j.db").value();
+  world::World world;
+  world.resources = {{"arm"}};
+  bridge::Actor actor{"act", {{}}};
+  task::SkillRegistry skills;
+  skills.add(actor.type());
+  bridge::Bridge bridge(*journal, skills, world);
+  ByHand hand(bridge, "act", "arm");
+  const auto taken = hand.take(bridge::Json::object(), Time{});
+  ASSERT_TRUE(taken) << taken.error().line();
+  EXPECT_TRUE(taken->begun);
+  EXPECT_EQ(bridge.state(taken->id), "waiting");
+  EXPECT_FALSE(bridge.unkept());
 }
 
 // Of a run without robots and skills.

@@ -150,15 +150,27 @@ std::vector<std::string> Arbiter::queue() const {
 
 // ---- resources ----
 
-const Arbiter::Entry* Arbiter::next(const std::set<Ways>& passed, const std::map<Ways, Rank>& looked) const {
+const Arbiter::Entry* Arbiter::next(const std::set<Ways>& passed, const std::map<Ways, Looked>& looked) const {
   const Lane::value_type* first = nullptr;
   for (const auto& [ways, lane] : lanes_) {
     if (passed.contains(ways)) continue;
     const auto last = looked.find(ways);
-    const auto head = last == looked.end() ? lane.begin() : lane.upper_bound(last->second);
+    const auto head = last == looked.end() ? lane.begin() : lane.upper_bound(last->second.rank);
     if (head != lane.end() && (first == nullptr || head->first < first->first)) first = &*head;
   }
   return first == nullptr ? nullptr : first->second;
+}
+
+bool Arbiter::look_on(const Ways& ways, Looked& looked) {
+  const auto resumes = looked_to_.find(ways);
+  if (++looked.looks == kLooks / 2 && resumes != looked_to_.end()) {
+    const auto last = waiting_.find(resumes->second);
+    if (last != waiting_.end()) looked.rank = std::max(looked.rank, last->second.rank);
+    looked_to_.erase(resumes);  // unless it ends before the lane does once more
+  }
+  if (looked.looks < kLooks) return true;
+  looked_to_.insert_or_assign(ways, looked.id);
+  return false;
 }
 
 std::vector<std::size_t> Arbiter::fitting(const Entry& entry, const Fits& fits) const {
@@ -176,12 +188,11 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
   if (!changed_ && !fits) return granted;
   Mask taken = held_ | withheld_;
   std::set<Ways> passed;
-  std::map<Ways, Rank> looked;
-  for (int looks = 0; looks < kLooks || !fits; ++looks) {
-    const Entry* const entry = next(passed, looked);
-    if (entry == nullptr) break;
+  std::map<Ways, Looked> looked;
+  while (const Entry* const entry = next(passed, looked)) {
     const Ways ways = entry->ways;  // the entry may be elsewhere soon
-    looked.insert_or_assign(ways, entry->rank);
+    Looked& there = looked[ways];
+    there.id = entry->claim.id, there.rank = entry->rank;
     const std::vector<std::size_t> fit = fitting(*entry, fits);
     const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free(ways[way], taken); });
     if (free != fit.end()) {
@@ -191,7 +202,8 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
       // It has to wait: nobody behind it may take what it waits for.
       for (const std::size_t way : fit) taken |= ways[way];
     }
-    if (std::ranges::none_of(ways, [&](Mask needs) { return is_free(needs, taken); })) passed.insert(ways);
+    const bool all_taken = std::ranges::none_of(ways, [&](Mask needs) { return is_free(needs, taken); });
+    if (all_taken || (fits && !look_on(ways, there))) passed.insert(ways);
   }
   changed_ = false;
   return granted;

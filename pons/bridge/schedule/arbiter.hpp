@@ -40,8 +40,9 @@ struct Claim {
 // one for `ageing` may have that of one that counts no more, and has had it for as long.
 //
 // add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
-// different sets of resources that are waited for. Of those that may be done in several ways, or are asked whether they
-// fit, at most kLooks are looked at in one grant().
+// different sets of resources that are waited for. Where it is asked what fits, at most kLooks of those that wait for
+// the same are looked at in one grant(): the first, and as many from where the last one ended. So nobody waits for ever
+// behind those that do not fit.
 class Arbiter {
  public:
   static constexpr std::size_t kMaxResources = 64;
@@ -112,7 +113,7 @@ class Arbiter {
     Time parked_at;                   // of a parked one
   };
   using Entries = std::map<std::string, Entry, std::less<>>;
-  // Those that wait for the same resources, of which only the first can be next; with none, for a seat.
+  // Those that wait for the same resources; with none, for a seat.
   using Lane = std::map<Rank, const Entry*>;
   using Lanes = std::map<Ways, Lane>;
   // Of waiting entries, by a time of theirs.
@@ -123,8 +124,15 @@ class Arbiter {
   void wait_no_more(Entry& entry);
   void age();
   void take_rank(Entry& entry) const;
+  struct Looked {
+    std::string id;  // who was looked at last
+    Rank rank;       // behind which the next one is
+    int looks = 0;
+  };
   // The first entry of all lanes that are none of `passed`, and in each behind the one looked at last; null: none.
-  [[nodiscard]] const Entry* next(const std::set<Ways>& passed, const std::map<Ways, Rank>& looked) const;
+  [[nodiscard]] const Entry* next(const std::set<Ways>& passed, const std::map<Ways, Looked>& looked) const;
+  // One more look at that lane. False: it was the last.
+  [[nodiscard]] bool look_on(const Ways& ways, Looked& looked);
   [[nodiscard]] std::vector<std::size_t> fitting(const Entry& entry, const Fits& fits) const;
   void give(const Entry& entry, std::size_t way, std::vector<std::string>& granted);
   [[nodiscard]] bool gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const;
@@ -137,6 +145,8 @@ class Arbiter {
   std::map<std::string, std::size_t, std::less<>> bits_;
   Entries waiting_, running_, parked_;
   Lanes lanes_;  // none empty
+  // At whom the looks of the last grant() ended that had not come to the lane's end. By id: it grows older.
+  std::map<Ways, std::string> looked_to_;
   Agenda ageing_, deadlines_;
   Mask held_ = 0, withheld_ = 0;
   int seated_ = 0;

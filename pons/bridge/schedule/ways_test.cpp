@@ -92,6 +92,34 @@ TEST(Arbiter, LooksAreBounded) {
   EXPECT_EQ(looks, 2 * Arbiter::kLooks);
 }
 
+// As with an arm that stands, and many tasks that only it can do.
+TEST(Arbiter, WhoDoesNotFitKeepsNobodyFromWhatItDoesNotNeed) {
+  Arbiter arbiter({"left", "right"}, {});
+  for (int i = 0; i < 5000; ++i) arbiter.add(claim(fmt::format("t{:04}", i), 90, {"left"}));
+  arbiter.add(claim("fits", 10, {"right"}));
+  EXPECT_EQ(arbiter.grant({}, [](std::string_view id, std::size_t) { return id == "fits"; }), Ids{"fits"});
+}
+
+TEST(Arbiter, WhoFitsIsFoundBehindManyThatDoNot) {
+  Arbiter arbiter({"left", "right"}, {.ageing = from_s(1)});
+  for (int i = 0; i < 2000; ++i) arbiter.add(either(fmt::format("t{:04}", i), 50, {"left"}, {"right"}));
+  const auto grants_until = [&](std::string_view wanted) {
+    for (int grants = 1; grants < 100; ++grants) {
+      const Ids granted = arbiter.grant(at(grants), [&](std::string_view id, std::size_t) { return id == wanted; });
+      if (granted.empty()) continue;
+      EXPECT_EQ(granted, Ids{std::string(wanted)});
+      arbiter.release(wanted);
+      return grants;
+    }
+    return 0;
+  };
+  EXPECT_EQ(grants_until("t0700"), 5) << "128 each after the first 256";
+  const int last = grants_until("t1999");
+  EXPECT_GT(last, 0);
+  EXPECT_LE(last, 16);
+  EXPECT_EQ(grants_until("t0300") > 0, true) << "and from the beginning again";
+}
+
 // ---- parked ----
 
 TEST(Arbiter, AParkedOneComesBackAtItsAge) {
