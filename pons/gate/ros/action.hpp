@@ -211,7 +211,8 @@ class ActionClient final : public Part {
 
   [[nodiscard]] bool available() { return goals_->available(); }
   // As GoalClient::send(). Error also: the goal is longer than its type allows.
-  [[nodiscard]] Expected<GoalId> send(typename A::Goal goal, std::chrono::milliseconds ends_within, Hears hears) {
+  [[nodiscard]] Expected<GoalId> send(typename A::Goal goal, std::optional<std::chrono::milliseconds> ends_within,
+                                      Hears hears) {
     typename A::SendGoal::Request request;
     request.goal_id.uuid = new_goal_id();
     request.goal = std::move(goal);

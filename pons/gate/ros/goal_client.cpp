@@ -72,18 +72,18 @@ bool GoalClient::available() {
   return feeds_back && sends && cancels && results;
 }
 
-Expected<void> GoalClient::send(const GoalId& id, std::vector<std::byte> request, std::chrono::milliseconds ends_within,
-                                Hears hears) {
+Expected<void> GoalClient::send(const GoalId& id, std::vector<std::byte> request,
+                                std::optional<std::chrono::milliseconds> ends_within, Hears hears) {
   const auto server = results_->server();
   if (!cancels_->present() || !server) return fail("no server is there", name_, "start it, on the same domain");
   auto called = sends_->call(std::move(request), kAnswersWithin,
                              [this, id, ends_within](const auto& reply) { decided(id, ends_within, reply); });
-  if (!called) return called;
-  open_.emplace(id, Open{std::move(hears), *server});
+  if (!called) return std::unexpected(called.error());
+  open_.emplace(id, Open{std::move(hears), *server, std::nullopt});
   return {};
 }
 
-void GoalClient::decided(const GoalId& id, std::chrono::milliseconds ends_within,
+void GoalClient::decided(const GoalId& id, std::optional<std::chrono::milliseconds> ends_within,
                          const Expected<std::span<const std::byte>>& reply) {
   const auto accepted = reply ? decision_in(*reply, decision_type_) : std::unexpected(reply.error());
   if (!accepted) {
@@ -91,12 +91,13 @@ void GoalClient::decided(const GoalId& id, std::chrono::milliseconds ends_within
     return finish(id, std::unexpected(accepted.error()));
   }
   if (!*accepted) return finish(id, fail(kGoalWasRejected, name_, "see what its server says"));
-  if (const auto found = open_.find(id); found != open_.end() && found->second.hears.accepted)
-    found->second.hears.accepted();
+  const auto found = open_.find(id);
+  if (found == open_.end()) return;  // forgotten meanwhile
+  if (found->second.hears.accepted) found->second.hears.accepted();
   wait_for_end(id, ends_within);
 }
 
-void GoalClient::wait_for_end(const GoalId& id, std::chrono::milliseconds within) {
+void GoalClient::wait_for_end(const GoalId& id, std::optional<std::chrono::milliseconds> within) {
   const UUID whose{id};
   auto request = bytes_of_request(whose, name_);
   if (!request) return finish(id, std::unexpected(request.error()));
@@ -106,7 +107,8 @@ void GoalClient::wait_for_end(const GoalId& id, std::chrono::milliseconds within
     if (!status) return finish(id, std::unexpected(status.error()));
     finish(id, Ended{*status, *reply});
   });
-  if (!called) finish(id, std::unexpected(called.error()));
+  if (!called) return finish(id, std::unexpected(called.error()));
+  if (const auto found = open_.find(id); found != open_.end()) found->second.end = *called;
 }
 
 Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
@@ -114,13 +116,22 @@ Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
   request.goal_info.goal_id.uuid = id;
   auto bytes = bytes_of_request(request, name_);
   if (!bytes) return std::unexpected(bytes.error());
-  return cancels_->call(*std::move(bytes), kAnswersWithin, [cancelled = std::move(cancelled)](const auto& reply) {
-    if (!cancelled) return;
-    if (!reply) return cancelled(std::unexpected(reply.error()));
-    CancelGoal::Response response;
-    if (const auto read = wire::decode(*reply, response); !read) return cancelled(std::unexpected(read.error()));
-    cancelled(response.return_code);
-  });
+  const auto called =
+      cancels_->call(*std::move(bytes), kAnswersWithin, [cancelled = std::move(cancelled)](const auto& reply) {
+        if (!cancelled) return;
+        if (!reply) return cancelled(std::unexpected(reply.error()));
+        CancelGoal::Response response;
+        if (const auto read = wire::decode(*reply, response); !read) return cancelled(std::unexpected(read.error()));
+        cancelled(response.return_code);
+      });
+  return called ? Expected<void>{} : std::unexpected(called.error());
+}
+
+void GoalClient::forget(const GoalId& id) {
+  const auto found = open_.find(id);
+  if (found == open_.end()) return;
+  if (found->second.end) results_->forget(*found->second.end);
+  open_.erase(found);
 }
 
 void GoalClient::spin(Clock::time_point now) {
@@ -157,7 +168,7 @@ void GoalClient::finish(const GoalId& id, const Expected<Ended>& end) {
   const auto found = open_.find(id);
   if (found == open_.end()) return;
   const Hears hears = std::move(found->second.hears);
-  open_.erase(found);
+  forget(id);
   if (hears.ended) hears.ended(end);
 }
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -46,8 +47,8 @@ class GoalClient final : public Part {
     std::int8_t status = GoalStatus::STATUS_UNKNOWN;
     std::span<const std::byte> reply;  // of get_result, as CDR, as long as the call lasts
   };
-  // What comes of a goal, on the node's thread. `ended` is called once: with the end, or why none will be heard of: it
-  // was rejected, nobody answered in time (then it is cancelled), the server has gone.
+  // What comes of a goal, on the node's thread. `ended` is called once, unless it is forgotten: with the end, or why
+  // none will be heard of: it was rejected, nobody answered in time (then it is cancelled), the server has gone.
   struct Hears {
     std::function<void()> accepted;
     std::function<Expected<void>(std::span<const std::byte>)> feedback;  // the message; error: it cannot be read
@@ -65,11 +66,14 @@ class GoalClient final : public Part {
   [[nodiscard]] const std::string& name() const { return name_; }
   // Whether a server is there with all that belongs to it.
   [[nodiscard]] bool available();
-  // `request`, of send_goal, has this id in it and room for a header before it. Error, at once: no server is there.
+  // `request`, of send_goal, has this id in it and room for a header before it. `ends_within` counts from its being
+  // accepted; without, it may take its time, as long as the server is there. Error, at once: no server is there.
   [[nodiscard]] Expected<void> send(const GoalId& id, std::vector<std::byte> request,
-                                    std::chrono::milliseconds ends_within, Hears hears);
+                                    std::optional<std::chrono::milliseconds> ends_within, Hears hears);
   // What comes of the goal, its end says; `cancelled`, which may be none, hears whether the server will try.
   [[nodiscard]] Expected<void> cancel(const GoalId& id, Cancelled cancelled);
+  // Nothing more is told of it.
+  void forget(const GoalId& id);
 
   void spin(Clock::time_point now) override;
   [[nodiscard]] Clock::time_point due() const override;
@@ -77,12 +81,13 @@ class GoalClient final : public Part {
  private:
   struct Open {
     Hears hears;
-    Guid server{};  // that was asked
+    Guid server{};                    // that was asked
+    std::optional<std::int64_t> end;  // the call that asks how it ended
   };
   GoalClient(Node& node, std::string name) : node_(node), name_(std::move(name)) {}
-  void decided(const GoalId& id, std::chrono::milliseconds ends_within,
+  void decided(const GoalId& id, std::optional<std::chrono::milliseconds> ends_within,
                const Expected<std::span<const std::byte>>& reply);
-  void wait_for_end(const GoalId& id, std::chrono::milliseconds within);
+  void wait_for_end(const GoalId& id, std::optional<std::chrono::milliseconds> within);
   void take_feedback();
   void finish(const GoalId& id, const Expected<Ended>& end);
 

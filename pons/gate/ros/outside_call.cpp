@@ -13,7 +13,7 @@ namespace {
 using How = OutsideCall::End::How;
 
 constexpr std::chrono::milliseconds kLooksForServer{50};
-constexpr std::chrono::seconds kLonger{60};  // than its skill waits
+constexpr std::chrono::seconds kEndsWithin{60};  // once it is told to: longer than its skill waits then
 
 OutsideCall::End unreadable(const Error& error) {
   return {How::kLost, {}, "its answer cannot be read: " + error.line()};
@@ -38,7 +38,7 @@ class AnAction final : public OutsideServer {
   [[nodiscard]] bool reaches(const Call&) override { return true; }  // its client says when it has gone
 
   Expected<void> send(const Call& call) override {
-    return goals_->send(call->id, call->request, patience(),
+    return goals_->send(call->id, call->request, std::nullopt,
                         {.accepted =
                              [this, call] {
                                call->accept();
@@ -57,6 +57,7 @@ class AnAction final : public OutsideServer {
       if (code && *code == CancelGoal::Response::ERROR_REJECTED) call->goes_on();
     });
   }
+  void forget(const Call& call) override { goals_->forget(call->id); }
   [[nodiscard]] OutsideCall::End meaning(const Expected<GoalClient::Ended>& end) const {
     if (!end) return unknown_end(end.error());
     const auto how = [&]() -> std::optional<How> {
@@ -92,23 +93,35 @@ class AService final : public OutsideServer {
   [[nodiscard]] bool available() override { return bytes_->available(); }
   [[nodiscard]] bool reaches(const Call& call) override {
     const auto found = asked_.find(call->id);
-    return found == asked_.end() || bytes_->reaches(found->second);
+    return found == asked_.end() || bytes_->reaches(found->second.server);
   }
   Expected<void> send(const Call& call) override {
-    std::erase_if(asked_, [this](const auto& each) { return !bytes_->reaches(each.second); });
-    if (const auto server = bytes_->server()) asked_[call->id] = *server;
-    return bytes_->call(call->request, patience(), [this, call](const auto& answer) {
+    const auto server = bytes_->server();
+    const auto number = bytes_->call(call->request, std::nullopt, [this, call](const auto& answer) {
       asked_.erase(call->id);
       if (!answer) return call->end({How::kLost, {}, answer.error().line()});
       auto reply = form_->reply(*answer);
       if (!reply) return call->end(unreadable(reply.error()));
       call->end({How::kDone, *std::move(reply), {}});
     });
+    if (!number) return std::unexpected(number.error());
+    if (server) asked_[call->id] = {*server, *number};
+    return {};
   }
   void cancel(const Call&) override {}  // ROS 2 has no word for it
+  void forget(const Call& call) override {
+    const auto found = asked_.find(call->id);
+    if (found == asked_.end()) return;
+    bytes_->forget(found->second.number);
+    asked_.erase(found);
+  }
 
+  struct Asked {
+    Guid server{};
+    std::int64_t number = 0;  // of the call
+  };
   std::unique_ptr<ByteClient> bytes_;
-  std::map<GoalId, Guid> asked_;
+  std::map<GoalId, Asked> asked_;
 };
 
 }  // namespace
@@ -218,10 +231,6 @@ Expected<std::unique_ptr<OutsideServer>> OutsideServer::open(Node& node, std::sh
 
 OutsideServer::~OutsideServer() { line_->connect(nullptr); }
 
-std::chrono::milliseconds OutsideServer::patience() const {
-  return std::chrono::duration_cast<std::chrono::milliseconds>(form_->skill().timeout) + kLonger;
-}
-
 void OutsideServer::spin(Clock::time_point now) {
   std::ranges::move(line_->take(), std::back_inserter(waiting_));
   client().spin(now);
@@ -230,18 +239,28 @@ void OutsideServer::spin(Clock::time_point now) {
     for (const Call& call : std::exchange(waiting_, {})) {
       if (!call->begin()) continue;
       if (auto sent = send(call); !sent) call->end({How::kUnsent, {}, sent.error().line()});
-      open_.push_back(call);
+      open_.push_back({call});
     }
   }
-  for (const Call& call : open_) {
-    if (call->take_cancel()) cancel(call);
-    if (!reaches(call)) call->end({How::kServerGone, {}, kServerHasGone});
+  for (auto& [call, until] : open_) {
+    if (call->take_cancel()) {
+      cancel(call);
+      until = now + kEndsWithin;
+    }
+    if (!reaches(call)) {
+      call->end({How::kServerGone, {}, kServerHasGone});
+      forget(call);
+    } else if (now >= until) {
+      call->end({How::kLost, {}, "no answer in time"});
+      forget(call);
+    }
   }
-  std::erase_if(open_, [](const Call& call) { return call->ended(); });
+  std::erase_if(open_, [](const Open& open) { return open.call->ended(); });
 }
 
 Part::Clock::time_point OutsideServer::due() const {
-  const auto due = client().due();
+  auto due = client().due();
+  for (const Open& open : open_) due = std::min(due, open.until);
   return waiting_.empty() ? due : std::min(due, Clock::now() + kLooksForServer);
 }
 

@@ -107,9 +107,6 @@ class OutsideServer : public Part {
   using Call = std::shared_ptr<OutsideCall>;
   OutsideServer(std::shared_ptr<const OutsideForm> form, std::shared_ptr<OutsideLine> line)
       : form_(std::move(form)), line_(std::move(line)) {}
-  // How long an answer is waited for at most; whose skill waits no longer has ended it before.
-  [[nodiscard]] std::chrono::milliseconds patience() const;
-
   std::shared_ptr<const OutsideForm> form_;
 
  private:
@@ -118,11 +115,20 @@ class OutsideServer : public Part {
   [[nodiscard]] virtual bool available() = 0;
   virtual Expected<void> send(const Call& call) = 0;
   virtual void cancel(const Call& call) = 0;
+  // What comes of it is not waited for any more.
+  virtual void forget(const Call& call) = 0;
   // Whether the server that was asked is still there.
   [[nodiscard]] virtual bool reaches(const Call& call) = 0;
 
   std::shared_ptr<OutsideLine> line_;
-  std::vector<Call> waiting_, open_;
+  // An answer is waited for as long as the skill does, whose time may stand; from when it is told to end, as long as
+  // this says.
+  struct Open {
+    Call call;
+    Clock::time_point until = Clock::time_point::max();
+  };
+  std::vector<Call> waiting_;
+  std::vector<Open> open_;
 };
 
 }  // namespace pons::gate::ros

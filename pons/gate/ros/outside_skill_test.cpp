@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "pons/gate/ros/action.hpp"
+#include "pons/gate/ros/interface_folders.hpp"
 #include "pons/gate/ros/service.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
 #include "pons/gate/ros/test_outside.hpp"
@@ -277,6 +278,37 @@ TEST_F(OutsideSkillTest, AServerThatDiesInTheMiddleIsNamed) {
   there_.reset();
   ASSERT_TRUE(comes([&] { return ended(); }));
   expect_failed("the server has gone", StopResult::kUncertain);
+}
+
+// While the robot is held a skill's time stands, and its server may be at it for hours.
+TEST_F(OutsideSkillTest, AnEndIsWaitedForUntilTheGoalIsGivenUp) {
+  serve_navigation();
+  const auto skills = outside_skills(kNavigateTo);
+  ASSERT_TRUE(skills) << skills.error().line();
+  wire::InterfaceTypes types = interface_types({});
+  const auto form = std::make_shared<const OutsideForm>(OutsideForm::compile(skills->front(), types).value());
+  const auto line = std::make_shared<OutsideLine>();
+  const auto server = OutsideServer::open(*here_, form, line);
+  ASSERT_TRUE(server) << server.error().line();
+  const auto call =
+      std::make_shared<OutsideCall>(GoalId{1}, form->request({{"x", 1.0}, {"y", 0.0}}, GoalId{1}).value());
+  line->put(call);
+  OutsideCall::News news;
+  const auto hears = [&](std::chrono::hours later, const std::function<bool()>& done) {
+    return spin_until({here_.get(), there_.get()}, [&] {
+      (*server)->spin(Part::Clock::now() + later);
+      news = call->look();
+      return done();
+    });
+  };
+  ASSERT_TRUE(hears(0h, [&] { return news.accepted; }));
+  ASSERT_TRUE(hears(2h, [&] { return goals_.size() == 1; }));
+  EXPECT_FALSE(news.end);
+  call->cancel();
+  ASSERT_TRUE(hears(2h, [&] { return cancels_ == 1; }));
+  EXPECT_FALSE(news.end);
+  ASSERT_TRUE(hears(3h, [&] { return news.end.has_value(); })) << "it does not answer";
+  EXPECT_EQ(news.end->how, OutsideCall::End::How::kLost);
 }
 
 TEST_F(OutsideSkillTest, AServicesAnswerSaysWhetherItWorked) {

@@ -212,11 +212,13 @@ Expected<std::unique_ptr<ByteClient>> ByteClient::open(Node& node, std::string n
   return std::make_unique<ByteClient>(node, std::move(*ends), std::move(name));
 }
 
-Expected<void> ByteClient::call(std::vector<std::byte> bytes, std::chrono::milliseconds patience, Replied replied) {
+Expected<std::int64_t> ByteClient::call(std::vector<std::byte> bytes, std::optional<std::chrono::milliseconds> patience,
+                                        Replied replied) {
   const auto number = ends_->ask(bytes);
   if (!number) return std::unexpected(number.error());
-  waiting_.emplace(*number, Waiting{std::move(replied), Clock::now() + patience});
-  return {};
+  waiting_.emplace(*number,
+                   Waiting{std::move(replied), patience ? Clock::now() + *patience : Clock::time_point::max()});
+  return *number;
 }
 
 void ByteClient::spin(Clock::time_point now) {

@@ -183,8 +183,12 @@ class ByteClient final : public Part {
   [[nodiscard]] bool reaches(const Guid& server) const { return ends_->reaches(server); }
   [[nodiscard]] const std::string& name() const { return name_; }
   // `bytes` as for ServerEnds::answer(). `replied` is called once, in spin(): with the reply, or the error that there
-  // was none in time. Error, at once: no server is there.
-  [[nodiscard]] Expected<void> call(std::vector<std::byte> bytes, std::chrono::milliseconds patience, Replied replied);
+  // was none in time; without patience, in its own time. Returns by what to forget it. Error, at once: no server is
+  // there.
+  [[nodiscard]] Expected<std::int64_t> call(std::vector<std::byte> bytes,
+                                            std::optional<std::chrono::milliseconds> patience, Replied replied);
+  // What comes of that call nobody wants to hear any more.
+  void forget(std::int64_t call) { waiting_.erase(call); }
 
   void spin(Clock::time_point now) override;
   [[nodiscard]] Clock::time_point due() const override;
@@ -215,12 +219,13 @@ class Client final : public Part {
                                     Replied replied) {
     auto bytes = bytes_of_request(request, bytes_->name());
     if (!bytes) return std::unexpected(bytes.error());
-    return bytes_->call(*std::move(bytes), patience, [replied = std::move(replied)](const auto& reply) {
+    const auto called = bytes_->call(*std::move(bytes), patience, [replied = std::move(replied)](const auto& reply) {
       if (!reply) return replied(std::unexpected(reply.error()));
       typename S::Response response;
       const auto read = wire::decode(*reply, response);
       replied(read ? Expected<typename S::Response>(std::move(response)) : std::unexpected(read.error()));
     });
+    return called ? Expected<void>{} : std::unexpected(called.error());
   }
 
   void spin(Clock::time_point now) override { bytes_->spin(now); }
