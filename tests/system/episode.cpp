@@ -246,7 +246,11 @@ void Episode::buttons() {
 // ---- the bridge ----
 
 Plan Episode::draw_plan() {
-  if (options_.only) return steps_.ends().empty() && !steps_.was_held_up() ? *options_.only : Plan{};
+  if (options_.before && steps_.ends().empty()) return *options_.before;
+  if (options_.only) {
+    const std::size_t gone = options_.before ? 1 : 0;
+    return steps_.ends().size() == gone && !steps_.was_held_up() ? *options_.only : Plan{};
+  }
   Plan plan;
   const double fate = random_.uniform();
   plan.fate = fate < 0.45 ? Fate::kDies : fate < 0.75 ? Fate::kLosesPower : Fate::kIsHeldUp;

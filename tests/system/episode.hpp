@@ -47,7 +47,8 @@ struct EpisodeOptions {
   Duration faults_for = std::chrono::minutes(10);  // then calm
   Disk::Syncs syncs = Disk::Syncs::kTruly;
   Trace::Told told = Trace::Told::kAtTheEnd;
-  std::optional<Plan> only{};  // the only thing that befalls a bridge process, the first that comes by there
+  std::optional<Plan> before{};  // what befalls one before that
+  std::optional<Plan> only{};    // the only thing that befalls a bridge process, the first that comes by there
 };
 
 struct EpisodeResult {
