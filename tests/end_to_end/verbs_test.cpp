@@ -195,6 +195,14 @@ TEST_P(VerbsOfASkill, HaltedItStandsAtOnceAndTheCellGoesOn) {
 INSTANTIATE_TEST_SUITE_P(Skills, VerbsOfASkill, testing::ValuesIn(kUses),
                          [](const auto& use) { return std::string(use.param.name); });
 
+TEST(Verbs, NoSkillOfAnArmIsLeftOut) {
+  TaskRun cell(small_cell_with_block());
+  for (const auto& [name, type] : cell.above().arms.front()->registry.all()) {
+    const std::string_view use = name == "pick" || name == "place" ? "pick_and_place" : std::string_view(name);
+    EXPECT_EQ(std::ranges::count(kUses, use, [](const Use& each) { return std::string_view(each.name); }), 1) << name;
+  }
+}
+
 // What had left the cups before the halt has arrived, and what had not is still held.
 TEST(Verbs, HaltedAtAnyMomentOfLettingGoItKnowsWhatItPlaced) {
   const auto let_go = [](TaskRun& cell) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include "pons/skills/base/base_skills.hpp"
 
@@ -22,7 +23,7 @@ class Scan final : public task::Skill {
   Scan(Chassis& chassis, Duration looks, Time now) : chassis_(chassis), looks_(looks), begun_(now) {}
 
   Progress tick(Time now) override {
-    if (over_) return ended({Status::kFailed, "cancelled"});
+    if (!stopped_.empty()) return ended({Status::kFailed, stopped_});
     if (paused_) return ended({Status::kPaused});
     const auto& belief = chassis_.belief();
     if (belief && belief->stamp >= begun_ && (scans_ == 0 || belief->stamp > last_)) take_in(*belief);
@@ -38,8 +39,8 @@ class Scan final : public task::Skill {
     begun_ = now;
     scans_ = 0;
   }
-  void cancel(Time) override { over_ = true; }
-  void halt(Time) override { over_ = true; }
+  void cancel(Time) override { stopped_ = "cancelled"; }
+  void halt(Time) override { stopped_ = "halted"; }
 
  private:
   static Progress ended(Progress progress) {
@@ -91,7 +92,8 @@ class Scan final : public task::Skill {
   Time begun_, last_;
   int scans_ = 0;
   BaseBelief newest_;
-  bool paused_ = false, over_ = false;
+  bool paused_ = false;
+  std::string stopped_;  // how, once it is
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ class Speak final : public task::Skill {
   Speak& operator=(const Speak&) = delete;
 
   Progress tick(Time now) override {
-    if (over_) return ended({Status::kFailed, "cancelled"});
+    if (!stopped_.empty()) return ended({Status::kFailed, stopped_});
     if (paused_) return ended({Status::kPaused});
     if (!speaks_) {
       if (auto begun = speech_.begin(text_, now); !begun) return {Status::kFailed, begun.error().line()};
@@ -37,9 +37,12 @@ class Speak final : public task::Skill {
   void resume(Time) override { paused_ = false; }
   void cancel(Time) override {
     fall_silent();
-    over_ = true;
+    stopped_ = "cancelled";
   }
-  void halt(Time now) override { cancel(now); }
+  void halt(Time) override {
+    fall_silent();
+    stopped_ = "halted";
+  }
 
  private:
   static Progress ended(Progress progress) {
@@ -52,7 +55,8 @@ class Speak final : public task::Skill {
 
   task::Speech& speech_;
   std::string text_;
-  bool speaks_ = false, paused_ = false, over_ = false;
+  bool speaks_ = false, paused_ = false;
+  std::string stopped_;  // how, once it is
 };
 
 }  // namespace
