@@ -74,7 +74,7 @@ void BridgeSide::recall(const bridge::Event& note) {
     if (!of.empty() && of != robot->skills.name) continue;
     robot->armed_before = robot->armed_before || note.kind == "armed";
     if (note.kind == "person") robot->arming.recall(task::text_of(note.detail, "asks"));
-    if (note.kind == "carries") robot->carried = note.detail.value("load", Json{});
+    if (note.kind == bridge::kCarriesEvent) robot->carried = note.detail.value("load", Json{});
   }
 }
 
@@ -347,7 +347,7 @@ void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBeli
   const auto object = std::ranges::find(objects, code, &ObjectBelief::code);
   if (code.empty() || object == objects.end()) return;
   const auto x_axis = object->world_from_top.linear().col(0);
-  bridge_.note("seen",
+  bridge_.note(bridge::kSeenEvent,
                {{"track", object->track},
                 {"position_m", task::list_of(object->world_from_top.translation())},
                 {"yaw_rad", std::atan2(x_axis.y(), x_axis.x())},
@@ -364,7 +364,7 @@ Expected<void> BridgeSide::note_carried(Robot& robot, Time now) {
   if (carries == robot.carried) return {};
   const std::string code = task::text_of(carries.is_object() ? carries : robot.carried, "code");
   robot.carried = std::move(carries);
-  bridge_.note("carries", {{"robot", robot.skills.name}, {"load", robot.carried}}, now, code);
+  bridge_.note(bridge::kCarriesEvent, {{"robot", robot.skills.name}, {"load", robot.carried}}, now, code);
   return bridge_.commit(now);
 }
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <cassert>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "pons/bridge/journal/layout.hpp"
@@ -359,20 +360,41 @@ Expected<void> Journal::close_order(std::string_view id, task::Outcome outcome, 
   return closed;
 }
 
+// In this transaction. Notes from `still_true` on stay, and of orders with an open task.
+Expected<std::int64_t> Journal::Impl::drop(std::int64_t keep, std::int64_t still_true) {
+  constexpr std::string_view kUpTo =
+      "(SELECT sequence FROM event WHERE kind = 'ended' ORDER BY sequence DESC LIMIT 1 OFFSET ?1)";
+  auto of_tasks =
+      database->prepare(fmt::format("DELETE FROM event WHERE kind NOT IN ('accepted', 'ended') AND task IN "
+                                    "(SELECT task FROM event WHERE kind = 'ended' AND sequence <= {})",
+                                    kUpTo));
+  if (!of_tasks) return std::unexpected(of_tasks.error());
+  auto of_orders = database->prepare(fmt::format(
+      "DELETE FROM event WHERE task = '' AND order_id <> '' AND kind IN ('{}', '{}') AND sequence < ?2 AND sequence <= "
+      "{} "
+      "AND order_id NOT IN (SELECT a.order_id FROM event a LEFT JOIN event e ON e.task = a.task AND e.kind = 'ended' "
+      "WHERE a.kind = 'accepted' AND e.sequence IS NULL)",
+      kSeenEvent, kCarriesEvent, kUpTo));
+  if (!of_orders) return std::unexpected(of_orders.error());
+  if (auto done = write(of_tasks->bind(keep)); !done) return std::unexpected(done.error());
+  const std::int64_t dropped = database->changes();
+  if (auto done = write(of_orders->bind(keep).bind(still_true)); !done) return std::unexpected(done.error());
+  return dropped + database->changes();
+}
+
 Expected<std::int64_t> Journal::compact(std::int64_t keep) {
   assert(keep >= 0);
   if (auto durable = commit(); !durable) return std::unexpected(durable.error());
-  const auto drop = [&]() -> Expected<std::int64_t> {
-    auto dropped = impl_->database->prepare(
-        "DELETE FROM event WHERE kind NOT IN ('accepted', 'ended') AND task IN (SELECT task FROM event WHERE kind = "
-        "'ended' AND sequence <= (SELECT sequence FROM event WHERE kind = 'ended' ORDER BY sequence DESC LIMIT 1 "
-        "OFFSET ?1))");
-    if (!dropped) return std::unexpected(dropped.error());
-    if (auto done = impl_->write(dropped->bind(keep)); !done) return std::unexpected(done.error());
-    return impl_->database->changes();
-  };
+  std::map<std::string, std::int64_t> held;  // by robot: the note of what it held last
+  auto read = each_note([&](const Event& event) -> Expected<void> {
+    if (event.kind == kCarriesEvent) held[task::text_of(event.detail, "robot")] = event.sequence;
+    return {};
+  });
+  if (!read) return std::unexpected(read.error());
+  std::int64_t still_true = std::numeric_limits<std::int64_t>::max();
+  for (const auto& [robot, sequence] : held) still_true = std::min(still_true, sequence);
   if (auto begun = impl_->ensure_transaction(); !begun) return std::unexpected(begun.error());
-  const auto dropped = drop();
+  const auto dropped = impl_->drop(keep, still_true);
   if (!dropped) return dropped;
   if (*dropped > 0) {
     if (auto noted = note(impl_->last, kCompactedEvent, {{"events", *dropped}}); !noted)

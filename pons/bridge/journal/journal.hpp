@@ -74,12 +74,14 @@ struct Counts {
   std::int64_t accepted = 0, open = 0, succeeded = 0, failed = 0, cancelled = 0, exception = 0, events = 0;
 };
 
-// Kinds that the journal itself writes and reads. Others are whoever's that notes them.
+// Kinds that the journal itself writes, or reads. Others are whoever's that notes them.
 inline constexpr std::string_view kAcceptedEvent = "accepted";  // detail: the task
 inline constexpr std::string_view kStartedEvent = "started";    // the task has left the queue: it may have moved things
 inline constexpr std::string_view kEndedEvent = "ended";        // detail: {"outcome", "reason", "detail"}
 inline constexpr std::string_view kCompactedEvent = "compacted";   // {"events": how many were dropped}
 inline constexpr std::string_view kLeftOutEvent = "left_out";      // of an open task; likewise, in all
+inline constexpr std::string_view kSeenEvent = "seen";             // where an order's parcel was
+inline constexpr std::string_view kCarriesEvent = "carries";       // {"robot", "load"}: its newest says what it holds
 inline constexpr std::string_view kClockBackEvent = "clock_back";  // {"by_s"}: until it has caught up, time stands
 
 class Journal {
@@ -184,7 +186,8 @@ class Journal {
   [[nodiscard]] std::int64_t run() const;
 
   // Drops what happened to ended tasks between acceptance and outcome, but for the `keep` (0 or more) that ended last;
-  // ids stay taken and outcomes known. Then gives the freed space back to the disk. Returns how many events were
+  // ids stay taken and outcomes known. With them go the notes of where their parcels were seen and carried, but for
+  // what each robot held last. Then gives the freed space back to the disk. Returns how many events were
   // dropped; a note says so, too. Error: the file cannot be written, it holds what it held; or no space was freed.
   [[nodiscard]] Expected<std::int64_t> compact(std::int64_t keep);
   // Whether the file itself is whole, as far as its database can tell. Error: what is not.

@@ -36,6 +36,7 @@ struct Journal::Impl {
   Statement add_first, add_event, add_note, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();
+  [[nodiscard]] Expected<std::int64_t> drop(std::int64_t keep, std::int64_t still_true);
   [[nodiscard]] Expected<void> prepare(Mode mode);
   [[nodiscard]] Expected<void> ensure_transaction();
   [[nodiscard]] Expected<void> make_durable();
