@@ -1,5 +1,6 @@
 // What every journal does, as a file or in a database: this is built into a test program for each.
 #include <algorithm>
+#include <array>
 
 #include "pons/bridge/journal/journal.hpp"
 #include "pons/bridge/journal/story.hpp"
@@ -267,16 +268,17 @@ TEST_P(AnyJournal, CompactedItStillKnowsEveryIdAndOutcome) {
 TEST_P(AnyJournal, CompactedItKnowsWhatEachRobotHoldsAndForgetsWhereEndedOrdersWere) {
   const auto journal = open();
   for (const char* const order : {"P1", "P2", "P3"}) {
-    for (const auto kind : {kSeenEvent, std::string_view("ride")}) ASSERT_TRUE(journal->note(at(1), kind, {}, order));
+    ASSERT_TRUE(journal->note(at(1), kSeenEvent, {}, order) && journal->note(at(1), "ride", {}, order));
     ASSERT_TRUE(journal->accept(sample(order), at(1)));
   }
-  for (const auto& [robot, order] : {std::pair{"left", "P1"}, {"left", "P1"}, {"right", "P2"}, {"left", "P3"}})
-    ASSERT_TRUE(journal->note(at(1), kCarriesEvent, {{"robot", robot}}, order));
-  for (const char* const order : {"P1", "P2"})
-    ASSERT_TRUE(journal->outcome(order, task::Outcome::kSucceeded, "", at(3)));
+  constexpr std::array<std::array<const char*, 2>, 4> kHeld{
+      {{"left", "P1"}, {"left", "P1"}, {"right", "P2"}, {"left", "P3"}}};
+  for (const auto& [robot, order] : kHeld) ASSERT_TRUE(journal->note(at(1), kCarriesEvent, {{"robot", robot}}, order));
+  for (const char* const id : {"P1", "P2"}) ASSERT_TRUE(journal->outcome(id, task::Outcome::kFailed, "", at(3)));
   ASSERT_EQ(journal->compact(0), 4) << "P1 and P2 as they were seen, and what was held before";
+  const auto notes = journal->notes().value();
   std::string left;
-  for (const Event& event : journal->notes().value()) left += event.kind + event.order + " ";
+  for (const Event& event : notes) left += event.kind + event.order + " ";
   EXPECT_EQ(left, "rideP1 rideP2 seenP3 rideP3 carriesP2 carriesP3 compacted ");
 }
 
