@@ -75,7 +75,7 @@ class Compiler {
   std::vector<Scope> scopes_;
   std::vector<std::string> within_;  // the trees that this one stands in
   std::size_t depth_ = 0;
-  int halting_ = 0;  // so many of the nodes above may halt this one
+  Differences::Above above_;
   Differences differences_;
   EntryUses uses_;
   std::size_t bytes_ = 0;
@@ -148,9 +148,8 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
   program_.nodes.push_back({.kind = info != nullptr ? info->kind : Kind::kSkill});
   Node made = program_.nodes.back();
   made.children = static_cast<std::int32_t>(element.children.size());
-  differences_.look(element, made.kind, halting_);
-  const bool halts = may_halt(made.kind) || element.attribute("_while") != nullptr;
-  halting_ += halts ? 1 : 0;
+  differences_.look(element, made.kind, above_);
+  above_.count(made.kind, element, 1);
   if (auto done = conditions(element, scope, made); !done) return done;
   const auto fewest = info != nullptr ? info->fewest_children : 0, most = info != nullptr ? info->most_children : 0;
   if (made.children < fewest || made.children > most) {
@@ -173,7 +172,7 @@ Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
     }
   }
   --depth_;
-  halting_ -= halts ? 1 : 0;
+  above_.count(made.kind, element, -1);
   made.end = static_cast<std::int32_t>(program_.nodes.size());
   stir(program_.fingerprint, "end");
   program_.nodes[index] = made;

@@ -9,6 +9,24 @@
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge::tree {
+namespace {
+
+bool makes_something_of_failure(Kind kind) {
+  switch (kind) {
+    case Kind::kFallback:
+    case Kind::kAsyncFallback:
+    case Kind::kReactiveFallback:
+    case Kind::kTryCatch:
+    case Kind::kInverter:
+    case Kind::kForceSuccess:
+    case Kind::kRetry:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
 
 void Differences::add(std::string_view where, std::string_view what) {
   if (lines_.size() < kMost) {
@@ -18,17 +36,28 @@ void Differences::add(std::string_view where, std::string_view what) {
   }
 }
 
-void Differences::look(const Element& element, Kind kind, int halting) {
+void Differences::Above::count(Kind kind, const Element& element, int by) {
+  if (may_halt(kind) || element.attribute("_while") != nullptr) halting += by;
+  if (makes_something_of_failure(kind)) catching += by;
+  if (kind == Kind::kParallel || kind == Kind::kParallelAll) beside += by;
+}
+
+void Differences::look(const Element& element, Kind kind, const Above& above) {
   const auto tell = [&](Told what, std::string_view text) {
     if ((std::exchange(told_, told_ | what) & what) == 0) add(element.where, text);
   };
-  if (kind == Kind::kSkill && halting > 0)
+  if (kind == Kind::kSkill && above.halting > 0)
     tell(kSkill,
          "a skill that a node above halts leaves the world safe first, while the tree goes on; what needs the same "
          "waits");
+  if (kind == Kind::kSkill && above.catching > 0)
+    tell(kException,
+         "an exception of a skill (handled, but not as asked) ends the whole tree; no node above catches it");
+  if (kind == Kind::kSkill && above.beside > 0)
+    tell(kBeside, "skills that run at the same time and need the same resource wait for one another");
   if (kind == Kind::kTimeout || kind == Kind::kDelay || kind == Kind::kSleep)
     tell(kTime, "time stands while the task is paused, and while the robot is stopped");
-  if (kind == Kind::kPrecondition && halting > 0)
+  if (kind == Kind::kPrecondition && above.halting > 0)
     tell(kPrecondition, "a Precondition that was halted asks its condition anew; there it goes on as if that held");
   const auto asynchronous = std::ranges::count(element.children, "AsyncSequence", &Element::tag);
   if (kind == Kind::kReactiveSequence && asynchronous > 1)

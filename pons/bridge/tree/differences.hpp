@@ -18,8 +18,13 @@ class Differences {
  public:
   static constexpr std::size_t kMost = 32;  // lines; a tree that somebody sends may be full of them
 
-  // A node that so many above it may halt. Of each sort of difference the first is told.
-  void look(const Element& element, Kind kind, int halting);
+  // So many of the nodes above one may halt it, make something else of its failure, or run it beside others.
+  struct Above {
+    int halting = 0, catching = 0, beside = 0;
+    void count(Kind kind, const Element& element, int by);
+  };
+  // Of each sort of difference the first is told.
+  void look(const Element& element, Kind kind, const Above& above);
   // An attribute that is no port's. What means nothing is told once for each name. Error: one that begins with an
   // underscore and is so near to a name that means something that it must be a slip.
   [[nodiscard]] Expected<void> look_at_attribute(const std::string& name, const std::string& where);
@@ -29,7 +34,7 @@ class Differences {
   [[nodiscard]] std::vector<std::string> take();
 
  private:
-  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8 };
+  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8, kException = 16, kBeside = 32 };
   int told_ = 0;
   std::set<std::string> strays_;  // attributes that were told of
   std::vector<std::string> lines_;

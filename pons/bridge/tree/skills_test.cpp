@@ -1,5 +1,6 @@
 // What a leaf starts its skill with, and what of its end is written on the blackboard.
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -164,6 +165,31 @@ TEST_F(SkillLeaves, SoManyResourcesOnly) {
   for (int i = 0; i < 65; ++i) type.resources.push_back(fmt::format("r{}", i));
   skills_.add(type);
   EXPECT_EQ(refusal(in_document("<greedy/>")), "test:1: its skills need more than 64 resources; divide it");
+}
+
+// ---- what of it is otherwise than in BehaviorTree.CPP ----
+
+TEST_F(SkillLeaves, EachSortOfDifferenceIsToldWithItsPlace) {
+  Actor pick("pick", {{}});
+  add(pick);
+  const auto told = [&](const std::string& nodes) {
+    std::string lines;
+    const auto document = read_document(in_document(nodes), "test");
+    const auto program = compile(*document, "", skills_);
+    EXPECT_TRUE(program) << program.error().line();
+    for (const std::string& line : (*program)->differences) lines += line + "\n";
+    return lines;
+  };
+  using ::testing::HasSubstr;
+  EXPECT_EQ(told("<Sequence><pick/><pick/><Repeat num_cycles=\"2\"><pick/></Repeat></Sequence>"), "");
+  for (const char* const tag : {"Fallback", "ReactiveFallback", "Inverter", "ForceSuccess"})
+    EXPECT_THAT(told(fmt::format("<{0}>\n<pick/></{0}>", tag)),
+                HasSubstr("test:2: an exception of a skill (handled, but not as asked) ends the whole tree"));
+  EXPECT_THAT(told("<RetryUntilSuccessful num_attempts=\"2\"><pick/></RetryUntilSuccessful>"), HasSubstr("exception"));
+  EXPECT_THAT(told("<Parallel>\n<pick/>\n<pick/></Parallel>"),
+              HasSubstr("test:2: skills that run at the same time and need the same resource wait for one another"));
+  EXPECT_THAT(told("<Timeout msec=\"9\"><pick/></Timeout>"), HasSubstr("leaves the world safe first"));
+  EXPECT_THAT(told("<Sleep msec=\"9\"/>"), HasSubstr("time stands while the task is paused"));
 }
 
 }  // namespace
