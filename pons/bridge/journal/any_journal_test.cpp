@@ -276,9 +276,8 @@ TEST_P(AnyJournal, CompactedItKnowsWhatEachRobotHoldsAndForgetsWhereEndedOrdersW
   for (const auto& [robot, order] : kHeld) ASSERT_TRUE(journal->note(at(1), kCarriesEvent, {{"robot", robot}}, order));
   for (const char* const id : {"P1", "P2"}) ASSERT_TRUE(journal->outcome(id, task::Outcome::kFailed, "", at(3)));
   ASSERT_EQ(journal->compact(0), 4) << "P1 and P2 as they were seen, and what was held before";
-  const auto notes = journal->notes().value();
   std::string left;
-  for (const Event& event : notes) left += event.kind + event.order + " ";
+  for (const auto notes = journal->notes().value(); const Event& event : notes) left += event.kind + event.order + " ";
   EXPECT_EQ(left, "rideP1 rideP2 seenP3 rideP3 carriesP2 carriesP3 compacted ");
 }
 
