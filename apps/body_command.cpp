@@ -61,7 +61,8 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   auto setup = body_setup(options.setup, options.parcels.seed, world);
   if (!setup) return bad_input(setup.error());
   setup->faults.leave_out(world::Strikes::kBrain);
-  setup->faults.leave_out(world::Strikes::kProcess);
+  setup->faults.leave_out(world::Strikes::kBridge);
+  setup->faults.leave_out(world::Strikes::kLoops);
   const std::string name = options.link.empty() ? default_link(world.name) : options.link;
   const auto identity = identity_of(world, manifest);
   if (!identity) return bad_input(identity.error());
@@ -71,7 +72,7 @@ int run_body(const BodyOptions& options, const world::World& world, const world:
   if (!body) return bad_input(body.error());
   LoopLog log;
   if (auto opened = log.open(options.log); !opened) return bad_input(opened.error());
-  say(stderr, left_out_line(setup->faults, "give pons bridge the plan, too, and kill one to have it crash"));
+  say(stderr, left_out_line(setup->faults, "give pons bridge the plan, too; control loops end with their body"));
 
   const auto tell_people = [&](std::string_view what) {
     if (!options.quiet) say(stderr, fmt::format("{}: {}\n", name, what));

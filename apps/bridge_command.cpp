@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "apps/assembly.hpp"
@@ -11,6 +12,7 @@
 #include "apps/brain_faults.hpp"
 #include "apps/commands.hpp"
 #include "apps/foxglove_sink.hpp"
+#include "apps/kills_itself.hpp"
 #include "apps/meeting.hpp"
 #include "apps/outside.hpp"
 #include "apps/paths.hpp"
@@ -127,7 +129,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
     along->withdraw();
     return bad_input(half.error());
   }
-  say(stderr, left_out_line(plan, "give pons body the plan, too, and kill this bridge to have it crash"));
+  say(stderr, left_out_line(plan, "give pons body the plan, too; control loops end with their body"));
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
   const runner::Crossing crossing = place.crossing({});
   if (auto begun = runner::await_begin(crossing, interrupted); !begun) return failed(begun.error());
@@ -135,10 +137,17 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   auto taken = (*half)->bridge_side->take_over(*(*half)->journal, border.clock.now());
   if (!taken) return bad_run(taken.error());
 
+  std::optional<KillsItself> dies;
+  constexpr auto kCrash = world::Fault::kBridgeCrash;
+  if (plan[kCrash].often > 0)
+    dies.emplace(plan[kCrash], world::fault_stream(options.parcels.seed, kCrash),
+                 [&border] { return border.clock.now(); });
+
   const auto total = static_cast<std::int64_t>(manifest.size());
   Progress progress(stderr, total);
   const runner::Watch watch = watch_of(options, **half, *along, border, progress, total);
   const auto result = runner::run_bridge_process(*(*half)->bridge_side, *(*half)->observer, crossing, watch);
+  dies.reset();
   progress.finish();
   const brain::Tally tally = (*half)->dispatcher->tally();
   // Said at once; what perception is in the middle of may take its time to end.
@@ -184,7 +193,7 @@ int bridge(const BridgeCommandOptions& options) {
   auto plan = world::load_faults(*world, options.faults);
   if (!plan) return bad_input(plan.error());
   plan->leave_out(world::Strikes::kBody);
-  plan->leave_out(world::Strikes::kProcess);
+  plan->leave_out(world::Strikes::kLoops);
   // Before it waits: the files may have changed by then.
   const auto identity = identity_of(*world, *manifest);
   if (!identity) return bad_input(identity.error());

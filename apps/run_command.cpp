@@ -206,7 +206,10 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
   auto setup = body_setup(options.body, options.parcels.seed, world);
   if (!setup) return std::unexpected(setup.error());
   setup->stays = options.stay;
-  if (options.realtime) setup->faults.leave_out(world::Strikes::kProcess);
+  if (options.realtime) {
+    setup->faults.leave_out(world::Strikes::kBridge);
+    setup->faults.leave_out(world::Strikes::kLoops);
+  }
   return CellInputs{std::move(*manifest), std::move(*setup)};
 }
 
@@ -285,7 +288,7 @@ int run(const RunOptions& options) {
     along->withdraw();
     return bad_input(cell.error());
   }
-  say(stderr, left_out_line((*cell)->body->faults, "by the clock a bridge is a process to kill: tools/kill_processes"));
+  say(stderr, left_out_line((*cell)->body->faults, "by the clock give pons bridge the plan, a process of its own"));
   return run_cell(options, **cell, *along, static_cast<std::int64_t>(manifest.size()));
 }
 

@@ -37,10 +37,10 @@ constexpr std::array<Kind, kFaults> kKinds{{{"missed_grasp", Unit::kPick, Strike
                                             {"shifted_view", Unit::kHour, Strikes::kBody},
                                             {"brain_stall", Unit::kHour, Strikes::kBrain},
                                             {"vacuum_weak", Unit::kHour, Strikes::kBody},
-                                            {"bridge_crash", Unit::kHour, Strikes::kProcess},
+                                            {"bridge_crash", Unit::kHour, Strikes::kBridge},
                                             {"brain_lie", Unit::kMoment, Strikes::kBrain},
                                             {"network_loss", Unit::kHour, Strikes::kBrain},
-                                            {"loop_crash", Unit::kHour, Strikes::kProcess}}};
+                                            {"loop_crash", Unit::kHour, Strikes::kLoops}}};
 
 constexpr std::uint64_t kFaultStream = 0x6661756c;
 constexpr double kMostAnHour = 3600, kMostTimes = 1000;

@@ -41,9 +41,10 @@ inline constexpr std::size_t kFaults = 15;
 
 // Where a fault strikes, and so which process can inject it.
 enum class Strikes : std::uint8_t {
-  kBody,     // the body, its cameras, its belt
-  kBrain,    // the brain, or between it and the bridge
-  kProcess,  // the bridge or the loops as a whole: in virtual time only; by the clock, processes that can be killed
+  kBody,    // the body, its cameras, its belt
+  kBrain,   // the brain, or between it and the bridge
+  kBridge,  // the bridge as a whole: in virtual time, or where it is a process of its own
+  kLoops,   // the control loops as a whole: in virtual time only, for by the clock a simulated body dies with them
 };
 [[nodiscard]] Strikes strikes(Fault fault);
 

@@ -77,7 +77,7 @@ TEST_F(FaultsTest, ALieIsAMomentAndACrashLasts) {
   EXPECT_DOUBLE_EQ((*plan)[Fault::kBridgeCrash].longest_s, 5);
   EXPECT_DOUBLE_EQ((*plan)[Fault::kNetworkLoss].shortest_s, 2);
   EXPECT_DOUBLE_EQ((*plan)[Fault::kLoopCrash].longest_s, 3);
-  EXPECT_EQ(strikes(Fault::kLoopCrash), Strikes::kProcess);
+  EXPECT_EQ(strikes(Fault::kLoopCrash), Strikes::kLoops);
   expect_says(refusal("brain_lie: {an_hour: 6, lasts_s: [5, 9]}\n"), {"brain_lie", "lasts_s"});
   expect_says(refusal("brain_lie: {an_hour: 4000}\n"), {"brain_lie.an_hour", "0 to 3600"});
   expect_says(refusal("bridge_crash: {an_hour: 2}\n"), {"bridge_crash", "lasts_s", "missing"});

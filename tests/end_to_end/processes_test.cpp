@@ -99,6 +99,30 @@ TEST_F(Processes, AgreeWithLockstepOnEachOfFifteenParcels) {
   EXPECT_GT(report["throughput"]["parcels_per_hour"], 0);
 }
 
+// By itself, with SIGKILL, at any moment; what starts it again is a loop, as of a shell.
+TEST_F(Processes, BridgesThatThePlanKillsAreFollowedUntilAllIsDone) {
+  constexpr int kParcels = 6, kMostBridges = 40;
+  write_text(folder_ / "deaths.yaml", "bridge_crash: {an_hour: 450, lasts_s: [0.1, 0.5]}\n");
+  Running body_process(folder_.path(), "body", body(kParcels));
+  std::vector<std::string> arguments = bridge(kParcels);
+  arguments.insert(arguments.end(), {"--faults", folder_ / "deaths.yaml"});
+  int killed = 0;
+  Finished ended;
+  while (killed < kMostBridges) {
+    ended = Running(folder_.path(), "bridge", arguments).wait();
+    if (ended.code != -SIGKILL) break;
+    ++killed;
+  }
+  EXPECT_EQ(ended.code, 0) << ended.out << ended.err;
+  EXPECT_GE(killed, 1);
+  const Finished told = body_process.wait();
+  EXPECT_EQ(told.code, 0) << told.out << told.err;
+  const nlohmann::json report = read_json(folder_ / "body.json");
+  expect_accounted_for(report);
+  EXPECT_EQ(report["parcels"]["missorted"], 0);
+  expect_nothing_left();
+}
+
 TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlacesIt) {
   constexpr int kParcels = 6;
   Running body_process(folder_.path(), "body", body(kParcels));
@@ -149,19 +173,19 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
 // Of one plan the body does what strikes it, and the bridge what strikes its brain; each names the rest.
 TEST_F(Processes, EachDoesItsPartOfAPlanOfFaults) {
   write_text(folder_ / "plan.yaml",
-             "brain_lie: {an_hour: 720}\nmissed_grasp: {a_pick: 0.5}\nbridge_crash: {an_hour: 60, lasts_s: [1, 2]}\n");
+             "brain_lie: {an_hour: 720}\nmissed_grasp: {a_pick: 0.5}\nloop_crash: {an_hour: 60, lasts_s: [1, 2]}\n");
   auto words = body(2), above = bridge(2);
   for (auto* const each : {&words, &above}) each->insert(each->end(), {"--faults", folder_ / "plan.yaml"});
   Running body_process(folder_.path(), "body", words);
   Running bridge_process(folder_.path(), "bridge", above);
   const Finished bridge_told = bridge_process.wait(), body_told = body_process.wait();
-  EXPECT_THAT(body_told.err, HasSubstr("pons: faults of plan that never come here: brain_lie, bridge_crash; "));
-  EXPECT_THAT(bridge_told.err, HasSubstr("pons: faults of plan that never come here: missed_grasp, bridge_crash; "));
+  EXPECT_THAT(body_told.err, HasSubstr("pons: faults of plan that never come here: brain_lie, loop_crash; "));
+  EXPECT_THAT(bridge_told.err, HasSubstr("pons: faults of plan that never come here: missed_grasp, loop_crash; "));
   EXPECT_TRUE(std::regex_search(bridge_told.out, std::regex("fault: [1-9][0-9]* brain_lie"))) << bridge_told.out;
   const nlohmann::json report = read_json(folder_ / "body.json");
   EXPECT_GE(report["faults"].value("missed_grasp", 0), 1) << report.dump(2);
   EXPECT_FALSE(report["faults"].contains("brain_lie")) << "the bridge tells of it";
-  EXPECT_EQ(report["faults_left_out"], nlohmann::json::array({"brain_lie", "bridge_crash"}));
+  EXPECT_EQ(report["faults_left_out"], nlohmann::json::array({"brain_lie", "loop_crash"}));
 }
 
 TEST_F(Processes, APersonsStopOutlivesTheBridgeThatWasTold) {
