@@ -65,7 +65,7 @@ TEST(LabelTest, GivesEachOfTwoTouchingParcelsItsOwnCode) {
 TEST(LabelTest, LooksForTheOtherLabelOfOneThatANeighboursPictureShows) {
   SyntheticBelt belt;
   Perception perception(belt.world, model::RobotModel::load(belt.world.robot).value());
-  const auto stuck_on = [](const Thing& thing, const char* code, Vector3 offset_m) {
+  const auto stuck_on = [](const Thing& thing, const char* code, const Vector3& offset_m) {
     const Vector3 at_m = Eigen::AngleAxisd(thing.yaw_rad, Vector3::UnitZ()) * offset_m;
     return Thing{.x_m = thing.x_m + at_m.x(),
                  .y_m = thing.y_m + at_m.y(),
