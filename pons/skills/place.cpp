@@ -53,7 +53,8 @@ constexpr Duration kRested = std::chrono::milliseconds(20);           // after t
 constexpr double kGoneShare = 0.4, kGoneLeast_kg = 0.08;              // of the load's mass, and at least
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);    // off a rim, too
 constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);    // a camera that watches the tray, every 2 s
-constexpr Duration kBounces = std::chrono::milliseconds(400);         // from one mouth into the next
+constexpr double kFlat_m = 0.03;  // far from its camera, what lies in a tray is seen from there on
+constexpr Duration kBounces = std::chrono::milliseconds(400);  // from one mouth into the next
 
 constexpr const char* kCancelled = "cancelled; still held";
 
@@ -322,10 +323,10 @@ class Place final : public ArmSkill {
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
-      const std::string on = beside_.empty() && into_->name == name_ ? may_lie_on() : beside_;
+      const std::string on = beside_.empty() && into_->name == name_ ? may_lie_in() : beside_;
       if (!on.empty()) {
         detail["fell_into"] = on;
-        return {Status::kException, (beside_.empty() ? "may lie on what fell into " : "fell into ") + on, detail};
+        return {Status::kException, (beside_.empty() ? "may have fallen into " : "fell into ") + on, detail};
       }
       cell_.strays->let_go(fallen_.code, into_->name, now);
       cell_.strays->counted(cell_.world.arm, fallen_.code, into_->name, now);
@@ -367,10 +368,10 @@ class Place final : public ArmSkill {
     }
     return {};
   }
-
-  // On what lies there already it would be counted as one thing with that.
-  [[nodiscard]] std::string may_lie_on() const {
-    const auto one = std::ranges::find_if(watched_, [](int things) { return things > 0; }, &Cell::Watched::things);
+  // Where it may lie unseen: flat, or on what lies there already.
+  [[nodiscard]] std::string may_lie_in() const {
+    const bool flat = fallen_.load.size_m.minCoeff() < kFlat_m;
+    const auto one = std::ranges::find_if(watched_, [=](int n) { return flat || n > 0; }, &Cell::Watched::things);
     return one != watched_.end() ? one->place : std::string();
   }
   // On the belt, where it is asked for again once it is seen.
@@ -441,8 +442,7 @@ class Place final : public ArmSkill {
   std::string beside_;                  // where one more has lain since
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
-  Time counted_at_;
-  Time fell_at_;
+  Time counted_at_, fell_at_;
   bool cancelled_ = false, aside_ = false, stopped_ = false;
   int times_struck_ = 0, more_ticks_ = 0;
   Scale scale_;

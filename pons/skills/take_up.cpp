@@ -90,7 +90,8 @@ TakeUp::Fate TakeUp::fate(const task::Task& task, std::size_t done) const {
     const bool own = std::ranges::find(chutes, place, &world::Place::name) != chutes.end();
     return own ? Fate::kDone : Fate::kAstray;
   }
-  return is_over(place) ? Fate::kDone : Fate::kLost;  // let go of there, and still falling
+  // Let go of there and still falling, or lost before it came there: the step waits for its mouth's light curtain.
+  return is_over(place) ? Fate::kGoesOn : Fate::kLost;
 }
 
 std::vector<const world::Place*> TakeUp::fallen_into() const {
