@@ -50,6 +50,7 @@ void LayDown::tick(Time now) {
   if (now > last_ + kCalledEvery || !cell_.arm.operational()) phase_ = Phase::kRise, since_ = now + kLeftAlone;
   last_ = now;
   if (!cell_.arm.operational() || now < since_ || !hand_.arrived(now)) return;
+  if (cell_.arm.cups().phase == link::VacuumPhase::kLost) phase_ = Phase::kLetGo;  // there is nothing to lay down
   const world::Belt& belt = cell_.world.belt;
   Vector3 spot(0.5 * (belt.pick_x_min_m + belt.pick_x_max_m), belt.y_center_m, belt.surface_z_m + kParcelHeight_m);
   switch (phase_) {
