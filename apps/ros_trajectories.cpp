@@ -37,6 +37,7 @@ constexpr double kPositionFineness = 1e9, kSpeedFineness = 1e6, kRounded = 1e6;
 constexpr double kThinned_rad = 0.001;
 constexpr std::size_t kMostPoints = 3000;
 // By so much later a goal may end that says nothing of it; and what says that it may end whenever it does, s.
+constexpr double kNow_s = 1;  // what a goal's way to here may take, and clocks differ by
 constexpr double kLater_s = 0.5, kLaterShare = 0.1, kErased_s = -1;
 // As the skill begins what it says of these.
 constexpr std::string_view kPathViolated = "path_tolerance_violated", kGoalViolated = "goal_tolerance_violated";
@@ -126,9 +127,6 @@ Expected<std::optional<double>> tolerance_from(const std::vector<Tolerance>& tol
 
 // Members that mean something which nothing here does.
 Expected<void> check_known(const Goal& goal) {
-  const auto& stamp = goal.trajectory.header.stamp;
-  if (stamp.sec != 0 || stamp.nanosec != 0)
-    return fail("a time to begin at is not kept", "header.stamp", "leave it 0: goals begin at once");
   if (!goal.multi_dof_trajectory.points.empty() || !goal.multi_dof_trajectory.joint_names.empty())
     return fail("joints of several axes are not known here", "multi_dof_trajectory", "leave it empty");
   if (!goal.component_path_tolerance.empty() || !goal.component_goal_tolerance.empty())
@@ -137,6 +135,19 @@ Expected<void> check_known(const Goal& goal) {
   if (std::ranges::any_of(goal.path_tolerance, has_more))
     return fail("only positions have tolerances", "path_tolerance", "leave velocity and acceleration 0");
   return {};
+}
+
+// Goals begin at once: it may be no other time than now, as many clients have it, or none.
+std::optional<Result> check_begin(const wire::builtin_interfaces::msg::Time& stamp, double now_s) {
+  const double begins_s = stamp.sec + 1e-9 * stamp.nanosec;
+  if (begins_s == 0 || std::abs(begins_s - now_s) <= kNow_s) return std::nullopt;
+  constexpr const char* kMend = "leave it 0, or stamp it by /clock (use_sim_time) when it is sent";
+  if (begins_s < now_s)
+    return Result{Result::OLD_HEADER_TIMESTAMP,
+                  fmt::format("header.stamp: {:.3f} s is long ago, now it is {:.3f} s; {}", begins_s, now_s, kMend)};
+  return Result{Result::INVALID_GOAL,
+                fmt::format("header.stamp: {:.3f} s is to come, now it is {:.3f} s, and goals begin at once; {}",
+                            begins_s, now_s, kMend)};
 }
 
 std::string task_of(const gate::ros::GoalId& goal, Json arguments) {
@@ -203,6 +214,9 @@ Expected<void> RosTrajectories::serve(const std::vector<world::OutsideSkill>& ot
 }
 
 void RosTrajectories::begin(const GoalId& id, const Goal& asked) {
+  const double now_s = 1e-9 * static_cast<double>(gate_.node().stamp_ns());
+  if (const auto wrong = check_begin(asked.trajectory.header.stamp, now_s))
+    return refuse(id, wrong->error_code, wrong->error_string);
   auto arguments = arguments_from(asked, joints_);
   if (!arguments) {
     const bool other_joints = arguments.error().where == "joint_names";
