@@ -55,7 +55,8 @@ void LayDown::tick(Time now) {
   Vector3 spot(0.5 * (belt.pick_x_min_m + belt.pick_x_max_m), belt.y_center_m, belt.surface_z_m + kParcelHeight_m);
   switch (phase_) {
     case Phase::kRise:
-      if (hand_.rise(now)) phase_ = Phase::kCarry;
+      (void)hand_.rise(now);  // or straight there, where no pose is right above
+      phase_ = Phase::kCarry;
       return;
     case Phase::kCarry:
       spot.z() += kRise_m;
