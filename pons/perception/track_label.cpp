@@ -47,7 +47,7 @@ void TrackLabel::move(const Eigen::Vector2d& middle_m, Time stamp) {
 
 void TrackLabel::drop() {
   code_.clear();
-  disputed_.clear();
+  if (!disputed_.empty()) once_disputed_ = std::exchange(disputed_, {});
   reads_ = attempts_ = searches_ = 0;
 }
 

@@ -32,6 +32,8 @@ class TrackLabel {
   [[nodiscard]] const std::string& code() const { return code_; }
   // Both of an object that shows two.
   [[nodiscard]] const std::vector<std::string>& disputed() const { return disputed_; }
+  // Both of those that it showed before it was dropped: that it was two remains to be seen.
+  [[nodiscard]] const std::vector<std::string>& once_disputed() const { return once_disputed_; }
   // Where it was read last, and when it lay there; only if there is a code.
   [[nodiscard]] const Eigen::Vector2d& middle_m() const { return middle_m_; }
   [[nodiscard]] Time stamp() const { return stamp_; }
@@ -43,7 +45,7 @@ class TrackLabel {
 
  private:
   std::string code_, other_code_;
-  std::vector<std::string> disputed_;
+  std::vector<std::string> disputed_, once_disputed_;
   Eigen::Vector2d middle_m_ = Eigen::Vector2d::Zero();
   Time stamp_;
   int reads_ = 0, other_reads_ = 0, attempts_ = 0, searches_ = 0;

@@ -411,9 +411,18 @@ bool Tracker::shown_beside_another(const Track& track, std::string_view code) co
   });
 }
 
+bool Tracker::was_not_two(const Track& track, std::string_view code) const {
+  const std::vector<std::string>& codes = track.label.once_disputed();
+  const auto among = [&](std::string_view one) { return std::ranges::find(codes, one) != codes.end(); };
+  return among(code) && std::ranges::none_of(tracks_, [&](const Track& other) {
+           return other.id != track.id && other.label.code() != code && among(other.label.code());
+         });
+}
+
 void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen::Vector2d& middle_m) {
   Track* const found = find(track);
-  if (found == nullptr || code.empty() || !shows(*found, middle_m) || shown_beside_another(*found, code)) return;
+  if (found == nullptr || code.empty() || !shows(*found, middle_m)) return;
+  if (shown_beside_another(*found, code) || was_not_two(*found, code)) return;
   found->label.read(code, middle_m, passages_.back().stamp);
   if (found->label.code() != code) return;
   // One code is on one parcel: whoever else has it got it from a bad cut or was this parcel before.

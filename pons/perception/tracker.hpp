@@ -116,6 +116,8 @@ class Tracker {
   // Whether one close by shows that code and another. What a bad frame cuts off such a one shows no more than it does;
   // where it really was two, it is soon none of them, or of another size.
   [[nodiscard]] bool shown_beside_another(const Track& track, std::string_view code) const;
+  // Whether it showed that code beside another, which nobody has now: one of its labels is only hidden.
+  [[nodiscard]] bool was_not_two(const Track& track, std::string_view code) const;
 
   world::Belt belt_;
   world::Rules rules_;
