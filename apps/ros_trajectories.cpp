@@ -36,8 +36,8 @@ constexpr double kPositionFineness = 1e9, kSpeedFineness = 1e6, kRounded = 1e6;
 // sampled ten times a second over the longest way.
 constexpr double kThinned_rad = 0.001;
 constexpr std::size_t kMostPoints = 3000;
-// By so much later a goal may end that says nothing of it; and what says that it may end whenever it does, s.
 constexpr double kNow_s = 1;  // what a goal's way to here may take, and clocks differ by
+// By so much later a goal may end that says nothing of it; and what says that it may end whenever it does, s.
 constexpr double kLater_s = 0.5, kLaterShare = 0.1, kErased_s = -1;
 // As the skill begins what it says of these.
 constexpr std::string_view kPathViolated = "path_tolerance_violated", kGoalViolated = "goal_tolerance_violated";

@@ -25,7 +25,7 @@ class TakeUp {
   void restore(const task::Json& carried);
 
   enum class Fate : std::uint8_t {
-    kGoesOn,  // what the next step needs is at hand
+    kGoesOn,  // what the next step needs is at hand; or it is to find out what became of that
     kDone,    // the next step had done its work: the load has fallen into its place
     kAstray,  // it was carried, and has fallen into the chute fell_into(), which is not its place
     kLost,    // it was carried, and is no more
