@@ -1,30 +1,23 @@
-// A node as rmw_cyclonedds_cpp makes one, on Cyclone DDS alone: names, qualities of service, user data, the header of
-// services, and when a service counts as there. What it hears it prints, a line each.
+// A node as rmw_cyclonedds_cpp makes one (cyclone_node.hpp). What it hears it prints, a line each.
 //
-// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, stower, client, or the JSON of a
-// task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input
-// does
-#include <dds/dds.h>
+// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, stower, worker, client, or the
+// JSON of a task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when
+// its input does
 #include <peer.h>
 #include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <memory>
-#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "tests/ros/cyclone_node.hpp"
+
+namespace cyclone {
 namespace {
 
-using Info = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
-using NodeInfo = rmw_dds_common_msg_dds__NodeEntitiesInfo_;
-using Gid = rmw_dds_common_msg_dds__Gid_;
 using String = std_msgs_msg_dds__String_;
 using Request = std_srvs_srv_dds__SetBool_Request_;
 using Response = std_srvs_srv_dds__SetBool_Response_;
@@ -32,142 +25,6 @@ using Submitted = pons_msgs_srv_dds__SubmitTask_Request_;
 using Stow = warehouse_msgs_srv_dds__Stow_Request_;
 using Stowed = warehouse_msgs_srv_dds__Stow_Response_;
 using Accepted = pons_msgs_srv_dds__SubmitTask_Response_;
-using QosOwner = std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)>;
-
-dds_entity_t checked(dds_entity_t entity, const char* what) {
-  if (entity >= 0) return entity;
-  std::fprintf(stderr, "cyclone_peer: %s: %s\n", what, dds_strretcode(entity));
-  std::exit(1);
-}
-
-QosOwner qos(int depth, const std::string& user_data, dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE) {
-  QosOwner made(dds_create_qos(), &dds_delete_qos);
-  dds_qset_reliability(made.get(), DDS_RELIABILITY_RELIABLE, DDS_INFINITY);
-  dds_qset_history(made.get(), depth > 0 ? DDS_HISTORY_KEEP_LAST : DDS_HISTORY_KEEP_ALL,
-                   depth > 0 ? depth : DDS_LENGTH_UNLIMITED);
-  dds_qset_durability(made.get(), durability);
-  if (durability == DDS_DURABILITY_TRANSIENT_LOCAL)
-    dds_qset_durability_service(made.get(), 0, DDS_HISTORY_KEEP_LAST, depth > 0 ? depth : 1, DDS_LENGTH_UNLIMITED,
-                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
-  dds_qset_writer_data_lifecycle(made.get(), false);
-  dds_qset_userdata(made.get(), user_data.data(), user_data.size());
-  return made;
-}
-
-std::string value_of(const dds_builtintopic_endpoint_t* endpoint, const std::string& key) {
-  void* bytes = nullptr;
-  std::size_t size = 0;
-  if (endpoint == nullptr || !dds_qget_userdata(endpoint->qos, &bytes, &size) || bytes == nullptr) return "";
-  const std::string text(static_cast<const char*>(bytes), size);
-  dds_free(bytes);
-  const std::size_t at = text.find(key + "=");
-  return at == std::string::npos ? "" : text.substr(at + key.size() + 1, text.find(';', at) - at - key.size() - 1);
-}
-
-class Peer {
- public:
-  Peer(dds_domainid_t domain, std::string node) : node_(std::move(node)) {
-    const std::string enclave = "enclave=/;";
-    const QosOwner own(dds_create_qos(), &dds_delete_qos);
-    dds_qset_userdata(own.get(), enclave.data(), enclave.size());
-    participant_ = checked(dds_create_participant(domain, own.get(), nullptr), "participant");
-    const dds_entity_t topic = this->topic(rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc, "ros_discovery_info");
-    info_writer_ = checked(
-        dds_create_writer(participant_, topic, qos(1, "", DDS_DURABILITY_TRANSIENT_LOCAL).get(), nullptr), "writer");
-    info_reader_ = checked(
-        dds_create_reader(participant_, topic, qos(0, "", DDS_DURABILITY_TRANSIENT_LOCAL).get(), nullptr), "reader");
-    announce();
-  }
-  ~Peer() { dds_delete(participant_); }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  dds_entity_t topic(const dds_topic_descriptor_t& type, const char* name) {
-    return checked(dds_create_topic(participant_, &type, name, nullptr, nullptr), name);
-  }
-  dds_entity_t writer(const dds_topic_descriptor_t& type, const char* name,
-                      const std::string& user_data = "typehash=RIHS01_0;") {
-    const dds_entity_t made =
-        checked(dds_create_writer(participant_, topic(type, name), qos(10, user_data).get(), nullptr), name);
-    writers_.push_back(gid(made));
-    announce();
-    return made;
-  }
-  dds_entity_t reader(const dds_topic_descriptor_t& type, const char* name, const std::string& user_data,
-                      dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE) {
-    const dds_entity_t made = checked(
-        dds_create_reader(participant_, topic(type, name), qos(10, user_data, durability).get(), nullptr), name);
-    readers_.push_back(gid(made));
-    announce();
-    return made;
-  }
-  // 16 bytes in hex with dots: the participant's, and a number.
-  std::string identifier(int number) {
-    const Gid own = gid(participant_);
-    std::string text;
-    for (int i = 0; i < 16; ++i) {
-      char part[8];
-      std::snprintf(part, sizeof part, "%s%x", i > 0 ? "." : "",
-                    i < 12    ? own.data[i]
-                    : i == 15 ? static_cast<unsigned>(number)
-                              : 0U);
-      text += part;
-    }
-    return text;
-  }
-
-  // Prints each node of the graph once.
-  void look() {
-    void* sample = nullptr;
-    dds_sample_info_t info;
-    while (dds_take(info_reader_, &sample, &info, 1, 1) == 1) {
-      const auto* const told = static_cast<const Info*>(sample);
-      for (std::uint32_t i = 0; info.valid_data && i < told->node_entities_info_seq._length; ++i) {
-        const NodeInfo& node = told->node_entities_info_seq._buffer[i];
-        char line[700];
-        std::snprintf(line, sizeof line, "node %s%s with %u readers and %u writers", node.node_namespace,
-                      node.node_name, node.reader_gid_seq._length, node.writer_gid_seq._length);
-        if (seen_.insert(line).second && node_ != node.node_name) std::puts(line);
-      }
-      dds_return_loan(info_reader_, &sample, 1);
-      sample = nullptr;
-    }
-  }
-
- private:
-  static Gid gid(dds_entity_t entity) {
-    dds_guid_t guid;
-    checked(dds_get_guid(entity, &guid), "guid");
-    Gid made;
-    std::memcpy(made.data, guid.v, sizeof made.data);
-    return made;
-  }
-  void announce() {
-    NodeInfo node{};
-    char space[] = "/";
-    std::snprintf(node.node_namespace, sizeof node.node_namespace, "%s", space);
-    std::snprintf(node.node_name, sizeof node.node_name, "%s", node_.c_str());
-    node.reader_gid_seq = {static_cast<std::uint32_t>(readers_.size()), static_cast<std::uint32_t>(readers_.size()),
-                           readers_.data(), false};
-    node.writer_gid_seq = {static_cast<std::uint32_t>(writers_.size()), static_cast<std::uint32_t>(writers_.size()),
-                           writers_.data(), false};
-    Info info{};
-    info.gid = gid(participant_);
-    info.node_entities_info_seq = {1, 1, &node, false};
-    checked(dds_write(info_writer_, &info), "announce");
-  }
-
-  std::string node_;
-  dds_entity_t participant_ = 0, info_writer_ = 0, info_reader_ = 0;
-  std::vector<Gid> readers_, writers_;
-  std::set<std::string> seen_;
-};
-
-class Role {
- public:
-  virtual ~Role() = default;
-  virtual void step() = 0;  // every 20 ms
-};
 
 class Talker final : public Role {
  public:
@@ -186,7 +43,7 @@ class Talker final : public Role {
 class Listener final : public Role {
  public:
   Listener(Peer& peer, const char* topic, dds_durability_kind_t durability)
-      : reader_(peer.reader(std_msgs_msg_dds__String__desc, topic, "typehash=RIHS01_0;", durability)) {}
+      : reader_(peer.reader(std_msgs_msg_dds__String__desc, topic, kTopicData, durability)) {}
   void step() override {
     void* sample = nullptr;
     dds_sample_info_t info;
@@ -201,74 +58,31 @@ class Listener final : public Role {
   dds_entity_t reader_;
 };
 
-template <typename Asked, typename Told>
-class Server : public Role {
- public:
-  Server(Peer& peer, const std::string& service, const dds_topic_descriptor_t& asked,
-         const dds_topic_descriptor_t& told)
-      : replies_(peer.writer(told, ("rr" + service + "Reply").c_str(), "serviceid=" + peer.identifier(1) + ";")),
-        requests_(peer.reader(asked, ("rq" + service + "Request").c_str(), "serviceid=" + peer.identifier(1) + ";")) {}
-  void step() override {
-    void* sample = nullptr;
-    dds_sample_info_t info;
-    while (dds_take(requests_, &sample, &info, 1, 1) == 1) {
-      if (info.valid_data) {
-        wait_for_reader(info.publication_handle);
-        const Told response = answer(*static_cast<const Asked*>(sample));
-        checked(dds_write(replies_, &response), "reply");
-      }
-      dds_return_loan(requests_, &sample, 1);
-      sample = nullptr;
-    }
-  }
-
- private:
-  virtual Told answer(const Asked& request) = 0;
-  // Up to 100 ms, for the reader that tells the identifier which the request's writer tells.
-  void wait_for_reader(dds_instance_handle_t asker) const {
-    auto* const writer = dds_get_matched_publication_data(requests_, asker);
-    const std::string client = value_of(writer, "clientid");
-    dds_builtintopic_free_endpoint(writer);
-    for (int tries = 0; tries < 10; ++tries) {
-      std::vector<dds_instance_handle_t> readers(16);
-      readers.resize(static_cast<std::size_t>(
-          std::max(0, dds_get_matched_subscriptions(replies_, readers.data(), readers.size()))));
-      for (const auto each : readers) {
-        auto* const reader = dds_get_matched_subscription_data(replies_, each);
-        const bool same = value_of(reader, "clientid") == client;
-        dds_builtintopic_free_endpoint(reader);
-        if (same) return;
-      }
-      dds_sleepfor(DDS_MSECS(10));
-    }
-    std::puts("no reader of replies");
-  }
-
-  dds_entity_t replies_, requests_;
-};
-
-class SwitchServer final : public Server<Request, Response> {
+class SwitchServer final : public Role {
  public:
   explicit SwitchServer(Peer& peer)
-      : Server(peer, "/switch", std_srvs_srv_dds__SetBool_Request__desc, std_srvs_srv_dds__SetBool_Response__desc) {}
+      : server_(peer, "/switch", std_srvs_srv_dds__SetBool_Request__desc, std_srvs_srv_dds__SetBool_Response__desc,
+                [this](const Request& request, auto asker) {
+                  std::printf("asked %d\n", request.data ? 1 : 0);
+                  server_.answer(asker, {request.client, request.number, request.data, text_.data()});
+                }) {}
+  void step() override { server_.step(); }
 
  private:
-  Response answer(const Request& request) override {
-    std::printf("asked %d\n", request.data ? 1 : 0);
-    return {request.client, request.number, request.data, text_.data()};
-  }
+  Server<Request, Response> server_;
   std::string text_ = "by cyclone";
 };
 
 // Of a type that Pons was not built with: each bin is stowed whose flags are all set.
-class Stower final : public Server<Stow, Stowed> {
+class Stower final : public Role {
  public:
   explicit Stower(Peer& peer)
-      : Server(peer, "/stow", warehouse_msgs_srv_dds__Stow_Request__desc, warehouse_msgs_srv_dds__Stow_Response__desc) {
-  }
+      : server_(peer, "/stow", warehouse_msgs_srv_dds__Stow_Request__desc, warehouse_msgs_srv_dds__Stow_Response__desc,
+                [this](const Stow& request, auto asker) { server_.answer(asker, stowed(request)); }) {}
+  void step() override { server_.step(); }
 
  private:
-  Stowed answer(const Stow& request) override {
+  Stowed stowed(const Stow& request) {
     std::printf("stow %s at %.2f %.2f, %.2f\n", request.shelf, request.corners[0].z, request.corners[1].x,
                 static_cast<double>(request.speed));
     left_.clear();
@@ -282,66 +96,104 @@ class Stower final : public Server<Stow, Stowed> {
     const auto count = static_cast<std::uint32_t>(left_.size());
     return {request.client, request.number, left_.empty(), text_.data(), {count, count, left_.data(), false}};
   }
+  Server<Stow, Stowed> server_;
   std::string text_ = "there is no room";
   std::vector<std::uint16_t> left_;
 };
 
-// A server's two ends tell one identifier.
-bool available(dds_entity_t requests, dds_entity_t replies) {
-  std::vector<dds_instance_handle_t> readers(16), writers(16);
-  readers.resize(
-      static_cast<std::size_t>(std::max(0, dds_get_matched_subscriptions(requests, readers.data(), readers.size()))));
-  writers.resize(
-      static_cast<std::size_t>(std::max(0, dds_get_matched_publications(replies, writers.data(), writers.size()))));
-  std::set<std::string> servers;
-  for (const auto each : readers) {
-    auto* const endpoint = dds_get_matched_subscription_data(requests, each);
-    servers.insert(value_of(endpoint, "serviceid"));
-    dds_builtintopic_free_endpoint(endpoint);
-  }
-  return std::ranges::any_of(writers, [&](dds_instance_handle_t each) {
-    auto* const endpoint = dds_get_matched_publication_data(replies, each);
-    const std::string id = value_of(endpoint, "serviceid");
-    dds_builtintopic_free_endpoint(endpoint);
-    return !id.empty() && servers.contains(id);
-  });
-}
-
-// Asks as soon as a server is there, and again after 3 s: what is asked while the server has not found us yet is lost.
-template <typename Asked, typename Told>
-class Client : public Role {
+// The action /work: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
+// steps; "lasts": until it is cancelled; "deaf": likewise, by whoever says it twice; all else is done after some steps.
+class Worker final : public Role {
  public:
-  Client(Peer& peer, int id, const std::string& service, const dds_topic_descriptor_t& asked,
-         const dds_topic_descriptor_t& told)
-      : replies_(peer.reader(told, ("rr" + service + "Reply").c_str(), "clientid=" + peer.identifier(id) + ";")),
-        requests_(peer.writer(asked, ("rq" + service + "Request").c_str(), "clientid=" + peer.identifier(id) + ";")) {
-    checked(dds_get_instance_handle(requests_, &self_), "handle");
-  }
+  explicit Worker(Peer& peer)
+      : sends_(peer, "/work/_action/send_goal", pons_msgs_action_dds__ExecuteTask_SendGoal_Request__desc,
+               pons_msgs_action_dds__ExecuteTask_SendGoal_Response__desc,
+               [this](const auto& request, auto asker) { take_goal(request, asker); }),
+        gets_(peer, "/work/_action/get_result", pons_msgs_action_dds__ExecuteTask_GetResult_Request__desc,
+              pons_msgs_action_dds__ExecuteTask_GetResult_Response__desc,
+              [this](const auto& request, auto asker) {
+                if (Goal* const goal = find(request.goal_id)) goal->waiting.push_back({request, asker});
+              }),
+        cancels_(peer, "/work/_action/cancel_goal", action_msgs_srv_dds__CancelGoal_Request__desc,
+                 action_msgs_srv_dds__CancelGoal_Response__desc,
+                 [this](const auto& request, auto asker) { take_cancel(request, asker); }),
+        feedback_(peer.writer(pons_msgs_action_dds__ExecuteTask_FeedbackMessage__desc, "rt/work/_action/feedback")),
+        status_(peer.writer(action_msgs_msg_dds__GoalStatusArray__desc, "rt/work/_action/status", kTopicData,
+                            DDS_DURABILITY_TRANSIENT_LOCAL)) {}
   void step() override {
-    if (!heard_ && available(requests_, replies_) && since_asked_++ % kAgain == 0) {
-      const Asked request = ask(self_, kNumber);
-      checked(dds_write(requests_, &request), "ask");
-    }
-    void* sample = nullptr;
-    dds_sample_info_t info;
-    while (dds_take(replies_, &sample, &info, 1, 1) == 1) {
-      const Told& response = *static_cast<const Told*>(sample);
-      if (info.valid_data && response.client == self_ && response.number == kNumber) heard_ = true, hear(response);
-      dds_return_loan(replies_, &sample, 1);
-      sample = nullptr;
-    }
+    sends_.step();
+    gets_.step();
+    cancels_.step();
+    for (Goal& goal : goals_) work(goal);
   }
 
  private:
-  static constexpr std::int64_t kNumber = 7;
-  static constexpr int kAgain = 150;  // steps
-  virtual Asked ask(std::uint64_t client, std::int64_t number) = 0;
-  virtual void hear(const Told& response) = 0;
+  using Id = unique_identifier_msgs_msg_dds__UUID_;
+  using Sent = pons_msgs_action_dds__ExecuteTask_SendGoal_Request_;
+  using Got = pons_msgs_action_dds__ExecuteTask_GetResult_Request_;
+  using Cancelled = action_msgs_srv_dds__CancelGoal_Request_;
+  static constexpr std::uint8_t kExecuting = 2, kCanceling = 3, kSucceeded = 4, kCanceled = 5, kAborted = 6;
+  static constexpr int kSteps = 10;
+  struct Goal {
+    Id id{};
+    std::string task;
+    std::uint8_t status = kExecuting;
+    int steps = 0, cancels = 0;
+    std::vector<std::pair<Got, dds_instance_handle_t>> waiting;  // for its result
+  };
 
-  dds_entity_t replies_, requests_;
-  dds_instance_handle_t self_ = 0;
-  int since_asked_ = 0;
-  bool heard_ = false;
+  Goal* find(const Id& id) {
+    const auto found =
+        std::ranges::find_if(goals_, [&](const Goal& each) { return std::ranges::equal(each.id.uuid, id.uuid); });
+    return found == goals_.end() ? nullptr : &*found;
+  }
+  void take_goal(const Sent& request, dds_instance_handle_t asker) {
+    const std::string task = request.goal.task;
+    std::printf("goal %s\n", task.c_str());
+    if (task != "refused") goals_.push_back({.id = request.goal_id, .task = task});
+    sends_.answer(asker, {request.client, request.number, task != "refused", {0, 0}});
+    show();
+  }
+  void take_cancel(const Cancelled& request, dds_instance_handle_t asker) {
+    Goal* const goal = find(request.goal_info.goal_id);
+    std::printf("cancel %s\n", goal != nullptr ? goal->task.c_str() : "of no goal");
+    if (goal != nullptr && ++goal->cancels == 1 && goal->task == "deaf") return;
+    action_msgs_msg_dds__GoalInfo_ info = request.goal_info;
+    const std::uint32_t count = goal != nullptr && goal->status == kExecuting ? 1 : 0;
+    if (count > 0) goal->status = kCanceling;
+    cancels_.answer(asker, {request.client, request.number, 0, {count, count, &info, false}});
+    show();
+  }
+  void work(Goal& goal) {
+    if (goal.status == kExecuting) {
+      std::string kind = "step", nothing;
+      const pons_msgs_action_dds__ExecuteTask_FeedbackMessage_ told{
+          goal.id, {{0, 0}, ++goal.steps, kind.data(), 0, goal.task.data(), nothing.data()}};
+      checked(dds_write(feedback_, &told), "feedback");
+    }
+    const bool lasts = goal.task == "lasts" || goal.task == "deaf";
+    if (goal.status == kExecuting && !lasts && goal.steps >= kSteps)
+      goal.status = goal.task == "fails" ? kAborted : kSucceeded, show();
+    if (goal.status == kCanceling) goal.status = kCanceled, show();
+    if (goal.status < kSucceeded) return;
+    std::string reason = "by cyclone";
+    for (const auto& [request, asker] : std::exchange(goal.waiting, {}))
+      gets_.answer(asker,
+                   {request.client, request.number, goal.status, {goal.status, goal.task.data(), reason.data()}});
+  }
+  void show() {
+    std::vector<action_msgs_msg_dds__GoalStatus_> all;
+    for (const Goal& each : goals_) all.push_back({{each.id, {0, 0}}, each.status});
+    const auto count = static_cast<std::uint32_t>(all.size());
+    const action_msgs_msg_dds__GoalStatusArray_ told{{count, count, all.data(), false}};
+    checked(dds_write(status_, &told), "status");
+  }
+
+  Server<Sent, pons_msgs_action_dds__ExecuteTask_SendGoal_Response_> sends_;
+  Server<Got, pons_msgs_action_dds__ExecuteTask_GetResult_Response_> gets_;
+  Server<Cancelled, action_msgs_srv_dds__CancelGoal_Response_> cancels_;
+  dds_entity_t feedback_, status_;
+  std::vector<Goal> goals_;
 };
 
 class Switch final : public Client<Request, Response> {
@@ -448,21 +300,28 @@ class Actor final : public Role {
 
 }  // namespace
 
+// Of main()'s third word; none: there is no such role.
+std::unique_ptr<Role> role_of(const std::string& wanted, Peer& peer) {
+  if (wanted == "talker") return std::make_unique<Talker>(peer);
+  if (wanted == "listener") return std::make_unique<Listener>(peer, "rt/chatter", DDS_DURABILITY_VOLATILE);
+  if (wanted == "described")
+    return std::make_unique<Listener>(peer, "rt/robot_description", DDS_DURABILITY_TRANSIENT_LOCAL);
+  if (wanted == "server") return std::make_unique<SwitchServer>(peer);
+  if (wanted == "worker") return std::make_unique<Worker>(peer);
+  if (wanted == "stower") return std::make_unique<Stower>(peer);
+  if (wanted == "client") return std::make_unique<Switch>(peer);
+  if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) return std::make_unique<Actor>(peer, wanted);
+  if (wanted.starts_with("{")) return std::make_unique<Submitter>(peer, wanted);
+  return nullptr;
+}
+
+}  // namespace cyclone
+
 int main(int count, char** words) {
   if (count != 4) return std::fputs("usage: cyclone_peer DOMAIN NODE ROLE\n", stderr), 2;
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  Peer peer(static_cast<dds_domainid_t>(std::atoi(words[1])), words[2]);
-  const std::string wanted = words[3];
-  std::unique_ptr<Role> role;
-  if (wanted == "talker") role = std::make_unique<Talker>(peer);
-  if (wanted == "listener") role = std::make_unique<Listener>(peer, "rt/chatter", DDS_DURABILITY_VOLATILE);
-  if (wanted == "described")
-    role = std::make_unique<Listener>(peer, "rt/robot_description", DDS_DURABILITY_TRANSIENT_LOCAL);
-  if (wanted == "server") role = std::make_unique<SwitchServer>(peer);
-  if (wanted == "stower") role = std::make_unique<Stower>(peer);
-  if (wanted == "client") role = std::make_unique<Switch>(peer);
-  if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) role = std::make_unique<Actor>(peer, wanted);
-  if (wanted.starts_with("{")) role = std::make_unique<Submitter>(peer, wanted);
+  cyclone::Peer peer(static_cast<dds_domainid_t>(std::atoi(words[1])), words[2]);
+  const auto role = cyclone::role_of(words[3], peer);
   if (!role) return std::fprintf(stderr, "cyclone_peer: no role '%s'\n", words[3]), 2;
   // Every 20 ms, until the input ends.
   for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, 20) == 0;) {

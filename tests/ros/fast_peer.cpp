@@ -1,39 +1,24 @@
-// A node as rmw_fastrtps_cpp makes one, on Fast DDS and Fast CDR alone: names, qualities of service, user data, the
-// identities of services, and when a service counts as there. Transports are the library's own choice. What it hears it
-// prints, a line each.
+// A node as rmw_fastrtps_cpp makes one (fast_node.hpp). What it hears it prints, a line each.
 //
-// usage: fast_peer DOMAIN NODE ROLE    ROLE: talker, listener, viewer, described, server, client, or the JSON of a task
-// to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its input does
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
+// usage: fast_peer DOMAIN NODE ROLE    ROLE: talker, listener, viewer, described, server, worker, client, or the JSON
+// of a task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when its
+// input does
 #include <poll.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/publisher/Publisher.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/SampleInfo.hpp>
-#include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <fastdds/dds/topic/TopicDataType.hpp>
-#include <functional>
 #include <memory>
-#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
-namespace {
+#include "tests/ros/fast_node.hpp"
 
-namespace dds = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
-using eprosima::fastcdr::Cdr;
-using eprosima::fastcdr::FastBuffer;
+namespace fast {
+namespace {
 
 // What is said; each knows how a generated type would put and take it.
 struct String {
@@ -63,9 +48,8 @@ struct Accepted {
   void put(Cdr& to) const { to << ok << id << error; }
   void take(Cdr& from) { from >> ok >> id >> error; }
 };
-using Gid = std::array<std::uint8_t, 16>;
 struct SendGoal {
-  Gid goal{};
+  Uuid goal{};
   std::string task;
   void put(Cdr& to) const { to << goal << task; }
   void take(Cdr& from) { from >> goal >> task; }
@@ -78,7 +62,7 @@ struct Decision {
   void take(Cdr& from) { from >> accepted >> sec >> nanosec; }
 };
 struct GetResult {
-  Gid goal{};
+  Uuid goal{};
   void put(Cdr& to) const { to << goal; }
   void take(Cdr& from) { from >> goal; }
 };
@@ -89,7 +73,7 @@ struct End {
   void take(Cdr& from) { from >> status >> outcome >> task >> reason; }
 };
 struct Cancel {
-  Gid goal{};
+  Uuid goal{};
   std::int32_t sec = 0;
   std::uint32_t nanosec = 0;
   void put(Cdr& to) const { to << goal << sec << nanosec; }
@@ -97,191 +81,42 @@ struct Cancel {
 };
 struct Cancelled {
   std::uint8_t code = 0;
-  std::uint32_t count = 0;  // of goals; the goals themselves are not looked at
-  void put(Cdr& to) const { to << code << count; }
+  std::uint32_t count = 0;  // of goals, one at most; whose it is, is not looked at
+  Uuid goal{};
+  void put(Cdr& to) const {
+    to << code << count;
+    if (count > 0) to << goal << std::int32_t{0} << std::uint32_t{0};
+  }
   void take(Cdr& from) { from >> code >> count; }
 };
-struct Info {
-  Gid gid{};
-  std::string space = "/", node;
-  std::vector<Gid> readers, writers;
+struct Feedback {
+  Uuid goal{};
+  std::int64_t sequence = 0;
+  std::string text;
   void put(Cdr& to) const {
-    to << gid << std::uint32_t{1} << space << node;
-    for (const auto* const gids : {&readers, &writers}) {
-      to << static_cast<std::uint32_t>(gids->size());
-      for (const Gid& each : *gids) to << each;
-    }
+    const std::string nothing;
+    to << goal << std::int32_t{0} << std::uint32_t{0} << sequence << nothing << std::int32_t{0} << text << nothing;
   }
-  void take(Cdr& from) {
-    std::uint32_t nodes = 0;
-    from >> gid >> nodes;
-    if (nodes == 0) return;
-    from >> space >> node;
-    for (auto* const gids : {&readers, &writers}) {
-      std::uint32_t count = 0;
-      from >> count;
-      gids->resize(count);
-      for (Gid& each : *gids) from >> each;
-    }
-  }
+  void take(Cdr&) {}
 };
-
-template <typename T>
-class Type final : public dds::TopicDataType {
- public:
-  explicit Type(const char* name) {
-    setName(name);
-    m_typeSize = 1024;
-    m_isGetKeyDefined = false;
-    auto_fill_type_object(false);
-    auto_fill_type_information(false);
+struct Statuses {
+  std::vector<std::pair<Uuid, std::uint8_t>> all;
+  void put(Cdr& to) const {
+    to << static_cast<std::uint32_t>(all.size());
+    for (const auto& [goal, status] : all) to << goal << std::int32_t{0} << std::uint32_t{0} << status;
   }
-  bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
-    FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->max_size);
-    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
-    payload->encapsulation = CDR_LE;
-    cdr.serialize_encapsulation();
-    static_cast<const T*>(data)->put(cdr);
-    payload->length = static_cast<std::uint32_t>(cdr.getSerializedDataLength());
-    return true;
-  }
-  bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
-    FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->length);
-    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
-    try {
-      cdr.read_encapsulation();
-      static_cast<T*>(data)->take(cdr);
-    } catch (const eprosima::fastcdr::exception::Exception& problem) {
-      std::printf("unreadable: %s\n", problem.what());
-      return false;
-    }
-    return true;
-  }
-  std::function<std::uint32_t()> getSerializedSizeProvider(void*) override {
-    return [this] { return m_typeSize; };
-  }
-  void* createData() override { return new T; }
-  void deleteData(void* data) override { delete static_cast<T*>(data); }
-  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
+  void take(Cdr&) {}
 };
-
-template <typename Entity>
-Entity* checked(Entity* entity, const char* what) {
-  if (entity != nullptr) return entity;
-  std::fprintf(stderr, "fast_peer: %s could not be made\n", what);
-  std::exit(1);
-}
-
-template <typename Qos>
-Qos qos(int depth, dds::DurabilityQosPolicyKind durability = dds::VOLATILE_DURABILITY_QOS) {
-  Qos made;
-  made.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
-  made.durability().kind = durability;
-  made.history().kind = depth > 0 ? dds::KEEP_LAST_HISTORY_QOS : dds::KEEP_ALL_HISTORY_QOS;
-  if (depth > 0) made.history().depth = depth;
-  made.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-  made.data_sharing().off();
-  const std::string hash = "typehash=RIHS01_0;";
-  made.user_data().assign(hash.begin(), hash.end());
-  return made;
-}
-
-Gid gid_of(const rtps::GUID_t& guid) {
-  Gid gid{};
-  std::memcpy(gid.data(), guid.guidPrefix.value, 12);
-  std::memcpy(gid.data() + 12, guid.entityId.value, 4);
-  return gid;
-}
-
-class Peer {
- public:
-  Peer(unsigned domain, std::string node) {
-    info_.node = std::move(node);
-    dds::DomainParticipantQos own;
-    const std::string enclave = "enclave=/;";
-    own.user_data().assign(enclave.begin(), enclave.end());
-    own.name("/");
-    auto* const factory = dds::DomainParticipantFactory::get_instance();
-    participant_ = checked(factory->create_participant(domain, own), "participant");
-    publisher_ = checked(participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT), "publisher");
-    subscriber_ = checked(participant_->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT), "subscriber");
-    info_.gid = gid_of(participant_->guid());
-    auto* const about = topic<Info>("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
-    info_writer_ =
-        publisher_->create_datawriter(about, qos<dds::DataWriterQos>(1, dds::TRANSIENT_LOCAL_DURABILITY_QOS));
-    info_reader_ =
-        subscriber_->create_datareader(about, qos<dds::DataReaderQos>(0, dds::TRANSIENT_LOCAL_DURABILITY_QOS));
-    info_writer_->write(&info_);
-  }
-  ~Peer() {
-    participant_->delete_contained_entities();
-    dds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
-  }
-  Peer(const Peer&) = delete;
-  Peer& operator=(const Peer&) = delete;
-
-  template <typename T>
-  dds::DataWriter* writer(const char* name, const char* type) {
-    auto* const made = checked(publisher_->create_datawriter(topic<T>(name, type), qos<dds::DataWriterQos>(10)), name);
-    info_.writers.push_back(gid_of(made->guid()));
-    info_writer_->write(&info_);
-    return made;
-  }
-  template <typename T>
-  dds::DataReader* reader(const char* name, const char* type,
-                          dds::DurabilityQosPolicyKind durability = dds::VOLATILE_DURABILITY_QOS,
-                          dds::ReliabilityQosPolicyKind reliability = dds::RELIABLE_RELIABILITY_QOS) {
-    auto wanted = qos<dds::DataReaderQos>(10, durability);
-    wanted.reliability().kind = reliability;
-    auto* const made = checked(subscriber_->create_datareader(topic<T>(name, type), wanted), name);
-    info_.readers.push_back(gid_of(made->guid()));
-    info_writer_->write(&info_);
-    return made;
-  }
-  // Prints each node of the graph once.
-  void look() {
-    Info info;
-    dds::SampleInfo about;
-    while (info_reader_->take_next_sample(&info, &about) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-      if (!about.valid_data || info.gid == info_.gid || info.node.empty()) continue;
-      const std::string line = "node " + info.space + info.node + " with " + std::to_string(info.readers.size()) +
-                               " readers and " + std::to_string(info.writers.size()) + " writers";
-      if (seen_.insert(line).second) std::puts(line.c_str());
-    }
-  }
-
- private:
-  template <typename T>
-  dds::Topic* topic(const char* name, const char* type) {
-    participant_->register_type(dds::TypeSupport(new Type<T>(type)));
-    return checked(participant_->create_topic(name, type, dds::TOPIC_QOS_DEFAULT), name);
-  }
-
-  Info info_;
-  dds::DomainParticipant* participant_;
-  dds::Publisher* publisher_;
-  dds::Subscriber* subscriber_;
-  dds::DataWriter* info_writer_;
-  dds::DataReader* info_reader_;
-  std::set<std::string> seen_;
-};
-
-template <typename T>
-bool take(dds::DataReader& reader, T& message, dds::SampleInfo& info) {
-  while (reader.take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
-    if (info.valid_data) return true;
-  return false;
-}
 
 constexpr const char* kStringType = "std_msgs::msg::dds_::String_";
 constexpr const char* kRequestType = "std_srvs::srv::dds_::SetBool_Request_";
 constexpr const char* kResponseType = "std_srvs::srv::dds_::SetBool_Response_";
-
-class Role {
- public:
-  virtual ~Role() = default;
-  virtual void step() = 0;  // every 20 ms
-};
+constexpr const char* kSendType = "pons_msgs::action::dds_::ExecuteTask_SendGoal_Request_";
+constexpr const char* kDecisionType = "pons_msgs::action::dds_::ExecuteTask_SendGoal_Response_";
+constexpr const char* kGetType = "pons_msgs::action::dds_::ExecuteTask_GetResult_Request_";
+constexpr const char* kEndType = "pons_msgs::action::dds_::ExecuteTask_GetResult_Response_";
+constexpr const char* kCancelType = "action_msgs::srv::dds_::CancelGoal_Request_";
+constexpr const char* kCancelledType = "action_msgs::srv::dds_::CancelGoal_Response_";
 
 class Talker final : public Role {
  public:
@@ -310,68 +145,17 @@ class Listener final : public Role {
   dds::DataReader* reader_;
 };
 
-class Server final : public Role {
+class SwitchServer final : public Role {
  public:
-  explicit Server(Peer& peer)
-      : replies_(peer.writer<Response>("rr/switchReply", kResponseType)),
-        requests_(peer.reader<Request>("rq/switchRequest", kRequestType)) {}
-  void step() override {
-    Request request;
-    for (dds::SampleInfo info; take(*requests_, request, info);) {
-      std::printf("asked %d\n", request.data ? 1 : 0);
-      rtps::WriteParams parameters;
-      parameters.related_sample_identity(info.sample_identity);
-      // The client's reader of replies, where it told.
-      if (info.related_sample_identity.writer_guid() != rtps::GUID_t::unknown())
-        parameters.related_sample_identity().writer_guid(info.related_sample_identity.writer_guid());
-      Response response{request.data, "by fast"};
-      replies_->write(&response, parameters);
-    }
-  }
+  explicit SwitchServer(Peer& peer)
+      : server_(peer, "/switch", kRequestType, kResponseType, [this](const Request& request, const auto& asker) {
+          std::printf("asked %d\n", request.data ? 1 : 0);
+          server_.answer(asker, {request.data, "by fast"});
+        }) {}
+  void step() override { server_.step(); }
 
  private:
-  dds::DataWriter* replies_;
-  dds::DataReader* requests_;
-};
-
-// Asks as soon as a server is there, and again after 3 s: what is asked while the server has not found us yet is lost.
-template <typename Asked, typename Told>
-class Client : public Role {
- public:
-  Client(Peer& peer, const std::string& service, const char* asked, const char* told)
-      : replies_(peer.reader<Told>(("rr" + service + "Reply").c_str(), told)),
-        requests_(peer.writer<Asked>(("rq" + service + "Request").c_str(), asked)) {}
-  void step() override {
-    dds::PublicationMatchedStatus asks;
-    dds::SubscriptionMatchedStatus hears;
-    requests_->get_publication_matched_status(asks);
-    replies_->get_subscription_matched_status(hears);
-    const bool available = asks.current_count > 0 && asks.current_count == hears.current_count;
-    if (!heard_ && available && since_asked_++ % kAgain == 0) {
-      rtps::WriteParams parameters;
-      parameters.related_sample_identity().writer_guid(replies_->guid());
-      Asked request = ask();
-      requests_->write(&request, parameters);
-      number_ = parameters.sample_identity().sequence_number();
-    }
-    Told response;
-    for (dds::SampleInfo info; take(*replies_, response, info);) {
-      const auto& related = info.related_sample_identity;
-      if (related.writer_guid() == replies_->guid() && related.sequence_number() == number_)
-        heard_ = true, hear(response);
-    }
-  }
-
- private:
-  virtual Asked ask() = 0;
-  virtual void hear(const Told& response) = 0;
-
-  dds::DataReader* replies_;
-  dds::DataWriter* requests_;
-  rtps::SequenceNumber_t number_;
-  static constexpr int kAgain = 150;  // steps
-  int since_asked_ = 0;
-  bool heard_ = false;
+  Server<Request, Response> server_;
 };
 
 class Switch final : public Client<Request, Response> {
@@ -400,15 +184,94 @@ class Submitter final : public Client<Submitted, Accepted> {
   std::string task_;
 };
 
-constexpr Gid kGoal{1, 2, 3, 4};
+// The action /work: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
+// steps; "lasts": until it is cancelled; "deaf": likewise, by whoever says it twice; all else is done after some steps.
+class Worker final : public Role {
+ public:
+  explicit Worker(Peer& peer)
+      : sends_(peer, "/work/_action/send_goal", kSendType, kDecisionType,
+               [this](const SendGoal& request, const auto& asker) { take_goal(request, asker); }),
+        gets_(peer, "/work/_action/get_result", kGetType, kEndType,
+              [this](const GetResult& request, const auto& asker) {
+                if (Goal* const goal = find(request.goal)) goal->waiting.push_back(asker);
+              }),
+        cancels_(peer, "/work/_action/cancel_goal", kCancelType, kCancelledType,
+                 [this](const Cancel& request, const auto& asker) { take_cancel(request, asker); }),
+        feedback_(
+            peer.writer<Feedback>("rt/work/_action/feedback", "pons_msgs::action::dds_::ExecuteTask_FeedbackMessage_")),
+        status_(peer.writer<Statuses>("rt/work/_action/status", "action_msgs::msg::dds_::GoalStatusArray_",
+                                      dds::TRANSIENT_LOCAL_DURABILITY_QOS)) {}
+  void step() override {
+    sends_.step();
+    gets_.step();
+    cancels_.step();
+    for (Goal& goal : goals_) work(goal);
+  }
+
+ private:
+  using Asker = rtps::SampleIdentity;
+  static constexpr std::uint8_t kExecuting = 2, kCanceling = 3, kSucceeded = 4, kCanceled = 5, kAborted = 6;
+  static constexpr int kSteps = 10;
+  struct Goal {
+    Uuid id{};
+    std::string task;
+    std::uint8_t status = kExecuting;
+    int steps = 0, cancels = 0;
+    std::vector<Asker> waiting;  // for its result
+  };
+
+  Goal* find(const Uuid& id) {
+    const auto found = std::ranges::find(goals_, id, &Goal::id);
+    return found == goals_.end() ? nullptr : &*found;
+  }
+  void take_goal(const SendGoal& request, const Asker& asker) {
+    std::printf("goal %s\n", request.task.c_str());
+    if (request.task != "refused") goals_.push_back({.id = request.goal, .task = request.task});
+    sends_.answer(asker, {request.task != "refused"});
+    show();
+  }
+  void take_cancel(const Cancel& request, const Asker& asker) {
+    Goal* const goal = find(request.goal);
+    std::printf("cancel %s\n", goal != nullptr ? goal->task.c_str() : "of no goal");
+    if (goal != nullptr && ++goal->cancels == 1 && goal->task == "deaf") return;
+    const bool will = goal != nullptr && goal->status == kExecuting;
+    if (will) goal->status = kCanceling;
+    cancels_.answer(asker, {.count = will ? 1U : 0U, .goal = request.goal});
+    show();
+  }
+  void work(Goal& goal) {
+    if (goal.status == kExecuting) {
+      Feedback told{.goal = goal.id, .sequence = ++goal.steps, .text = goal.task};
+      feedback_->write(&told);
+    }
+    const bool lasts = goal.task == "lasts" || goal.task == "deaf";
+    if (goal.status == kExecuting && !lasts && goal.steps >= kSteps)
+      goal.status = goal.task == "fails" ? kAborted : kSucceeded, show();
+    if (goal.status == kCanceling) goal.status = kCanceled, show();
+    if (goal.status < kSucceeded) return;
+    for (const Asker& asker : std::exchange(goal.waiting, {}))
+      gets_.answer(asker, {goal.status, goal.status, goal.task, "by fast"});
+  }
+  void show() {
+    Statuses told;
+    for (const Goal& each : goals_) told.all.emplace_back(each.id, each.status);
+    status_->write(&told);
+  }
+
+  Server<SendGoal, Decision> sends_;
+  Server<GetResult, End> gets_;
+  Server<Cancel, Cancelled> cancels_;
+  dds::DataWriter *feedback_, *status_;
+  std::vector<Goal> goals_;
+};
+
+constexpr Uuid kGoal{1, 2, 3, 4};
 constexpr const char* kAction = "/pons/execute_task/_action/";
 
 class Sends final : public Client<SendGoal, Decision> {
  public:
   Sends(Peer& peer, std::string task)
-      : Client(peer, std::string(kAction) + "send_goal", "pons_msgs::action::dds_::ExecuteTask_SendGoal_Request_",
-               "pons_msgs::action::dds_::ExecuteTask_SendGoal_Response_"),
-        task_(std::move(task)) {}
+      : Client(peer, std::string(kAction) + "send_goal", kSendType, kDecisionType), task_(std::move(task)) {}
   [[nodiscard]] bool accepted() const { return accepted_; }
 
  private:
@@ -423,9 +286,7 @@ class Sends final : public Client<SendGoal, Decision> {
 
 class Gets final : public Client<GetResult, End> {
  public:
-  explicit Gets(Peer& peer)
-      : Client(peer, std::string(kAction) + "get_result", "pons_msgs::action::dds_::ExecuteTask_GetResult_Request_",
-               "pons_msgs::action::dds_::ExecuteTask_GetResult_Response_") {}
+  explicit Gets(Peer& peer) : Client(peer, std::string(kAction) + "get_result", kGetType, kEndType) {}
 
  private:
   GetResult ask() override { return {kGoal}; }
@@ -434,9 +295,7 @@ class Gets final : public Client<GetResult, End> {
 
 class Cancels final : public Client<Cancel, Cancelled> {
  public:
-  explicit Cancels(Peer& peer)
-      : Client(peer, std::string(kAction) + "cancel_goal", "action_msgs::srv::dds_::CancelGoal_Request_",
-               "action_msgs::srv::dds_::CancelGoal_Response_") {}
+  explicit Cancels(Peer& peer) : Client(peer, std::string(kAction) + "cancel_goal", kCancelType, kCancelledType) {}
 
  private:
   Cancel ask() override { return {kGoal}; }
@@ -463,25 +322,30 @@ class Actor final : public Role {
 
 }  // namespace
 
+// Of main()'s third word; none: there is no such role.
+std::unique_ptr<Role> role_of(const std::string& wanted, Peer& peer) {
+  if (wanted == "talker") return std::make_unique<Talker>(peer);
+  if (wanted == "listener") return std::make_unique<Listener>(peer, "rt/chatter", dds::VOLATILE_DURABILITY_QOS);
+  if (wanted == "viewer")
+    return std::make_unique<Listener>(peer, "rt/chatter", dds::VOLATILE_DURABILITY_QOS,
+                                      dds::BEST_EFFORT_RELIABILITY_QOS);
+  if (wanted == "described")
+    return std::make_unique<Listener>(peer, "rt/robot_description", dds::TRANSIENT_LOCAL_DURABILITY_QOS);
+  if (wanted == "server") return std::make_unique<SwitchServer>(peer);
+  if (wanted == "worker") return std::make_unique<Worker>(peer);
+  if (wanted == "client") return std::make_unique<Switch>(peer);
+  if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) return std::make_unique<Actor>(peer, wanted);
+  if (wanted.starts_with("{")) return std::make_unique<Submitter>(peer, wanted);
+  return nullptr;
+}
+
+}  // namespace fast
+
 int main(int count, char** words) {
   if (count != 4) return std::fputs("usage: fast_peer DOMAIN NODE ROLE\n", stderr), 2;
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
-  Peer peer(static_cast<unsigned>(std::atoi(words[1])), words[2]);
-  const std::string wanted = words[3];
-  std::unique_ptr<Role> role;
-  if (wanted == "talker") role = std::make_unique<Talker>(peer);
-  if (wanted == "listener")
-    role = std::make_unique<Listener>(peer, "rt/chatter", eprosima::fastdds::dds::VOLATILE_DURABILITY_QOS);
-  if (wanted == "viewer")
-    role = std::make_unique<Listener>(peer, "rt/chatter", eprosima::fastdds::dds::VOLATILE_DURABILITY_QOS,
-                                      eprosima::fastdds::dds::BEST_EFFORT_RELIABILITY_QOS);
-  if (wanted == "described")
-    role = std::make_unique<Listener>(peer, "rt/robot_description",
-                                      eprosima::fastdds::dds::TRANSIENT_LOCAL_DURABILITY_QOS);
-  if (wanted == "server") role = std::make_unique<Server>(peer);
-  if (wanted == "client") role = std::make_unique<Switch>(peer);
-  if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) role = std::make_unique<Actor>(peer, wanted);
-  if (wanted.starts_with("{")) role = std::make_unique<Submitter>(peer, wanted);
+  fast::Peer peer(static_cast<unsigned>(std::atoi(words[1])), words[2]);
+  const auto role = fast::role_of(words[3], peer);
   if (!role) return std::fprintf(stderr, "fast_peer: no role '%s'\n", words[3]), 2;
   // Every 20 ms, until the input ends.
   for (pollfd input{STDIN_FILENO, POLLIN, 0}; ::poll(&input, 1, 20) == 0;) {

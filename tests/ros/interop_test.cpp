@@ -5,13 +5,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "pons/gate/ros/action.hpp"
 #include "pons/gate/ros/node.hpp"
 #include "pons/gate/ros/service.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
+#include "pons/wire/types/pons_msgs/action/execute_task.hpp"
 #include "pons/wire/types/std_msgs/msg/string.hpp"
 #include "pons/wire/types/std_srvs/srv/set_bool.hpp"
 #include "tests/ros/peer_process.hpp"
@@ -23,8 +28,10 @@ using namespace std::chrono_literals;
 using test::PeerProcess;
 using ::testing::Contains;
 using ::testing::StartsWith;
+using wire::pons_msgs::action::ExecuteTask;
 using wire::std_msgs::msg::String;
 using wire::std_srvs::srv::SetBool;
+using Ended = ActionClient<ExecuteTask>::Ended;
 
 struct Make {
   const char* name;
@@ -32,11 +39,13 @@ struct Make {
   std::vector<std::string> environment;
 };
 
-// Cyclone takes the first interface that is not loopback, as long as nobody tells it otherwise. The last is how
-// rmw_cyclonedds confines it to one computer.
+// Of Jazzy, where nothing else is said. Cyclone takes the first interface that is not loopback, as long as nobody tells
+// it otherwise. The last is how rmw_cyclonedds confines it to one computer.
 const Make kMakes[] = {
     {"fast", PONS_FAST_PEER, {}},
+    {"fast_of_humble", PONS_FAST_HUMBLE_PEER, {}},
     {"cyclone", PONS_CYCLONE_PEER, {}},
+    {"cyclone_of_humble", PONS_CYCLONE_HUMBLE_PEER, {}},
     {"cyclone_on_loopback",
      PONS_CYCLONE_PEER,
      {R"(CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo" multicast="true"/>)"
@@ -119,6 +128,69 @@ TEST_P(Interop, AServerThatDiesIsNamed) {
   EXPECT_THAT(message, ::testing::HasSubstr("no answer in time"));
 }
 
+// Goals of an action that the peer serves; their ends, as they come.
+class InteropOfActions : public Interop {
+ protected:
+  struct Sent {
+    GoalId id{};
+    std::vector<std::string> feedback;
+    std::optional<Expected<Ended>> end;
+  };
+  void SetUp() override {
+    asks_ = action_client<ExecuteTask>(*node_, "work").value_or(nullptr);
+    ASSERT_NE(asks_, nullptr);
+    ASSERT_TRUE(spun([&] { return asks_->available(); })) << ::testing::PrintToString(worker_.lines());
+  }
+  Sent& send(const std::string& task) {
+    Sent& sent = sent_.emplace_back();
+    const auto id = asks_->send({.task = task}, 30s,
+                                {.accepted = {},
+                                 .feedback = [&](const auto& told) { sent.feedback.push_back(told.text); },
+                                 .ended = [&](auto told) { sent.end = std::move(told); }});
+    EXPECT_TRUE(id) << id.error().line();
+    sent.id = id.value_or(GoalId{});
+    return sent;
+  }
+  Expected<Ended> end_of(const Sent& sent) {
+    if (!spun([&] { return sent.end.has_value(); })) return fail("no end", "work", "");
+    return *sent.end;
+  }
+
+  PeerProcess worker_ = peer("worker");
+  ActionClient<ExecuteTask>* asks_ = nullptr;
+  std::deque<Sent> sent_;
+};
+
+TEST_P(InteropOfActions, HearsHowItsGoalsGo) {
+  for (const auto& [task, status] :
+       {std::pair{"sorted", GoalStatus::STATUS_SUCCEEDED}, std::pair{"fails", GoalStatus::STATUS_ABORTED}}) {
+    const Sent& sent = send(task);
+    const auto end = end_of(sent);
+    ASSERT_TRUE(end) << end.error().line();
+    EXPECT_EQ(end->status, status);
+    EXPECT_EQ(end->result.task_id, task);
+    EXPECT_THAT(end->result.reason, StartsWith("by "));
+    EXPECT_GE(sent.feedback.size(), 5U);
+    EXPECT_THAT(sent.feedback, ::testing::Each(task));
+  }
+  const auto refused = end_of(send("refused"));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().what, kGoalWasRejected);
+}
+
+TEST_P(InteropOfActions, CancelsAGoal) {
+  const Sent& other = send("lasts");
+  const Sent& sent = send("lasts");
+  ASSERT_TRUE(spun([&] { return !sent.feedback.empty() && !other.feedback.empty(); }));
+  ASSERT_TRUE(asks_->cancel(sent.id));
+  const auto end = end_of(sent);
+  ASSERT_TRUE(end) << end.error().line();
+  EXPECT_EQ(end->status, GoalStatus::STATUS_CANCELED);
+  EXPECT_FALSE(other.end);
+}
+
+INSTANTIATE_TEST_SUITE_P(, InteropOfActions, ::testing::ValuesIn(kMakes),
+                         [](const auto& each) { return each.param.name; });
 INSTANTIATE_TEST_SUITE_P(, Interop, ::testing::ValuesIn(kMakes), [](const auto& each) { return each.param.name; });
 
 // Who hears as sensors are heard, on a socket with the system's room, is sent again nothing that it has lost.
@@ -156,8 +228,8 @@ TEST(InteropOfBoth, OneServerAnswersClientsOfEither) {
     answer({.success = request.data, .message = "by pons"});
     ++asked;
   }));
-  PeerProcess fast(kMakes[0].program, test_domain(), "fast", "client", kMakes[0].environment);
-  PeerProcess cyclone(kMakes[1].program, test_domain(), "cyclone", "client", kMakes[1].environment);
+  PeerProcess fast(PONS_FAST_PEER, test_domain(), "fast", "client");
+  PeerProcess cyclone(PONS_CYCLONE_PEER, test_domain(), "cyclone", "client");
   EXPECT_TRUE(spin_until({node.get()}, [&] { return fast.said("reply") && cyclone.said("reply"); }));
   EXPECT_TRUE(fast.said("reply 1 by pons"));
   EXPECT_TRUE(cyclone.said("reply 1 by pons"));

@@ -53,6 +53,16 @@ constexpr const char* kStow = R"(
     success: stowed
     reason: why
 )";
+constexpr const char* kWork = R"(
+  - name: work
+    action: /work
+    type: pons_msgs/action/ExecuteTask
+    arguments: {what: text}
+    goal: {task: "{what}"}
+    timeout_s: 60
+    feedback: [text]
+    reason: reason
+)";
 constexpr const char* kHurry = R"(
   - name: hurry_to
     action: /navigate_to_pose
@@ -188,6 +198,27 @@ TEST_F(Served, ATypeOfSomebodysOwnIsReadOfItsInterfaceFiles) {
   run_process.signal(SIGINT);
   (void)run_process.wait();
   ::unsetenv("AMENT_PREFIX_PATH");
+}
+
+// By Cyclone DDS.
+TEST_F(Served, AnActionOfTheOtherMakeIsServedAndCancelled) {
+  write_world(std::string(kSkills) + kWork);
+  Running run_process(folder_.path(), "run", run());
+  PeerProcess peer(PONS_CYCLONE_PEER, test_domain(), "worker", "worker");
+  submit("done", {{"what", "sorted"}}, "work");
+  expect_end("done", "SUCCEEDED", R"("task_id":"sorted")");
+  submit("not", {{"what", "fails"}}, "work");
+  expect_end("not", "FAILED", "/work: aborted: by cyclone");
+  // Who says a cancellation once has "deaf" go on.
+  for (const char* what : {"lasts", "deaf"}) {
+    submit(what, {{"what", what}}, "work");
+    ASSERT_TRUE(under_way(what));
+    EXPECT_TRUE(gate::ask(folder_ / "s", {{"op", "cancel"}, {"id", what}, {"reason", "lunch"}}));
+    expect_end(what, "CANCELLED", R"("stop":"CONFIRMED")");
+  }
+  EXPECT_EQ(std::ranges::count(peer.lines(), "cancel deaf"), 2);
+  run_process.signal(SIGINT);
+  (void)run_process.wait();
 }
 
 TEST_F(Served, ABridgeThatFollowsAnotherDoesNotAskAgain) {

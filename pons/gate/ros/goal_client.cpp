@@ -117,7 +117,8 @@ Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
   auto bytes = bytes_of_request(request, name_);
   if (!bytes) return std::unexpected(bytes.error());
   const auto called =
-      cancels_->call(*std::move(bytes), kAnswersWithin, [cancelled = std::move(cancelled)](const auto& reply) {
+      cancels_->call(*std::move(bytes), kHearsWithin, [this, id, cancelled = std::move(cancelled)](const auto& reply) {
+        if (!reply && open_.contains(id) && cancel(id, cancelled)) return;
         if (!cancelled) return;
         if (!reply) return cancelled(std::unexpected(reply.error()));
         CancelGoal::Response response;

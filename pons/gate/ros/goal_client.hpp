@@ -56,8 +56,8 @@ class GoalClient final : public Part {
   };
   // CancelGoal's return code, or that nobody answered.
   using Cancelled = std::function<void(const Expected<std::int8_t>&)>;
-  // Within which a server says whether it accepts, and hears of a cancellation.
-  static constexpr std::chrono::milliseconds kAnswersWithin{5000};
+  // Within which a server says whether it accepts, and whether it will cancel.
+  static constexpr std::chrono::milliseconds kAnswersWithin{5000}, kHearsWithin{2000};
 
   // Errors: those of Node::add_writer().
   [[nodiscard]] static Expected<std::unique_ptr<GoalClient>> open(Node& node, std::string name,
@@ -70,7 +70,8 @@ class GoalClient final : public Part {
   // accepted; without, it may take its time, as long as the server is there. Error, at once: no server is there.
   [[nodiscard]] Expected<void> send(const GoalId& id, std::vector<std::byte> request,
                                     std::optional<std::chrono::milliseconds> ends_within, Hears hears);
-  // What comes of the goal, its end says; `cancelled`, which may be none, hears whether the server will try.
+  // What comes of the goal, its end says; `cancelled`, which may be none, hears whether the server will try. What
+  // nobody answers is said again as long as the goal is waited for.
   [[nodiscard]] Expected<void> cancel(const GoalId& id, Cancelled cancelled);
   // Nothing more is told of it.
   void forget(const GoalId& id);

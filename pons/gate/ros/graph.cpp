@@ -71,7 +71,7 @@ void Graph::heard(const Heard& heard) {
     case Heard::Kind::kGone:
       alike_.erase(heard.guid);
       others_.erase(heard.guid);
-      peers_.erase(heard.guid);
+      if (peers_.erase(heard.guid) > 0) choose_form();
       return;
     case Heard::Kind::kIncompatible: {
       const auto own = std::ranges::find(own_, heard.guid, &Endpoint::guid);
@@ -153,18 +153,23 @@ void Graph::learn(const Guid& participant, Peer peer) {
     if (node.name == node_)
       warn(fmt::format("{}: another node of that name is in the graph; give one of them another name or domain",
                        node_.full()));
-  if (peer.form != form_ && !alike_.contains(participant)) {
-    const bool mixed = std::ranges::any_of(peers_, [&](const auto& each) {
-      return each.first != participant && each.second.form == form_ && !alike_.contains(each.first);
-    });
-    if (mixed)
-      warn(
-          "nodes of ROS 2 Humble and of Iron or later are on one domain: they do not read each other's names; each "
-          "sees ours while its kind came last");
-    form_ = peer.form;
-    changed_ = true;
-  }
   peers_.insert_or_assign(participant, std::move(peer));
+  choose_form();
+}
+
+void Graph::choose_form() {
+  const auto any = [this](Form form) {
+    return std::ranges::any_of(
+        peers_, [&](const auto& each) { return each.second.form == form && !alike_.contains(each.first); });
+  };
+  const bool humble = any(Form::kHumble), jazzy = any(Form::kJazzy);
+  if (humble && jazzy)
+    warn(
+        "nodes of ROS 2 Humble and of Iron or later are on one domain: the latter see no name of ours, for what they "
+        "read may end the former; give each a domain of its own");
+  const Form form = jazzy && !humble ? Form::kJazzy : Form::kHumble;
+  changed_ = changed_ || form != form_;
+  form_ = form;
 }
 
 std::vector<std::byte> Graph::announcement() const {

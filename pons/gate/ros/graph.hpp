@@ -21,7 +21,9 @@ namespace pons::gate::ros {
 inline constexpr std::string_view kDiscoveryTopic = "ros_discovery_info";
 
 // How long the identifiers of ros_discovery_info are: 16 bytes since ROS 2 Iron, 24 before. Who reads the other form
-// sees endpoints, but no names of nodes.
+// sees endpoints, but no names of nodes. Iron and later find an empty list of nodes in Humble's form, where its
+// identifier is filled up with zeros; Humble takes whatever bytes of the other for a number of nodes, and may end of it
+// (ros2/rmw_fastrtps#733, #797).
 enum class Form : std::uint8_t { kJazzy, kHumble };
 
 // Of ours or of others'.
@@ -46,7 +48,8 @@ class Graph {
   [[nodiscard]] std::vector<std::byte> announcement() const;
   // True once after what we tell, or how, has changed.
   [[nodiscard]] bool take_changed() { return std::exchange(changed_, false); }
-  // That of the others; where there are both, of those that came last; Jazzy's while there is nobody.
+  // Jazzy's where there is somebody who reads that, and nobody who reads Humble's; else Humble's, which harms nobody:
+  // what we have told last comes to whoever joins, before he has told us anything.
   [[nodiscard]] Form form() const { return form_; }
 
   [[nodiscard]] const std::vector<Endpoint>& own() const { return own_; }
@@ -72,6 +75,7 @@ class Graph {
   [[nodiscard]] bool is_heard_otherwise(const Endpoint& own, std::string_view policy) const;
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);
+  void choose_form();
   void warn(std::string_view text);
 
   NodeName node_;
@@ -79,8 +83,8 @@ class Graph {
   std::vector<Endpoint> own_;
   std::map<Guid, Endpoint> others_;
   std::map<Guid, Peer> peers_;  // by participant
-  std::set<Guid> alike_;        // other nodes of Pons: they speak the form of their peers, as we do
-  Form form_ = Form::kJazzy;
+  std::set<Guid> alike_;        // other nodes of Pons: they speak the form of their peers, as we do, and read both
+  Form form_ = Form::kHumble;
   bool changed_ = true;
   std::vector<std::string> warnings_;
   std::set<std::string> warned_;

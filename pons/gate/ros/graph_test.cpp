@@ -58,38 +58,58 @@ const Endpoint kWriter{.guid = guid(1, 5),
                        .type = "std_msgs::msg::dds_::String_",
                        .user_data = "typehash=RIHS01_aa;"};
 
-TEST(Graph, SpeaksTheFormOfItsPeers) {
+TEST(Graph, SpeaksTheFormOfItsPeersAndHumblesBeforeThereAreAny) {
   Graph graph(kNode, kOurs);
   graph.add_own(kWriter);
   EXPECT_TRUE(graph.take_changed());
   EXPECT_FALSE(graph.take_changed());
+  HumbleInfo humble;
+  ASSERT_TRUE(wire::decode(graph.announcement(), humble));
+  EXPECT_TRUE(std::ranges::equal(std::span(humble.gid.data).first(16), kOurs));
+  EXPECT_EQ(humble.node_entities_info_seq.at(0).node_name, "pons");
+
+  ASSERT_TRUE(
+      graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "talker", {guid(2, 1), guid(2, 2)}), {guid(2, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  EXPECT_TRUE(graph.take_changed());
   ParticipantEntitiesInfo jazzy;
   ASSERT_TRUE(wire::decode(graph.announcement(), jazzy));
   EXPECT_EQ(jazzy.node_entities_info_seq.at(0).node_name, "pons");
   EXPECT_EQ(jazzy.node_entities_info_seq.at(0).writer_gid_seq.at(0).data, kWriter.guid);
-
-  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "talker", {guid(2, 1), guid(2, 2)}), {guid(2, 9), 1}));
-  EXPECT_EQ(graph.form(), Form::kHumble);
-  EXPECT_TRUE(graph.take_changed());
-  HumbleInfo humble;
-  ASSERT_TRUE(wire::decode(graph.announcement(), humble));
-  EXPECT_TRUE(std::ranges::equal(std::span(humble.gid.data).first(16), kOurs));
   EXPECT_THAT(graph.nodes(), ElementsAre("/talker"));
   EXPECT_THAT(graph.take_warnings(), IsEmpty());
 
-  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kOthers, "listener", {}), {guid(3, 9), 1}));
-  EXPECT_EQ(graph.form(), Form::kJazzy);
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kOthers, "listener", {}), {guid(3, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kHumble) << "what the others read would harm it";
+  EXPECT_TRUE(graph.take_changed());
   EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("Humble")));
+  graph.heard({.kind = Heard::Kind::kGone, .guid = kOthers});
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  EXPECT_TRUE(graph.take_changed());
+  graph.heard({.kind = Heard::Kind::kGone, .guid = kTheirs});
+  EXPECT_EQ(graph.form(), Form::kHumble) << "whoever comes next";
+  EXPECT_TRUE(graph.take_changed());
+}
+
+// What comes to whoever joins, before we know of him.
+TEST(Graph, JazzysReadersFindNoNodesInHumblesForm) {
+  Graph graph(kNode, kOurs);
+  graph.add_own(kWriter);
+  auto bytes = graph.announcement();
+  const auto count = std::span(bytes).subspan(wire::kEncapsulation + 16, 4);  // after an identifier of theirs
+  EXPECT_THAT(count, testing::Each(std::byte{0}));
 }
 
 // They would mirror each other, and each what the other has just left.
 TEST(Graph, OtherNodesOfPonsTellNothingOfTheForm) {
   Graph graph(kNode, kOurs);
   graph.heard({.kind = Heard::Kind::kParticipant, .guid = kTheirs, .user_data = "enclave=/;pons=1;"});
-  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "alike", {}), {guid(2, 9), 1}));
-  EXPECT_EQ(graph.form(), Form::kJazzy);
-  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kOthers, "talker", {}), {guid(3, 9), 1}));
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "alike", {}), {guid(2, 9), 1}));
   EXPECT_EQ(graph.form(), Form::kHumble);
+  ASSERT_TRUE(graph.told(info_of<ParticipantEntitiesInfo>(kOthers, "talker", {}), {guid(3, 9), 1}));
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "alike", {}), {guid(2, 9), 2}));
+  EXPECT_EQ(graph.form(), Form::kJazzy);
   EXPECT_THAT(graph.take_warnings(), IsEmpty());
 }
 
