@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <string>
@@ -194,9 +195,10 @@ TEST_P(RosRunOfBoth, CancelsAGoal) {
   EXPECT_THAT(story("watch"), HasSubstr("CANCELLED"));
 }
 
-INSTANTIATE_TEST_SUITE_P(, RosRunOfBoth, ::testing::Values(PONS_FAST_PEER, PONS_CYCLONE_PEER), [](const auto& each) {
-  return std::string(each.param).ends_with("fast_peer") ? "fast" : "cyclone";
-});
+INSTANTIATE_TEST_SUITE_P(, RosRunOfBoth,
+                         ::testing::Values(PONS_FAST_PEER, PONS_CYCLONE_PEER, PONS_FAST_HUMBLE_PEER,
+                                           PONS_CYCLONE_HUMBLE_PEER),
+                         [](const auto& each) { return std::filesystem::path(each.param).filename().string(); });
 
 TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
   const tests::Folder folder;
