@@ -289,7 +289,7 @@ TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
     ASSERT_TRUE(spun([&] { return stamp_ns() >= until; }));
   }
   // Two topics: what one says may be heard before what the other said earlier. A machine that does other things may
-  // have stopped the arm meanwhile: who sends set-points goes on sending them.
+  // have kept the bridge from it so long that the loop stopped the arm: who sends set-points goes on sending them.
   const auto there = [&](double turned) { return std::abs(turned - before[0] - 0.3) < 0.002; };
   std::int64_t again = stamp_ns() + 1'000'000'000;
   ASSERT_TRUE(spun([&] {
@@ -299,7 +299,7 @@ TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
     }
     return there(turned_.back()) && there(asked.back()[0]);
   })) << turned_.back() - before[0]
-      << ", asked for " << asked.back()[0] - before[0] << run_.err();
+      << ", asked for " << asked.back()[0] - before[0] << run_.err() << stories();
   const std::size_t until_there = asked.size();
   Float64MultiArray wrong;
   wrong.data = {1, 2};
