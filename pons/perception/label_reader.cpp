@@ -5,14 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 
 namespace pons::perception {
 namespace {
 
 constexpr double kAround_m = 0.012;  // beyond the print, so that the quiet zone is in
 constexpr double kLeastPrint_m2 = 3e-4;
+constexpr double kOutline = 1.25;  // as large as a label: its modules, and the cells that they blur into
+constexpr double kBlock = 0.6;     // of a label's side: another is a block as large; edges and tape are lines
 
 std::optional<cv::Point2d> project(const RgbdFrame& frame, const Vector3& world) {
   const Vector3 p = frame.world_from_optical.inverse() * world;
@@ -32,16 +36,14 @@ Eigen::Vector2d unproject(const RgbdFrame& frame, const cv::Point2d& pixel, doub
 
 }  // namespace
 
-cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
-                                 const Region& region, double top_z_m) const {
-  cv::Rect cells;
-  double printed = 0;
-  for (const cv::Point& cell : region.cells) {
-    if (texture(cell) == 0) continue;
-    printed += 1;
-    cells |= cv::Rect(cell, cv::Size(1, 1));
-  }
-  if (printed * view.cell_m * view.cell_m < kLeastPrint_m2) return {};
+cv::Point2d LabelReader::Found::middle() const {
+  return std::accumulate(corners.begin(), corners.end(), cv::Point2d()) / 4;
+}
+
+cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& print,
+                                 double top_z_m) const {
+  if (cv::countNonZero(print) * view.cell_m * view.cell_m < kLeastPrint_m2) return {};
+  const cv::Rect cells = cv::boundingRect(print);
   double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
   for (const int x : {cells.x, cells.br().x}) {
     for (const int y : {cells.y, cells.br().y}) {
@@ -57,11 +59,17 @@ cv::Rect LabelReader::print_area(const RgbdFrame& frame, const TopView& view, co
   return area & cv::Rect(0, 0, frame.intrinsics.width, frame.intrinsics.height);
 }
 
-std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, const cv::Rect& area) {
+std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, const cv::Rect& area,
+                                                    const std::vector<Found>& before) {
   // A cv::Mat knows no const data; nothing writes here. NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
   auto* const pixels = const_cast<std::uint8_t*>(frame.rgb.data());
   const cv::Mat3b picture(frame.intrinsics.height, frame.intrinsics.width, reinterpret_cast<cv::Vec3b*>(pixels));
   cv::cvtColor(picture(area), grey_, cv::COLOR_RGB2GRAY);
+  for (const Found& label : before) {
+    std::vector<cv::Point> outline;
+    for (const cv::Point2d& corner : label.corners) outline.push_back(cv::Point(corner) - area.tl());
+    cv::fillConvexPoly(grey_, outline, cv::Scalar(255));
+  }
   // Small modules are found more surely when enlarged; the plain picture goes first because it is four times cheaper.
   struct Attempt {
     int scale;
@@ -86,13 +94,31 @@ std::vector<LabelReader::Found> LabelReader::decode(const RgbdFrame& frame, cons
     std::vector<Found> found;
     for (const auto& result : ZXing::ReadBarcodes(image, hints)) {
       if (!result.isValid()) continue;
-      cv::Point2d middle(0, 0);
-      for (const auto& corner : result.position()) middle += cv::Point2d(corner.x, corner.y) / 4;
-      found.push_back({result.text(), middle / attempt.scale + cv::Point2d(area.tl())});
+      Found label{.code = result.text()};
+      std::ranges::transform(result.position(), label.corners.begin(), [&](const auto& corner) {
+        return cv::Point2d(corner.x, corner.y) / attempt.scale + cv::Point2d(area.tl());
+      });
+      found.push_back(std::move(label));
     }
     if (!found.empty()) return found;
   }
   return {};
+}
+
+void LabelReader::take_away(const RgbdFrame& frame, const TopView& view, const std::vector<Found>& labels,
+                            double top_z_m, cv::Mat1b& print) {
+  double side = 0;  // cells
+  for (const Found& label : labels) {
+    std::vector<cv::Point> outline;
+    for (const cv::Point2d& corner : label.corners) {
+      const Eigen::Vector2d at = unproject(frame, label.middle() + kOutline * (corner - label.middle()), top_z_m);
+      outline.push_back(view.cell(at.x(), at.y()));
+    }
+    side = std::max(side, cv::norm(outline[1] - outline[0]) / kOutline);
+    cv::fillConvexPoly(print, outline, cv::Scalar(0));
+  }
+  const int block = std::max(1, cvRound(kBlock * side));
+  cv::morphologyEx(print, print, cv::MORPH_OPEN, cv::Mat1b(block, block, 1));
 }
 
 std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
@@ -101,10 +127,19 @@ std::vector<LabelRead> LabelReader::read(const RgbdFrame& frame, const TopView& 
   std::vector<LabelRead> reads;
   for (const std::size_t index : wanted) {
     const double top_z_m = sightings[index].world_from_top.translation().z();
-    const cv::Rect area = print_area(frame, view, texture, segments.regions[index], top_z_m);
-    if (area.width < 20 || area.height < 20) continue;
-    for (const Found& found : decode(frame, area)) {
-      const Eigen::Vector2d at = unproject(frame, found.middle, top_z_m);
+    cv::Mat1b print(texture.size(), 0);
+    for (const cv::Point& cell : segments.regions[index].cells) print(cell) = texture(cell);
+    // All of it, then what is printed beside what was found: another label may be legible only when enlarged.
+    std::vector<Found> all, more;
+    do {
+      const cv::Rect area = print_area(frame, view, print, top_z_m);
+      if (area.width < 20 || area.height < 20) break;
+      more = decode(frame, area, all);
+      all.insert(all.end(), more.begin(), more.end());
+      take_away(frame, view, more, top_z_m, print);
+    } while (!more.empty());
+    for (const Found& found : all) {
+      const Eigen::Vector2d at = unproject(frame, found.middle(), top_z_m);
       const cv::Point cell = view.cell(at.x(), at.y());
       const int label = view.contains(cell) ? segments.labels(cell) : 0;
       if (label == 0 || std::ranges::find(reads, found.code, &LabelRead::code) != reads.end()) continue;

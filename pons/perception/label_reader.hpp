@@ -1,6 +1,7 @@
 // Reads QR labels from the parts of a picture where objects with fine print lie.
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -28,11 +29,18 @@ class LabelReader {
  private:
   struct Found {
     std::string code;
-    cv::Point2d middle;  // px, in the frame
+    std::array<cv::Point2d, 4> corners;  // px, in the frame
+    [[nodiscard]] cv::Point2d middle() const;
   };
-  [[nodiscard]] cv::Rect print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& texture,
-                                    const Region& region, double top_z_m) const;
-  [[nodiscard]] std::vector<Found> decode(const RgbdFrame& frame, const cv::Rect& area);
+  // Of the printed cells.
+  [[nodiscard]] cv::Rect print_area(const RgbdFrame& frame, const TopView& view, const cv::Mat1b& print,
+                                    double top_z_m) const;
+  // Not those that were found before.
+  [[nodiscard]] std::vector<Found> decode(const RgbdFrame& frame, const cv::Rect& area,
+                                          const std::vector<Found>& before);
+  // Leaves of the print what may be a label beside these.
+  static void take_away(const RgbdFrame& frame, const TopView& view, const std::vector<Found>& labels, double top_z_m,
+                        cv::Mat1b& print);
 
   cv::Mat1b grey_, large_;
 };
