@@ -199,12 +199,12 @@ TEST(InteropOfPictures, ArriveOnASocketOfTheSystemsOwnSize) {
   const auto node = test_node("pons");
   auto publisher = node->advertise<String>("chatter", {.depth = 2, .publish_mode = Qos::PublishMode::kFlowControlled});
   ASSERT_TRUE(publisher);
+  // Each side finds the other by itself. One after the other: Debian's Fast DDS may abort where it opens memory that
+  // another process is about to lay out.
   PeerProcess reliable(PONS_FAST_PEER, test_domain(), "reliable", "listener");
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return publisher->publish({"first"}) && reliable.said("heard first"); }));
   PeerProcess viewer(PONS_FAST_PEER, test_domain(), "viewer", "viewer");
-  // Each side finds the other by itself.
-  ASSERT_TRUE(spin_until({node.get()}, [&] {
-    return publisher->publish({"first"}) && reliable.said("heard first") && viewer.said("heard first");
-  }));
+  ASSERT_TRUE(spin_until({node.get()}, [&] { return publisher->publish({"second"}) && viewer.said("heard second"); }));
   const auto heard = [](PeerProcess& by, int picture) { return by.said(fmt::format("heard {} ", picture)); };
   // The viewer may be kept from its CPU now and then; sent in one burst each, hardly half of any row arrive.
   int most = 0;
