@@ -204,7 +204,7 @@ class Judge {
       astray(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
     } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;
-      find(parcel, entry, "missorted");
+      find(parcel, entry, "missorted", kFirst);
     } else if (!entry.succeeded) {
       lost(parcel, entry, "in its chute, but the journal does not say so");
     } else {
@@ -253,21 +253,28 @@ class Judge {
 
   void lost(const ParcelTruth& parcel, const Entry& entry, std::string_view why) {
     ++verdict_.lost;
-    find(parcel, entry, fmt::format("lost: {}", why));
+    find(parcel, entry, fmt::format("lost: {}", why), kFirst);
   }
 
-  void find(const ParcelTruth& parcel, const Entry& entry, std::string_view what) {
-    verdict_.findings.push_back(fmt::format(
-        "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; "
-        "journal: {}",
-        parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(), parcel.size_m.y(),
-        parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "", parcel.picks, parcel.drops,
-        entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason)));
+  // What should not be at all comes before the rest: readers may be shown no more than the first ones.
+  enum Order : std::uint8_t { kFirst, kLast };
+  void find(const ParcelTruth& parcel, const Entry& entry, std::string_view what, Order order = kLast) {
+    const auto where = order == kFirst ? verdict_.findings.begin() + first_++ : verdict_.findings.end();
+    verdict_.findings.insert(
+        where,
+        fmt::format(
+            "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; "
+            "journal: {}",
+            parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(),
+            parcel.size_m.y(), parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "",
+            parcel.picks, parcel.drops,
+            entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason)));
   }
 
   Verdict& verdict_;
   Story story_;
   RunEnd end_;
+  std::ptrdiff_t first_ = 0;                    // of the findings
   std::vector<Unread> unread_;                  // below
   std::vector<const ParcelTruth*> with_entry_;  // likewise
 };

@@ -39,7 +39,8 @@ struct Verdict {
   int unfinished = 0;            // still on the belt or in the hand when the run was broken off
   std::uint64_t violations = 0;  // axis-steps beyond a limit, as the simulator saw the arm
   double worst_ratio = 0;        // of measured speed or commanded torque to its limit
-  // One line for each parcel that is not sorted or deservedly excepted, and for each breach of a limit.
+  // One line for each parcel that is not sorted or deservedly excepted, lost and missorted ones before all others, and
+  // for each breach of a limit.
   std::vector<std::string> findings;
 };
 

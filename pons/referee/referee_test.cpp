@@ -85,6 +85,18 @@ TEST_F(RefereeTest, CountsExceptionsByTheKindOfTheirReason) {
   EXPECT_EQ(verdict.reasons.at("why").undeserved, 1);
 }
 
+TEST_F(RefereeTest, WhatIsLostOrMissortedIsTheFirstFinding) {
+  for (const char* id : {"A", "B", "C", "D"}) accept(id, id);
+  end("A", Outcome::kException);
+  end("C", Outcome::kSucceeded);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kException, "exception"), parcel("B", Whereabouts::kChute, "chute_1"),
+             parcel("C", Whereabouts::kChute, "chute_2"), parcel("D", Whereabouts::kException, "exception")});
+  EXPECT_THAT(verdict.findings,
+              ::testing::ElementsAre(::testing::HasSubstr("B: lost"), ::testing::HasSubstr("C: missorted"),
+                                     ::testing::HasSubstr("D: lost"), ::testing::HasSubstr("A: undeserved")));
+}
+
 TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   accept("A", "A");
   end("A", Outcome::kSucceeded);
