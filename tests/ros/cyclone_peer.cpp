@@ -101,24 +101,24 @@ class Stower final : public Role {
   std::vector<std::uint16_t> left_;
 };
 
-// The action /work: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
+// The action /chore: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
 // steps; "lasts": until it is cancelled; "deaf": likewise, by whoever says it twice; all else is done after some steps.
 class Worker final : public Role {
  public:
   explicit Worker(Peer& peer)
-      : sends_(peer, "/work/_action/send_goal", pons_msgs_action_dds__ExecuteTask_SendGoal_Request__desc,
+      : sends_(peer, "/chore/_action/send_goal", pons_msgs_action_dds__ExecuteTask_SendGoal_Request__desc,
                pons_msgs_action_dds__ExecuteTask_SendGoal_Response__desc,
                [this](const auto& request, auto asker) { take_goal(request, asker); }),
-        gets_(peer, "/work/_action/get_result", pons_msgs_action_dds__ExecuteTask_GetResult_Request__desc,
+        gets_(peer, "/chore/_action/get_result", pons_msgs_action_dds__ExecuteTask_GetResult_Request__desc,
               pons_msgs_action_dds__ExecuteTask_GetResult_Response__desc,
               [this](const auto& request, auto asker) {
                 if (Goal* const goal = find(request.goal_id)) goal->waiting.push_back({request, asker});
               }),
-        cancels_(peer, "/work/_action/cancel_goal", action_msgs_srv_dds__CancelGoal_Request__desc,
+        cancels_(peer, "/chore/_action/cancel_goal", action_msgs_srv_dds__CancelGoal_Request__desc,
                  action_msgs_srv_dds__CancelGoal_Response__desc,
                  [this](const auto& request, auto asker) { take_cancel(request, asker); }),
-        feedback_(peer.writer(pons_msgs_action_dds__ExecuteTask_FeedbackMessage__desc, "rt/work/_action/feedback")),
-        status_(peer.writer(action_msgs_msg_dds__GoalStatusArray__desc, "rt/work/_action/status", kTopicData,
+        feedback_(peer.writer(pons_msgs_action_dds__ExecuteTask_FeedbackMessage__desc, "rt/chore/_action/feedback")),
+        status_(peer.writer(action_msgs_msg_dds__GoalStatusArray__desc, "rt/chore/_action/status", kTopicData,
                             DDS_DURABILITY_TRANSIENT_LOCAL)) {}
   void step() override {
     sends_.step();

@@ -184,22 +184,22 @@ class Submitter final : public Client<Submitted, Accepted> {
   std::string task_;
 };
 
-// The action /work: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
+// The action /chore: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
 // steps; "lasts": until it is cancelled; "deaf": likewise, by whoever says it twice; all else is done after some steps.
 class Worker final : public Role {
  public:
   explicit Worker(Peer& peer)
-      : sends_(peer, "/work/_action/send_goal", kSendType, kDecisionType,
+      : sends_(peer, "/chore/_action/send_goal", kSendType, kDecisionType,
                [this](const SendGoal& request, const auto& asker) { take_goal(request, asker); }),
-        gets_(peer, "/work/_action/get_result", kGetType, kEndType,
+        gets_(peer, "/chore/_action/get_result", kGetType, kEndType,
               [this](const GetResult& request, const auto& asker) {
                 if (Goal* const goal = find(request.goal)) goal->waiting.push_back(asker);
               }),
-        cancels_(peer, "/work/_action/cancel_goal", kCancelType, kCancelledType,
+        cancels_(peer, "/chore/_action/cancel_goal", kCancelType, kCancelledType,
                  [this](const Cancel& request, const auto& asker) { take_cancel(request, asker); }),
-        feedback_(
-            peer.writer<Feedback>("rt/work/_action/feedback", "pons_msgs::action::dds_::ExecuteTask_FeedbackMessage_")),
-        status_(peer.writer<Statuses>("rt/work/_action/status", "action_msgs::msg::dds_::GoalStatusArray_",
+        feedback_(peer.writer<Feedback>("rt/chore/_action/feedback",
+                                        "pons_msgs::action::dds_::ExecuteTask_FeedbackMessage_")),
+        status_(peer.writer<Statuses>("rt/chore/_action/status", "action_msgs::msg::dds_::GoalStatusArray_",
                                       dds::TRANSIENT_LOCAL_DURABILITY_QOS)) {}
   void step() override {
     sends_.step();

@@ -137,7 +137,7 @@ class InteropOfActions : public Interop {
     std::optional<Expected<Ended>> end;
   };
   void SetUp() override {
-    asks_ = action_client<ExecuteTask>(*node_, "work").value_or(nullptr);
+    asks_ = action_client<ExecuteTask>(*node_, "chore").value_or(nullptr);
     ASSERT_NE(asks_, nullptr);
     ASSERT_TRUE(spun([&] { return asks_->available(); })) << ::testing::PrintToString(worker_.lines());
   }
@@ -152,7 +152,7 @@ class InteropOfActions : public Interop {
     return sent;
   }
   Expected<Ended> end_of(const Sent& sent) {
-    if (!spun([&] { return sent.end.has_value(); })) return fail("no end", "work", "");
+    if (!spun([&] { return sent.end.has_value(); })) return fail("no end", "chore", "");
     return *sent.end;
   }
 

@@ -55,7 +55,7 @@ constexpr const char* kStow = R"(
 )";
 constexpr const char* kWork = R"(
   - name: work
-    action: /work
+    action: /chore
     type: pons_msgs/action/ExecuteTask
     arguments: {what: text}
     goal: {task: "{what}"}
@@ -208,7 +208,7 @@ TEST_F(Served, AnActionOfTheOtherMakeIsServedAndCancelled) {
   submit("done", {{"what", "sorted"}}, "work");
   expect_end("done", "SUCCEEDED", R"("task_id":"sorted")");
   submit("not", {{"what", "fails"}}, "work");
-  expect_end("not", "FAILED", "/work: aborted: by cyclone");
+  expect_end("not", "FAILED", "/chore: aborted: by cyclone");
   // Who says a cancellation once has "deaf" go on.
   for (const char* what : {"lasts", "deaf"}) {
     submit(what, {{"what", what}}, "work");

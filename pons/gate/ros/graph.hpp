@@ -22,8 +22,8 @@ inline constexpr std::string_view kDiscoveryTopic = "ros_discovery_info";
 
 // How long the identifiers of ros_discovery_info are: 16 bytes since ROS 2 Iron, 24 before. Who reads the other form
 // sees endpoints, but no names of nodes. Iron and later find an empty list of nodes in Humble's form, where its
-// identifier is filled up with zeros; Humble takes whatever bytes of the other for a number of nodes, and may end of it
-// (ros2/rmw_fastrtps#733, #797).
+// identifier is filled up with zeros; Humble takes whatever bytes of the other for a number of nodes, and may end of
+// it.
 enum class Form : std::uint8_t { kJazzy, kHumble };
 
 // Of ours or of others'.
