@@ -25,7 +25,7 @@ bool may_become(std::int8_t from, std::int8_t to) {
 }  // namespace
 
 bool Goals::add(const GoalId& id, Clock::time_point now, std::int64_t stamp_ns) {
-  return goals_.try_emplace(id, Goal{.stamp_ns = stamp_ns, .ended = now}).second;
+  return goals_.try_emplace(id, Goal{.stamp_ns = stamp_ns, .number = ++accepted_, .ended = now}).second;
 }
 
 bool Goals::becomes(const GoalId& id, std::int8_t status, Clock::time_point now) {
@@ -70,11 +70,13 @@ wire::action_msgs::msg::GoalInfo Goals::info(const GoalId& id) const {
 }
 
 wire::action_msgs::msg::GoalStatusArray Goals::all() const {
+  std::map<std::int64_t, GoalId> in_order;
+  for (const auto& [id, goal] : goals_) in_order.emplace(goal.number, id);
   wire::action_msgs::msg::GoalStatusArray all;
-  for (const auto& [id, goal] : goals_) {
-    auto& status = all.status_list.emplace_back();
-    status.goal_info = info(id);
-    status.status = goal.status;
+  for (const auto& [number, id] : in_order) {
+    auto& each = all.status_list.emplace_back();
+    each.goal_info = info(id);
+    each.status = status(id);
   }
   return all;
 }

@@ -48,6 +48,7 @@ class Goals {
   // Whom the request means, of those that go on, and what it is answered where it means nobody.
   [[nodiscard]] std::pair<std::vector<GoalId>, std::int8_t> meant(const CancelGoal::Request& request) const;
   [[nodiscard]] wire::action_msgs::msg::GoalInfo info(const GoalId& id) const;
+  // In the order of their acceptance, as rcl has them: viewers look at the last.
   [[nodiscard]] wire::action_msgs::msg::GoalStatusArray all() const;
   // Those that are known no longer.
   [[nodiscard]] std::vector<GoalId> forget(Clock::time_point now);
@@ -55,11 +56,12 @@ class Goals {
  private:
   struct Goal {
     std::int8_t status = GoalStatus::STATUS_ACCEPTED;
-    std::int64_t stamp_ns = 0;
+    std::int64_t stamp_ns = 0, number = 0;  // they are counted as they are accepted
     Clock::time_point ended;
   };
   std::map<GoalId, Goal> goals_;
   std::vector<GoalId> ended_;  // in the order of their ends
+  std::int64_t accepted_ = 0;
 };
 
 [[nodiscard]] wire::builtin_interfaces::msg::Time ros_stamp(std::int64_t ns);

@@ -42,6 +42,15 @@ TEST(Goals, BecomeWhatMayFollow) {
   EXPECT_EQ(goals.status(goal(2)), GoalStatus::STATUS_UNKNOWN);
 }
 
+TEST(Goals, AreToldInTheOrderOfTheirAcceptance) {
+  Goals goals;
+  for (const std::uint8_t first : std::vector<std::uint8_t>{9, 3, 7})
+    ASSERT_TRUE(goals.add({first}, Goals::Clock::now(), 0));
+  std::vector<int> told;
+  for (const auto& each : goals.all().status_list) told.push_back(each.goal_info.goal_id.uuid[0]);
+  EXPECT_EQ(told, (std::vector{9, 3, 7}));
+}
+
 TEST(Goals, ACancellationMeansOneAllOrThoseUpToATime) {
   Goals goals;
   const auto now = Goals::Clock::now();

@@ -118,7 +118,7 @@ Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
   if (!bytes) return std::unexpected(bytes.error());
   const auto called =
       cancels_->call(*std::move(bytes), kHearsWithin, [this, id, cancelled = std::move(cancelled)](const auto& reply) {
-        if (!reply && open_.contains(id) && cancel(id, cancelled)) return;
+        if (!reply && open_.contains(id)) return unheard_.push_back({id, cancelled});
         if (!cancelled) return;
         if (!reply) return cancelled(std::unexpected(reply.error()));
         CancelGoal::Response response;
@@ -138,6 +138,9 @@ void GoalClient::forget(const GoalId& id) {
 void GoalClient::spin(Clock::time_point now) {
   take_feedback();
   for (ByteClient* const client : {sends_.get(), cancels_.get(), results_.get()}) client->spin(now);
+  for (auto& [id, cancelled] : std::exchange(unheard_, {})) {
+    if (open_.contains(id)) (void)cancel(id, std::move(cancelled));
+  }
   // Nothing more is heard of the goals of one that has gone, though another may have come.
   std::vector<GoalId> lost;
   for (const auto& [id, open] : open_) {

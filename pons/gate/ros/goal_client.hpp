@@ -98,6 +98,7 @@ class GoalClient final : public Part {
   std::unique_ptr<Reader> feedback_;
   Sample sample_;
   std::map<GoalId, Open> open_;
+  std::vector<std::pair<GoalId, Cancelled>> unheard_;  // cancellations that nobody has answered in time
 };
 
 }  // namespace pons::gate::ros

@@ -96,15 +96,21 @@ void Graph::heard(const Heard& heard) {
   }
 }
 
-// Who is not reliable enough for one reader of ours is heard by another of the same topic, which asks for less.
+// Who offers one reader of ours too little is heard by another of the same topic, which asks for less.
 bool Graph::is_heard_otherwise(const Endpoint& own, std::string_view policy) const {
-  return policy == "reliability" && !own.writes && std::ranges::any_of(own_, [&](const Endpoint& each) {
-           return !each.writes && each.topic == own.topic && each.qos.reliability == Qos::Reliability::kBestEffort;
-         });
+  const auto asks_less = [&](const Endpoint& each) {
+    return (policy == "reliability" && each.qos.reliability == Qos::Reliability::kBestEffort) ||
+           (policy == "durability" && own.qos.durability != each.qos.durability &&
+            each.qos.durability == Qos::Durability::kVolatile);
+  };
+  return !own.writes && std::ranges::any_of(own_, [&](const Endpoint& each) {
+    return !each.writes && each.topic == own.topic && asks_less(each);
+  });
 }
 
 void Graph::compare(const Endpoint& own, const Endpoint& other) {
-  if (own.topic != other.topic || own.writes == other.writes) return;
+  if (own.topic != other.topic) return;
+  if (own.writes == other.writes) return compare_role(own, other);
   if (own.type != other.type)
     return warn(fmt::format("{}: {} has the type {} there, ours is {}; nothing goes between them", own.topic,
                             owner_of(other.guid), other.type, own.type));
@@ -112,6 +118,19 @@ void Graph::compare(const Endpoint& own, const Endpoint& other) {
   if (!ours.empty() && !theirs.empty() && ours != theirs)
     warn(fmt::format("{}: {} has another definition of {} ({}, ours is {}); build both from the same interface file",
                      own.topic, owner_of(other.guid), own.type, theirs, ours));
+}
+
+// Of some things there is to be one on a domain.
+void Graph::compare_role(const Endpoint& own, const Endpoint& other) {
+  const RosName name = ros_name(own.topic);
+  if (!own.writes && name.use == Use::kRequest) {
+    const std::string what = name.name.substr(0, name.name.find(kActionPart));
+    warn(fmt::format("{}: {} serves it, too, and whoever asks reaches both; give one of them another name", what,
+                     owner_of(other.guid)));
+  }
+  if (own.writes && name.name == "/clock" && name.use == Use::kTopic)
+    warn(fmt::format("/clock: {} tells the time, too, and whoever goes by it sees it jump; remap one of them",
+                     owner_of(other.guid)));
 }
 
 std::string Graph::owner_of(const Guid& endpoint) const {

@@ -58,7 +58,8 @@ class Graph {
   // Full names, of others; several of one name are told as often.
   [[nodiscard]] std::vector<std::string> nodes() const;
   // What stands in the way of speaking with somebody, a line each, told once: another type or definition of it,
-  // qualities of service that do not fit, a node of our name, two forms of ROS 2.
+  // qualities of service that do not fit, a node of our name, who serves or tells the time as we do, two forms of
+  // ROS 2.
   [[nodiscard]] std::vector<std::string> take_warnings() { return std::exchange(warnings_, {}); }
 
  private:
@@ -72,6 +73,7 @@ class Graph {
   };
 
   void compare(const Endpoint& own, const Endpoint& other);
+  void compare_role(const Endpoint& own, const Endpoint& other);
   [[nodiscard]] bool is_heard_otherwise(const Endpoint& own, std::string_view policy) const;
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);

@@ -141,6 +141,27 @@ TEST(Graph, AnotherDefinitionOfATypeIsToldOnceWithItsNode) {
   EXPECT_THAT(graph.take_warnings(), ElementsAre(AllOf(HasSubstr("/listener"), HasSubstr("RIHS01_bb"))));
 }
 
+TEST(Graph, WhoServesTheSameOrTellsTheTimeTooIsToldOnce) {
+  Graph graph(kNode, kOurs);
+  const auto theirs = [&](const std::string& topic, bool writes, std::uint8_t number) {
+    graph.heard({.kind = writes ? Heard::Kind::kWriter : Heard::Kind::kReader,
+                 .guid = guid(2, number),
+                 .topic = topic,
+                 .type = "T"});
+  };
+  std::uint8_t number = 1;
+  for (const char* const part : {"send_goal", "get_result"}) {
+    const std::string topic = std::string("rq/go/_action/") + part + "Request";
+    graph.add_own({.guid = guid(1, number), .topic = topic, .type = "T"});
+    theirs(topic, false, number++);
+  }
+  for (const char* const topic : {"rt/clock", "rt/tf"}) {
+    graph.add_own({.guid = guid(1, number), .writes = true, .topic = topic, .type = "T"});
+    theirs(topic, true, number++);
+  }
+  EXPECT_THAT(graph.take_warnings(), ElementsAre(HasSubstr("/go: somebody serves it, too"), HasSubstr("/clock: ")));
+}
+
 TEST(Graph, AnotherTypeIsToldWhoeverCameFirst) {
   Heard other = reader("RIHS01_aa");
   other.type = "std_msgs::msg::dds_::Int32_";

@@ -92,6 +92,14 @@ void Node::spin_for(std::chrono::milliseconds at_most) {
   spin();
 }
 
+bool Node::is_kept(std::string_view topic) const {
+  const auto name = wire_name(topic, Use::kTopic);
+  return name && std::ranges::any_of(graph_.endpoints(), [&](const auto& each) {
+           const Endpoint& other = each.second;
+           return other.writes && other.qos.durability == Qos::Durability::kTransientLocal && other.topic == *name;
+         });
+}
+
 void Node::warn_of_idle_remaps() {
   for (const auto& [from, to] : settings_.remaps) {
     const auto is_called_so = [&called = to](const Endpoint& own) {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -87,6 +88,7 @@ class Node {
     return {};
   }
   // Likewise, for what must come from whoever says it: who publishes reliably is heard so, who does not as best he can.
+  // What somebody keeps for who comes later is heard, too; what he says after that perhaps twice.
   template <wire::Message T>
   [[nodiscard]] Expected<void> subscribe_to_all(std::string_view topic, std::function<void(const T&)> heard) {
     auto reliable = add_reader(topic, Use::kTopic, T::kName, T::kHash, kTopicQos);
@@ -95,7 +97,8 @@ class Node {
     if (!others) return std::unexpected(others.error());
     const Reader* const first = reliable->get();
     add_part(std::make_unique<Subscription<T>>(*this, std::move(*reliable), heard));
-    add_part(std::make_unique<Subscription<T>>(*this, std::move(*others), std::move(heard), first));
+    add_part(std::make_unique<Subscription<T>>(*this, std::move(*others), heard, first));
+    add_part(std::make_unique<KeptSubscription<T>>(*this, std::string(topic), std::move(heard)));
     return {};
   }
 
@@ -175,11 +178,38 @@ class Node {
     T message_;
   };
 
+  // Only where somebody keeps what he says: others would be warned of a reader that wants more than they offer.
+  template <wire::Message T>
+  class KeptSubscription final : public Part {
+   public:
+    KeptSubscription(Node& node, std::string topic, std::function<void(const T&)> heard)
+        : node_(node), topic_(std::move(topic)), heard_(std::move(heard)) {}
+    void spin(Clock::time_point now) override {
+      if (heard_ && node_.is_kept(topic_)) open();
+      if (opened_) opened_->spin(now);
+    }
+
+   private:
+    void open() {
+      auto reader = node_.add_reader(topic_, Use::kTopic, T::kName, T::kHash, kLatchedQos);
+      if (!reader) node_.warn(reader.error().line());
+      if (reader) opened_.emplace(node_, std::move(*reader), std::move(heard_));
+      heard_ = nullptr;
+    }
+
+    Node& node_;
+    std::string topic_;
+    std::function<void(const T&)> heard_;  // until it is opened, or cannot be
+    std::optional<Subscription<T>> opened_;
+  };
+
   explicit Node(const NodeSettings& settings, Descriptor wake) : settings_(settings), wake_(std::move(wake)) {}
   [[nodiscard]] Expected<void> join(const Join& join);
   [[nodiscard]] Expected<EndpointName> endpoint_name(std::string_view name, Use use, std::string_view type,
                                                      std::string_view hash, std::string_view user_data) const;
   void announce();
+  // Whether somebody says something there that he keeps for who comes later.
+  [[nodiscard]] bool is_kept(std::string_view topic) const;
 
   NodeSettings settings_;
   Descriptor wake_;

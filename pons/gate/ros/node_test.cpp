@@ -119,6 +119,20 @@ TEST(RosNode, AllWhoPublishAreHeardOnceAndWithoutAWord) {
   EXPECT_THAT(there->take_warnings(), IsEmpty());
 }
 
+// A button that was pressed before anybody heard of it.
+TEST(RosNode, HearsWhatWasKeptForIt) {
+  const auto here = test_node("here");
+  auto kept = here->advertise<Int64>("stop", kLatchedQos);
+  ASSERT_TRUE(kept);
+  ASSERT_TRUE(kept->publish({7}));
+  const auto there = test_node("there");
+  std::vector<std::int64_t> heard;
+  ASSERT_TRUE(there->subscribe_to_all<Int64>("stop", [&](const Int64& each) { heard.push_back(each.data); }));
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return !heard.empty(); }));
+  EXPECT_EQ(heard.front(), 7);
+  EXPECT_THAT(there->take_warnings(), IsEmpty());
+}
+
 TEST(RosNode, RulesThatRenameNothingAreNamed) {
   const NodeName name{"/", "here"};
   Remaps remaps;

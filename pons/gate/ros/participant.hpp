@@ -40,8 +40,10 @@ struct Qos {
   bool operator==(const Qos&) const = default;
 };
 
-// The profiles of ROS 2.
-inline constexpr Qos kTopicQos{}, kServiceQos{};
+// The profiles of ROS 2; but of services, whose depth no peer hears of, with room for many that ask at once, as those
+// of parameters have: what finds none is never answered.
+inline constexpr Qos kTopicQos{};
+inline constexpr Qos kServiceQos{.depth = 1000};
 inline constexpr Qos kSensorQos{.reliability = Qos::Reliability::kBestEffort, .depth = 5};
 inline constexpr Qos kParametersQos{.depth = 1000};
 inline constexpr Qos kRosoutQos{.durability = Qos::Durability::kTransientLocal, .depth = 1000};
