@@ -118,7 +118,7 @@ Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
   if (!bytes) return std::unexpected(bytes.error());
   const auto called =
       cancels_->call(*std::move(bytes), kHearsWithin, [this, id, cancelled = std::move(cancelled)](const auto& reply) {
-        if (!reply && open_.contains(id)) return unheard_.push_back({id, cancelled});
+        if (!reply && open_.contains(id)) return void(unheard_.emplace_back(id, cancelled));
         if (!cancelled) return;
         if (!reply) return cancelled(std::unexpected(reply.error()));
         CancelGoal::Response response;
