@@ -1,11 +1,13 @@
 // A node as rmw_fastrtps_cpp makes one, on Fast DDS and Fast CDR alone: names, qualities of service, user data, the
-// identities of services, and when a service counts as there. Transports are the library's own choice. With PONS_HUMBLE
-// one of Humble: longer identifiers, no hashes of types.
+// identities of services, and when a service counts as there. Over UDP alone: beside processes that were
+// killed Debian's Fast DDS may abort over what they held of shared memory. With PONS_HUMBLE one of Humble: longer
+// identifiers, no hashes of types.
 #pragma once
 
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <array>
 #include <cstdint>
 #include <cstdio>
@@ -20,6 +22,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <functional>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -141,6 +144,8 @@ class Peer {
     const std::string enclave = "enclave=/;";
     own.user_data().assign(enclave.begin(), enclave.end());
     own.name("/");
+    own.transport().use_builtin_transports = false;
+    own.transport().user_transports.push_back(std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>());
     auto* const factory = dds::DomainParticipantFactory::get_instance();
     participant_ = checked(factory->create_participant(domain, own), "participant");
     publisher_ = checked(participant_->create_publisher(dds::PUBLISHER_QOS_DEFAULT), "publisher");
