@@ -40,6 +40,10 @@ void TrackLabel::read_two(std::string_view code, std::string_view other) {
   reads_ = other_reads_ = 0;
 }
 
+void TrackLabel::suspect(std::string_view code, std::string_view other) {
+  once_disputed_ = {std::string(code), std::string(other)};
+}
+
 void TrackLabel::move(const Eigen::Vector2d& middle_m, Time stamp) {
   middle_m_ = middle_m;
   stamp_ = stamp;

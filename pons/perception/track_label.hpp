@@ -20,6 +20,8 @@ class TrackLabel {
   void read(std::string_view code, const Eigen::Vector2d& middle_m, Time stamp);
   // Two codes at once.
   void read_two(std::string_view code, std::string_view other);
+  // Likewise, but one of them may be a neighbour's.
+  void suspect(std::string_view code, std::string_view other);
 
   // It moved with its object: where the label lies now.
   void move(const Eigen::Vector2d& middle_m, Time stamp);
@@ -32,7 +34,7 @@ class TrackLabel {
   [[nodiscard]] const std::string& code() const { return code_; }
   // Both of an object that shows two.
   [[nodiscard]] const std::vector<std::string>& disputed() const { return disputed_; }
-  // Both of those that it showed before it was dropped: that it was two remains to be seen.
+  // Both of those that it showed before it was dropped, or is suspected to: that it was two remains to be seen.
   [[nodiscard]] const std::vector<std::string>& once_disputed() const { return once_disputed_; }
   // Where it was read last, and when it lay there; only if there is a code.
   [[nodiscard]] const Eigen::Vector2d& middle_m() const { return middle_m_; }

@@ -433,10 +433,10 @@ void Tracker::label_read(std::uint32_t track, std::string_view code, const Eigen
 
 void Tracker::labels_read(std::uint32_t track, const Label& one, const Label& other) {
   Track* const found = find(track);
-  if (found == nullptr) return;
-  // What was cut badly shows a neighbour's, too.
-  if (!shows(*found, one.middle_m) || !shows(*found, other.middle_m)) return;
-  found->label.read_two(one.code, other.code);
+  const int shown = found == nullptr ? 0 : int{shows(*found, one.middle_m)} + int{shows(*found, other.middle_m)};
+  if (shown == 2) found->label.read_two(one.code, other.code);
+  // It was cut badly, or is larger than it was.
+  if (shown == 1) found->label.suspect(one.code, other.code);
 }
 
 void Tracker::forget(std::uint32_t track) {

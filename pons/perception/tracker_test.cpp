@@ -278,6 +278,25 @@ TEST(TrackerTest, APieceOfOneThatShowsTwoCodesHasNoneOfThem) {
   EXPECT_EQ(read(pieces[1], "C"), "C");
 }
 
+// What lay beside it was lost from sight, and lies there again.
+TEST(TrackerTest, OneThatIsTakenForASmallerThatLayBesideItHasNoneOfItsTwoCodes) {
+  Bench bench;
+  const auto code = [&](std::uint32_t track) {
+    const auto beliefs = bench.tracker.beliefs(bench.now, 0);
+    return std::ranges::find(beliefs, track, &ObjectBelief::track)->code;
+  };
+  const std::uint32_t id = bench.update({Bench::sighting(-0.5, 0, 0, {0.18, 0.08, 0.1})}).at(0);
+  ASSERT_EQ(bench.update({Bench::sighting(-0.5, 0, 0, {0.24, 0.09, 0.1})}).at(0), id);
+  bench.tracker.labels_read(id, {"A", {-0.55, 0}}, {"B", {-0.385, 0}});
+  bench.read(id, "A", {-0.05, 0});
+  EXPECT_EQ(code(id), "") << "B may be on it, too";
+  const std::uint32_t other =
+      bench.update({Bench::sighting(-0.5, 0, 0, {0.18, 0.08, 0.1}), Bench::sighting(0.2, 0)})[1];
+  bench.read(other, "B");
+  bench.read(id, "A", {-0.05, 0});
+  EXPECT_EQ(code(id), "A") << "B is somebody else's";
+}
+
 TEST(TrackerTest, WantsLabelsOfWhatCouldBeReadAndIsNotSure) {
   Bench bench;
   EXPECT_FALSE(bench.tracker.wants_labels());

@@ -35,7 +35,8 @@ void Curtains::update(const Composed& cell, const mjData* data, const Ledger& le
     }
   }
   for (Mouth& mouth : mouths_) {
-    if (broken[mouth.place] && !mouth.broken) ++counts_[mouth.place];
+    // What lies on the rim has not fallen in yet.
+    if (mouth.broken && !broken[mouth.place]) ++counts_[mouth.place];
     mouth.broken = broken[mouth.place];
   }
 }

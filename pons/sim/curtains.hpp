@@ -17,7 +17,7 @@ class Curtains {
 
   // After each step.
   void update(const Composed& cell, const mjData* data, const Ledger& ledger);
-  // How often each of the world's places had its curtain broken.
+  // How often the curtain of each of the world's places was broken and is whole again.
   [[nodiscard]] const std::array<std::uint16_t, kMaxPlaces>& counts() const { return counts_; }
 
  private:

@@ -257,6 +257,26 @@ TEST_P(Lift, CupsSealCarryAndReleaseIntoAChute) {
 
 INSTANTIATE_TEST_SUITE_P(Masses, Lift, testing::Values(0.3, 1.5, 3.5));
 
+// Or lies on the rim, maybe, and falls into another mouth.
+TEST(Curtain, WhatHangsInItHasNotFallenIn) {
+  Bench bench(1.0);
+  const world::Place& chute = *bench.world.place("chute_2");
+  const auto counted = [&, place = static_cast<std::size_t>(&chute - bench.world.places.data())] {
+    return bench.cell.arm().measured.fallen_into[place];
+  };
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.05), 1.0, 0.1);
+  bench.puppet.set_vacuum(0xf);
+  bench.puppet.move_tip(bench.top - Vector3(0, 0, 0.004), 0.6, 0.3);
+  bench.puppet.move_tip(bench.top + Vector3(0, 0, 0.30), 0.8, 0.2);
+  bench.puppet.move_tip(chute.center_m + Vector3(0, 0, 0.30), 1.5, 0.2);
+  bench.puppet.move_tip(chute.center_m + Vector3(0, 0, 0.05), 1.0, 0.5);
+  ASSERT_EQ(bench.truth().where, Whereabouts::kHeld);
+  EXPECT_EQ(counted(), 0);
+  bench.puppet.set_vacuum(0);
+  bench.puppet.hold(0.5);
+  EXPECT_EQ(counted(), 1);
+}
+
 TEST(Truth, AJointBeyondItsLimitIsToldWithItsTime) {
   Bench bench(1.0);
   const ArmTruth& arm = bench.cell.ledger.arms().front();
