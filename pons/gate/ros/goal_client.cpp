@@ -75,6 +75,7 @@ bool GoalClient::available() {
 Expected<void> GoalClient::send(const GoalId& id, std::vector<std::byte> request,
                                 std::optional<std::chrono::milliseconds> ends_within, Hears hears) {
   const auto server = results_->server();
+  if (several()) return fail("several servers are there, and each would do it", name_, "stop all but one");
   if (!cancels_->present() || !server) return fail("no server is there", name_, "start it, on the same domain");
   auto called = sends_->call(std::move(request), kAnswersWithin,
                              [this, id, ends_within](const auto& reply) { decided(id, ends_within, reply); });
@@ -101,12 +102,15 @@ void GoalClient::wait_for_end(const GoalId& id, std::optional<std::chrono::milli
   const UUID whose{id};
   auto request = bytes_of_request(whose, name_);
   if (!request) return finish(id, std::unexpected(request.error()));
-  const auto called = results_->call(*std::move(request), within, [this, id](const auto& reply) {
-    const auto status = reply ? status_in(*reply, end_type_) : std::unexpected(reply.error());
-    if (!reply) (void)cancel(id, {});
-    if (!status) return finish(id, std::unexpected(status.error()));
-    finish(id, Ended{*status, *reply});
-  });
+  const auto called = results_->call(
+      *std::move(request), within,
+      [this, id](const auto& reply) {
+        const auto status = reply ? status_in(*reply, end_type_) : std::unexpected(reply.error());
+        if (!reply) (void)cancel(id, {});
+        if (!status) return finish(id, std::unexpected(status.error()));
+        finish(id, Ended{*status, *reply});
+      },
+      server_of(id));
   if (!called) return finish(id, std::unexpected(called.error()));
   if (const auto found = open_.find(id); found != open_.end()) found->second.end = *called;
 }
@@ -116,16 +120,24 @@ Expected<void> GoalClient::cancel(const GoalId& id, Cancelled cancelled) {
   request.goal_info.goal_id.uuid = id;
   auto bytes = bytes_of_request(request, name_);
   if (!bytes) return std::unexpected(bytes.error());
-  const auto called =
-      cancels_->call(*std::move(bytes), kHearsWithin, [this, id, cancelled = std::move(cancelled)](const auto& reply) {
+  const auto called = cancels_->call(
+      *std::move(bytes), kHearsWithin,
+      [this, id, cancelled = std::move(cancelled)](const auto& reply) {
         if (!reply && open_.contains(id)) return void(unheard_.emplace_back(id, cancelled));
         if (!cancelled) return;
         if (!reply) return cancelled(std::unexpected(reply.error()));
         CancelGoal::Response response;
         if (const auto read = wire::decode(*reply, response); !read) return cancelled(std::unexpected(read.error()));
         cancelled(response.return_code);
-      });
+      },
+      server_of(id));
   return called ? Expected<void>{} : std::unexpected(called.error());
+}
+
+// Another may have come since.
+std::optional<Guid> GoalClient::server_of(const GoalId& id) const {
+  const auto found = open_.find(id);
+  return found == open_.end() ? std::nullopt : std::optional(found->second.server);
 }
 
 void GoalClient::forget(const GoalId& id) {

@@ -64,10 +64,13 @@ class GoalClient final : public Part {
                                                                   const ActionTypes& types);
 
   [[nodiscard]] const std::string& name() const { return name_; }
-  // Whether a server is there with all that belongs to it.
+  // Whether the one server is there with all that belongs to it.
   [[nodiscard]] bool available();
+  // Whether more than one is: none is sent a goal, for each would go about it.
+  [[nodiscard]] bool several() const { return sends_->several() || cancels_->several() || results_->several(); }
   // `request`, of send_goal, has this id in it and room for a header before it. `ends_within` counts from its being
-  // accepted; without, it may take its time, as long as the server is there. Error, at once: no server is there.
+  // accepted; without, it may take its time, as long as the server is there. Errors, at once: no server is there, or
+  // several are.
   [[nodiscard]] Expected<void> send(const GoalId& id, std::vector<std::byte> request,
                                     std::optional<std::chrono::milliseconds> ends_within, Hears hears);
   // What comes of the goal, its end says; `cancelled`, which may be none, hears whether the server will try. What
@@ -91,6 +94,7 @@ class GoalClient final : public Part {
   void wait_for_end(const GoalId& id, std::optional<std::chrono::milliseconds> within);
   void take_feedback();
   void finish(const GoalId& id, const Expected<Ended>& end);
+  [[nodiscard]] std::optional<Guid> server_of(const GoalId& id) const;
 
   Node& node_;
   std::string name_, feedback_topic_, decision_type_, end_type_;

@@ -35,6 +35,7 @@ class AnAction final : public OutsideServer {
   Part& client() override { return *goals_; }
   [[nodiscard]] const Part& client() const override { return *goals_; }
   [[nodiscard]] bool available() override { return goals_->available(); }
+  [[nodiscard]] bool several() const override { return goals_->several(); }
   [[nodiscard]] bool reaches(const Call&) override { return true; }  // its client says when it has gone
 
   Expected<void> send(const Call& call) override {
@@ -91,6 +92,7 @@ class AService final : public OutsideServer {
   Part& client() override { return *bytes_; }
   [[nodiscard]] const Part& client() const override { return *bytes_; }
   [[nodiscard]] bool available() override { return bytes_->available(); }
+  [[nodiscard]] bool several() const override { return bytes_->several(); }
   [[nodiscard]] bool reaches(const Call& call) override {
     const auto found = asked_.find(call->id);
     return found == asked_.end() || bytes_->reaches(found->second.server);
@@ -150,6 +152,11 @@ bool OutsideCall::begin() {
   const std::scoped_lock lock(mutex_);
   news_.sent = !withdrawn_;
   return news_.sent;
+}
+
+void OutsideCall::find_several(bool servers) {
+  const std::scoped_lock lock(mutex_);
+  news_.several = servers;
 }
 
 void OutsideCall::accept() {
@@ -242,6 +249,7 @@ void OutsideServer::spin(Clock::time_point now) {
       open_.push_back({call});
     }
   }
+  for (const Call& call : waiting_) call->find_several(several());
   for (auto& [call, until] : open_) {
     if (call->take_cancel()) {
       cancel(call);

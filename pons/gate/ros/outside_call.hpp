@@ -35,6 +35,7 @@ class OutsideCall {
   };
   struct News {
     bool sent = false, accepted = false;
+    bool several = false;                // servers are there, of which none is asked
     bool goes_on = false;                // the server will not cancel it
     std::optional<task::Json> feedback;  // the last that was not looked at
     std::optional<End> end;
@@ -56,6 +57,7 @@ class OutsideCall {
 
   // False: it was withdrawn. Else it counts as sent from here on.
   [[nodiscard]] bool begin();
+  void find_several(bool servers);
   void accept();
   void goes_on();
   void tell(task::Json feedback);
@@ -113,6 +115,7 @@ class OutsideServer : public Part {
   virtual Part& client() = 0;
   [[nodiscard]] virtual const Part& client() const = 0;
   [[nodiscard]] virtual bool available() = 0;
+  [[nodiscard]] virtual bool several() const = 0;
   virtual Expected<void> send(const Call& call) = 0;
   virtual void cancel(const Call& call) = 0;
   // What comes of it is not waited for any more.

@@ -62,7 +62,9 @@ class OutsideSkill final : public task::Skill {
     if (!news.sent) {
       if (ends_by_) return stopped({Status::kFailed, "cancelled before it was asked for"}, StopResult::kConfirmed);
       if (now < began_ + form_->skill().server_wait || !call_->withdraw()) return {};
-      return {Status::kFailed, fmt::format("{}: no server within {:g} s", server(), to_s(form_->skill().server_wait))};
+      return {Status::kFailed,
+              fmt::format("{}: {} within {:g} s", server(), news.several ? "several servers, not one" : "no server",
+                          to_s(form_->skill().server_wait))};
     }
     if (!ends_by_) return {};
     if (!form_->acts())

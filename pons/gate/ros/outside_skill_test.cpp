@@ -60,6 +60,13 @@ class OutsideSkillTest : public ::testing::Test {
     ASSERT_TRUE(served) << served.error().line();
     server_ = *served;
   }
+  void serve_navigation_again() {
+    another_ = test_node("another");
+    auto served = serve_action<NavigateToPose>(
+        *another_, "/navigate_to_pose", [this](const GoalId&, const NavigateToPose::Goal&) { ++others_goals_; },
+        [](const GoalId&) { return true; });
+    ASSERT_TRUE(served) << served.error().line();
+  }
   void start(const char* name, const task::Json& arguments) {
     skill_ = registry_.find(name)->start(arguments, now_);
     ASSERT_TRUE(skill_);
@@ -80,6 +87,7 @@ class OutsideSkillTest : public ::testing::Test {
   [[nodiscard]] bool comes(const std::function<bool()>& done) {
     std::vector<Node*> nodes{here_.get()};
     if (there_) nodes.push_back(there_.get());
+    if (another_) nodes.push_back(another_.get());
     return spin_until(nodes, [&] {
       tick();
       return done();
@@ -94,14 +102,14 @@ class OutsideSkillTest : public ::testing::Test {
     EXPECT_EQ(progress_.stop, stop);
   }
 
-  std::unique_ptr<Node> here_ = test_node("pons"), there_;
+  std::unique_ptr<Node> here_ = test_node("pons"), there_, another_;
   OutsideSkills skills_;
   task::SkillRegistry registry_;
   ActionServer<NavigateToPose>* server_ = nullptr;
   std::vector<GoalId> goals_;
   double asked_x_ = 0;
   bool decides_ = true, accepts_ = true, willing_ = true;
-  int cancels_ = 0;
+  int cancels_ = 0, others_goals_ = 0;
   Time now_;
   std::unique_ptr<task::Skill> skill_;
   Progress progress_;
@@ -172,6 +180,31 @@ TEST_F(OutsideSkillTest, WithoutAServerItFailsByNameAndNothingIsSentLater) {
   navigate();
   ASSERT_TRUE(comes([&] { return told("goal_accepted"); }));
   EXPECT_EQ(goals_.size(), 1U) << "the first was withdrawn";
+}
+
+// Each would do it: two bases on their way to one place.
+TEST_F(OutsideSkillTest, OfSeveralServersNoneIsAsked) {
+  serve_navigation();
+  serve_navigation_again();
+  navigate();
+  const auto until = std::chrono::steady_clock::now() + 1s;  // one alone would have been asked after a fifth of that
+  ASSERT_TRUE(comes([&] { return std::chrono::steady_clock::now() > until; }));
+  EXPECT_TRUE(goals_.empty());
+  tick_after(5s);
+  expect_failed("/navigate_to_pose: several servers, not one within 5 s");
+
+  another_.reset();
+  progress_ = {};
+  navigate();
+  ASSERT_TRUE(comes([&] { return told("goal_accepted"); }));
+  serve_navigation_again();
+  skill_->cancel(now_);
+  ASSERT_TRUE(comes([&] { return server_->status(goals_.at(0)) == GoalStatus::STATUS_CANCELING; }))
+      << "who has the goal is told, whoever else has come";
+  server_->end(goals_.at(0), GoalStatus::STATUS_CANCELED, {});
+  ASSERT_TRUE(comes([&] { return ended(); }));
+  expect_failed("cancelled", StopResult::kConfirmed);
+  EXPECT_EQ(others_goals_, 0);
 }
 
 TEST_F(OutsideSkillTest, WhatIsRejectedOrAbortedSaysWhy) {

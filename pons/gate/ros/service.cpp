@@ -150,7 +150,7 @@ std::vector<Guid> ClientEnds::servers() const {
 
 std::optional<Guid> ClientEnds::server() const {
   const std::vector<Guid> found = servers();
-  return found.empty() ? std::nullopt : std::optional(found.front());
+  return found.size() == 1 ? std::optional(found.front()) : std::nullopt;
 }
 
 bool ClientEnds::reaches(const Guid& server) const {
@@ -169,8 +169,10 @@ bool ClientEnds::available() {
   return matched_ && now - matched_->second >= settled_after(vendor_of(matched_->first));
 }
 
-Expected<std::int64_t> ClientEnds::ask(std::vector<std::byte>& bytes) {
-  const auto there = server();
+Expected<std::int64_t> ClientEnds::ask(std::vector<std::byte>& bytes, std::optional<Guid> to) {
+  const auto there = to ? to : server();
+  if (!there && several())
+    return fail("several servers are there, and each would do it", "service", "stop all but one");
   if (!there) return fail("no server is there", "service", "start it, on the same domain");
   // That of the writer's sample, which is what rmw_fastrtps counts by.
   const std::int64_t number = asked_ + 1;
@@ -213,8 +215,8 @@ Expected<std::unique_ptr<ByteClient>> ByteClient::open(Node& node, std::string n
 }
 
 Expected<std::int64_t> ByteClient::call(std::vector<std::byte> bytes, std::optional<std::chrono::milliseconds> patience,
-                                        Replied replied) {
-  const auto number = ends_->ask(bytes);
+                                        Replied replied, std::optional<Guid> to) {
+  const auto number = ends_->ask(bytes, to);
   if (!number) return std::unexpected(number.error());
   waiting_.emplace(*number,
                    Waiting{std::move(replied), patience ? Clock::now() + *patience : Clock::time_point::max()});

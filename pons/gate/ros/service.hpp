@@ -77,16 +77,18 @@ class ClientEnds final {
  public:
   [[nodiscard]] static Expected<std::unique_ptr<ClientEnds>> open(Node& node, std::string_view name,
                                                                   const ServiceTypes& types, const Qos& qos);
-  // Whether a server is matched with both its ends, and has been for so long that it has surely found ours: DDS matches
-  // each side by itself, and what is sent before the other side has done so is lost, and no one tells.
+  // Whether the one server is matched with both its ends, and has been for so long that it has surely found ours: DDS
+  // matches each side by itself, and what is sent before the other side has done so is lost, and no one tells.
   [[nodiscard]] bool available();
-  // The reader of requests of one that is matched with both its ends; of several the first.
+  // The reader of requests of the one that is matched with both its ends. Of several none: each would do what is asked
+  // for, and those of the other vendor would read it as what it is not.
   [[nodiscard]] std::optional<Guid> server() const;
+  [[nodiscard]] bool several() const { return servers().size() > 1; }
   // Whether that one still is.
   [[nodiscard]] bool reaches(const Guid& server) const;
-  // `bytes` as for ServerEnds::answer(). The number by which the reply is known. Errors: no server; it does not keep
-  // up.
-  [[nodiscard]] Expected<std::int64_t> ask(std::vector<std::byte>& bytes);
+  // `bytes` as for ServerEnds::answer(). `to`: who has been asked before, though there may be others now. The number by
+  // which the reply is known. Errors: no server, or several; it does not keep up.
+  [[nodiscard]] Expected<std::int64_t> ask(std::vector<std::byte>& bytes, std::optional<Guid> to);
   // The oldest reply to us; nothing: there is none.
   [[nodiscard]] std::optional<std::pair<std::int64_t, std::span<const std::byte>>> take(Sample& room);
 
@@ -178,15 +180,17 @@ class ByteClient final : public Part {
 
   [[nodiscard]] bool available() { return ends_->available(); }
   [[nodiscard]] bool present() const { return ends_->server().has_value(); }
+  [[nodiscard]] bool several() const { return ends_->several(); }
   // The server that is asked now; and whether that one is still there.
   [[nodiscard]] std::optional<Guid> server() const { return ends_->server(); }
   [[nodiscard]] bool reaches(const Guid& server) const { return ends_->reaches(server); }
   [[nodiscard]] const std::string& name() const { return name_; }
   // `bytes` as for ServerEnds::answer(). `replied` is called once, in spin(): with the reply, or the error that there
-  // was none in time; without patience, in its own time. Returns by what to forget it. Error, at once: no server is
-  // there.
+  // was none in time; without patience, in its own time. `to` as for ClientEnds::ask(). Returns by what to forget it.
+  // Errors, at once: those of ClientEnds::ask().
   [[nodiscard]] Expected<std::int64_t> call(std::vector<std::byte> bytes,
-                                            std::optional<std::chrono::milliseconds> patience, Replied replied);
+                                            std::optional<std::chrono::milliseconds> patience, Replied replied,
+                                            std::optional<Guid> to = std::nullopt);
   // What comes of that call nobody wants to hear any more.
   void forget(std::int64_t call) { waiting_.erase(call); }
 
