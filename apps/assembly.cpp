@@ -338,7 +338,6 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
          .robot = robot,
          .refresh = [&cell](Time now, std::vector<ObjectBelief> objects,
                             Time seen) { cell.refresh(now, std::move(objects), seen); },
-         .watch = [&cell](std::string_view place, int things, Time seen) { cell.watch(place, things, seen); },
          .label = [&cell](std::vector<ObjectBelief>& objects) { cell.label(objects); },
          .unseen = [&cell] { return cell.left(); },
          .state = [&cell]() -> const link::State& { return cell.arm.state(); },

@@ -25,8 +25,8 @@ struct Sensors {
   bool photo_eye_blocked = false;                 // at the belt's entry
   bool stop_input = false;                        // the body's own stop button or safety chain
   bool watchdog_tripped = false;                  // the body's watchdog has taken the power off: see Body
-  // How often, since the start, something fell through the light curtain in the mouth of each of the world's places:
-  // counted when the curtain is free again.
+  // How often, since the start, something fell through the light curtain below the mouth of each of the world's places:
+  // so far below that what lies on the rim has not.
   std::array<std::uint16_t, kMaxPlaces> fallen_into{};
   std::uint32_t zones_occupied = 0;  // bit i: somebody is in the world's zone i (scanner, light curtain)
 };

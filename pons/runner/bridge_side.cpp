@@ -138,12 +138,6 @@ void BridgeSide::take_in(const Snapshot& snapshot, Time now) {
   }
   seen_ = snapshot;
   seen_behind_ = now - snapshot.due;
-  for (std::size_t camera = 0; camera < world_.cameras.size(); ++camera) {
-    const auto watched = snapshot.occupancy.find(world_.cameras[camera].watches);
-    if (watched == snapshot.occupancy.end() || camera >= snapshot.shown.size()) continue;
-    for (const auto& robot : robots_)
-      if (robot->skills.watch) robot->skills.watch(watched->first, watched->second, snapshot.shown[camera]);
-  }
   if (snapshot.base && first().locate) first().locate(*snapshot.base);
 }
 

@@ -28,8 +28,6 @@ struct SkillPort {
   // Before any skill is ticked: the beliefs, and after them what the view's border cuts; and when the newest frame of
   // the belt was taken that they come from.
   std::function<void(Time, std::vector<ObjectBelief>, Time)> refresh;
-  // How many things a camera saw in a watched place, and when: with each frame; may be empty.
-  std::function<void(std::string_view place, int things, Time seen)> watch = {};
   std::function<void(const BaseBelief&)> locate;  // with each scan of a base's lidar; may be empty
   // Gives the codes to those unread that are known without a camera, as of the last refresh; may be empty.
   std::function<void(std::vector<ObjectBelief>&)> label;

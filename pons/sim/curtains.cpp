@@ -5,7 +5,9 @@
 namespace pons::sim {
 namespace {
 
-constexpr double kBelowRim_m = 0.02;
+// So deep that what reaches down to it has most of itself below the rim: what lies on that, or slides over it, does
+// not.
+constexpr double kBelowRim_m = 0.25;
 
 }  // namespace
 
@@ -35,8 +37,7 @@ void Curtains::update(const Composed& cell, const mjData* data, const Ledger& le
     }
   }
   for (Mouth& mouth : mouths_) {
-    // What lies on the rim has not fallen in yet.
-    if (mouth.broken && !broken[mouth.place]) ++counts_[mouth.place];
+    if (broken[mouth.place] && !mouth.broken) ++counts_[mouth.place];
     mouth.broken = broken[mouth.place];
   }
 }

@@ -1,4 +1,4 @@
-// The light curtains in the chutes' mouths: they tell that something fell in, not what. Private to pons/sim.
+// The light curtains below the chutes' mouths: they tell that something fell in, not what. Private to pons/sim.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ class Curtains {
 
   // After each step.
   void update(const Composed& cell, const mjData* data, const Ledger& ledger);
-  // How often the curtain of each of the world's places was broken and is whole again.
+  // How often each of the world's places had its curtain broken.
   [[nodiscard]] const std::array<std::uint16_t, kMaxPlaces>& counts() const { return counts_; }
 
  private:

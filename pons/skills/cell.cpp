@@ -82,6 +82,7 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   if (held && !arm.operational() && arm.cups().open) {
     // Lost in a stop. A loop that still reckons with the load's weight does not come to rest.
     lost = held;
+    lost_at = now;
     dropped();
   }
   const double passed_s = to_s(now - now_);
@@ -112,13 +113,6 @@ void Cell::refresh(Time now, std::vector<ObjectBelief> objects, std::optional<Ti
   take_in_cut();
   add_unseen();
   believe_felt();
-}
-
-void Cell::watch(std::string_view place, int things, Time seen) {
-  const auto known = std::ranges::find(watched_, place, &Watched::place);
-  Watched& watched = known != watched_.end() ? *known : watched_.emplace_back(std::string(place));
-  watched.things = things;
-  watched.seen = seen;
 }
 
 void Cell::watch_strays() {

@@ -161,14 +161,6 @@ class Cell {
   // What rides beyond the cameras' view now, and what their border is found to cut, nobody has seen whole: it counts as
   // so high an obstacle until it has ridden off the end.
   void unseen_end(double height_m);
-  // How many things a camera saw in a place where nothing should lie, in a frame of that time.
-  void watch(std::string_view place, int things, Time seen);
-  struct Watched {
-    std::string place;
-    int things = 0;
-    Time seen;
-  };
-  [[nodiscard]] const std::vector<Watched>& watched() const { return watched_; }
   [[nodiscard]] const Falls& falls() const { return arm.state().fallen_into; }
   // For the journal, of whatever task runs.
   void note(std::string kind, task::Json detail) { notes_.push_back({std::move(kind), std::move(detail)}); }
@@ -252,8 +244,9 @@ class Cell {
   Mouths mouths;
   std::optional<Held> held;
   std::optional<Miss> missed;
-  std::optional<Hooked> hooked;                                 // the last one
-  std::optional<Held> lost;                                     // from the cups in the last stop in which anything was
+  std::optional<Hooked> hooked;  // the last one
+  std::optional<Held> lost;      // from the cups in a stop, as long as nobody has told what became of it; and when
+  Time lost_at;
   std::shared_ptr<Strays> strays = std::make_shared<Strays>();  // of all arms of a belt
   double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
   bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked
@@ -287,7 +280,6 @@ class Cell {
   double last_belt_speed_m_s_ = 0;
   std::optional<Time> belt_moved_;  // last
   std::vector<ObjectBelief> objects_;
-  std::vector<Watched> watched_;
   std::vector<ObjectBelief> left_;  // on the belt, and not seen since, as of now_
   Dragged dragged_;
   Fallen fallen_{view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m};

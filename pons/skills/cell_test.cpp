@@ -216,12 +216,12 @@ TEST_F(DroppedTest, WhatTurnsOutToBeLargerIsNotTakenForItAnyMore) {
   seen_ = {seen()};
   pass();
   ASSERT_NE(cell_.find("P1"), nullptr);
-  EXPECT_FALSE(cell_.strays->is_any_astray(world_.arm, "P2", now_));
   seen_[0].size_m.y() = 0.2;
   seen_[0].frames_seen = 9;
   pass();
   EXPECT_EQ(cell_.find("P1"), nullptr);
-  EXPECT_TRUE(cell_.strays->is_any_astray(world_.arm, "P2", now_));
+  cell_.strays->fell(world_.arm, "chute_2", now_);
+  EXPECT_EQ(cell_.strays->take_found_gone().at(0).code, "P1");
 }
 
 TEST_F(DroppedTest, OverAChuteOrOutOfViewItIsNot) {

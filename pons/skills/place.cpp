@@ -52,9 +52,7 @@ constexpr Duration kNoReplanBefore = std::chrono::milliseconds(200);  // the end
 constexpr Duration kRested = std::chrono::milliseconds(20);           // after the motion, before the wrist is believed
 constexpr double kGoneShare = 0.4, kGoneLeast_kg = 0.08;              // of the load's mass, and at least
 constexpr Duration kFallsWithin = std::chrono::milliseconds(1000);    // off a rim, too
-constexpr Duration kLooksWithin = std::chrono::milliseconds(3500);    // a camera that watches the tray, every 2 s
-constexpr double kFlat_m = 0.03;  // far from its camera, what lies in a tray is seen from there on
-constexpr Duration kBounces = std::chrono::milliseconds(400);  // from one mouth into the next
+constexpr Duration kTogether = std::chrono::milliseconds(400);        // falls what came along
 
 constexpr const char* kCancelled = "cancelled; still held";
 
@@ -134,7 +132,8 @@ class Place final : public ArmSkill {
   }
 
   Progress plan(Time now) {
-    if (!cell_.held && cell_.lost && cell_.lost->code == object_) return begin_fall(now, *cell_.lost);
+    if (!cell_.held && cell_.lost && cell_.lost->code == object_)
+      return begin_fall(now, *std::exchange(cell_.lost, std::nullopt));
     if (!cell_.held) return {Status::kFailed, "nothing is held", {}};
     if (!object_.empty() && cell_.held->code != object_) {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
@@ -301,8 +300,6 @@ class Place final : public ArmSkill {
   Progress begin_fall(Time now, Held load) {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
-    watched_ = cell_.watched();
-    beside_.clear();
     if (cell_.held) cell_.dropped();
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
@@ -314,22 +311,15 @@ class Place final : public ArmSkill {
   // is seen again.
   Progress fall(Time now) {
     task::Json detail{{"place", name_}, {"object", fallen_.code}};
-    if (beside_.empty()) beside_ = lies_beside();
     if (const auto chutes = cell_.mouths.fallen_since(fallen_.falls); !chutes.empty()) {
       cell_.await_no_more(fallen_.code);
-      cell_.mouths.expect_anywhere(now);  // it may have grazed the last one
+      cell_.mouths.expect_anywhere(now);  // another may have come along
       fallen_.falls = cell_.falls();
       for (const world::Place* const chute : chutes) count(*chute, now);
     }
     if (into_ != nullptr) {
-      if (now < counted_at_ + kBounces || !looked_beside(now)) return {};
-      const std::string on = beside_.empty() && into_->name == name_ ? may_lie_in() : beside_;
-      if (!on.empty()) {
-        detail["fell_into"] = on;
-        return {Status::kException, (beside_.empty() ? "may have fallen into " : "fell into ") + on, detail};
-      }
+      if (now < counted_at_ + kTogether) return {};
       cell_.strays->let_go(fallen_.code, into_->name, now);
-      cell_.strays->counted(cell_.world.arm, fallen_.code, into_->name, now);
       if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
       detail["fell_into"] = into_->name;
       return {Status::kException, "fell into " + into_->name, std::move(detail)};
@@ -342,38 +332,15 @@ class Place final : public ArmSkill {
     return {Status::kFailed, "dropped", std::move(detail)};
   }
 
-  // Grazed, a mouth counts, too, and the last one is where it went; unless another hung on it, may have though no scale
-  // felt it, or lies on a rim: of two counts that of its own mouth is its own then, and the other that one's.
+  // Of two counts that of its own mouth is its own, else the last; the other is that of one that came along, or lay on
+  // a rim.
   void count(const world::Place& chute, Time now) {
-    const bool hung = !fallen_.alone || !fallen_.company.empty();
-    const bool two = hung || cell_.strays->is_any_astray(cell_.world.arm, fallen_.code, now);
-    const bool another = into_ != nullptr && two;
-    const bool own_before = another && into_->name == name_;
-    if (another) cell_.strays->fell(cell_.world.arm, own_before ? chute.name : into_->name, now);
+    const bool own_before = into_ != nullptr && into_->name == name_;
+    if (into_ != nullptr) cell_.strays->fell(cell_.world.arm, own_before ? chute.name : into_->name, now);
     if (!own_before) into_ = &chute;
     counted_at_ = now;
   }
 
-  // A curtain counts what then bounces off its mouth's rim, too.
-  [[nodiscard]] bool looked_beside(Time now) const {
-    const auto has = [&](const Cell::Watched& one) { return one.seen >= fell_at_ + kFallsWithin; };
-    return now >= fell_at_ + kLooksWithin || std::ranges::all_of(cell_.watched(), has);
-  }
-  // Where one more lies than before, though nothing should; empty: nowhere. Of what lies there the next picture may
-  // show nothing: the arm hides it.
-  [[nodiscard]] std::string lies_beside() const {
-    for (const Cell::Watched& before : watched_) {
-      const auto one = std::ranges::find(cell_.watched(), before.place, &Cell::Watched::place);
-      if (one->things > before.things) return one->place;
-    }
-    return {};
-  }
-  // Where it may lie unseen: flat, or on what lies there already.
-  [[nodiscard]] std::string may_lie_in() const {
-    const bool flat = fallen_.load.size_m.minCoeff() < kFlat_m;
-    const auto one = std::ranges::find_if(watched_, [=](int n) { return flat || n > 0; }, &Cell::Watched::things);
-    return one != watched_.end() ? one->place : std::string();
-  }
   // On the belt, where it is asked for again once it is seen.
   Progress look_for_it(Time now) {
     cell_.hold_belt(now);
@@ -438,8 +405,6 @@ class Place final : public ArmSkill {
   std::optional<Time> tried_, blocked_since_, halfway_at_;
   Cell::Search search_;
   world::Entry entry_;
-  std::vector<Cell::Watched> watched_;  // when it fell
-  std::string beside_;                  // where one more has lain since
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
   Time counted_at_, fell_at_;

@@ -99,12 +99,10 @@ void SetDown::begin_at(Time released_at) {
 }
 
 Expected<motion::Trajectory> SetDown::way_to_belt(Time now, double over_belt_m) {
-  // Where there will be room depends on when it gets there, and that on where.
-  Time arrives = now + kTakes;
-  Expected<motion::Trajectory> way = fail("no way to the belt", cell_.held->code);
-  for (int round = 0; round < kRounds; ++round) {
+  if (round_ == 0) arrives_ = now + kTakes;
+  for (;;) {
     const auto goal = [&](const AxisVector& from) -> Expected<AxisVector> {
-      const Vector3 spot = free_spot(arrives, over_belt_m);
+      const Vector3 spot = free_spot(arrives_, over_belt_m);
       const auto down = nearest_orientation(cell_, from, spot, cell_.held->load.yaw_in_tip_rad);
       if (!down) return fail("no room on the belt", cell_.held->code);
       Pose pose = Pose::Identity();
@@ -112,11 +110,12 @@ Expected<motion::Trajectory> SetDown::way_to_belt(Time now, double over_belt_m) 
       pose.linear() = *down;
       return cell_.model.inverse(pose, from);
     };
-    way = cell_.carry(now, goal, search_);
-    if (!way) return way;
-    arrives = way->back().end();
+    auto way = cell_.carry(now, goal, search_);
+    // All rounds may take more than a tick may search.
+    if (!way && cell_.router.spent()) return way;
+    if (way) arrives_ = way->back().end();
+    if (!way || ++round_ == kRounds) return round_ = 0, way;
   }
-  return way;
 }
 
 // Tip position over the belt: the first with room enough at `time`, else the one with the most.

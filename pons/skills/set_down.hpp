@@ -44,6 +44,9 @@ class SetDown {
   Delay delay_;
   Cell::Search search_{.must = true};
   std::size_t height_ = 0;  // over the belt, that is being searched
+  // Where there will be room depends on when it gets there, and that on where.
+  int round_ = 0;
+  Time arrives_;
   struct Back {
     Vector3 tip_m;  // relative to the belt
     Eigen::Matrix3d orientation;

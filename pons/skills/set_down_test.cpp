@@ -47,6 +47,23 @@ TEST_F(SetDownTest, WhatDoesNotHangAloneGoesStraightBackOnlyFromNearby) {
   EXPECT_NEAR(let_go_over_belt_m(1.2, Vector3(-0.4, 0.05, top_m)), 0.2, 0.005);
 }
 
+class SetDownOfTheFirstArmTest : public ObedientArmTest {
+ protected:
+  SetDownOfTheFirstArmTest() : ObedientArmTest(shipped_world("parcel_cell_two_arms").arms()[0]) {}
+};
+
+// An arm held its load for ten minutes: the search is longer than a tick's, and began anew in each.
+TEST_F(SetDownOfTheFirstArmTest, AWayFromAFarMouthIsFoundInAFewTicks) {
+  is_stopped_at({-1.797, -0.459, 1.020});
+  cell_.held = Held{"P1", {{0.236, 0.200, 0.106}, -1.571, {}}, 2.3};
+  cell_.held->alone = false;
+  SetDown set_down(cell_);
+  int ticks = 0;
+  while (!set_down.begin(now_) && ticks < 50) pass(), ++ticks;
+  EXPECT_GT(ticks, 0) << "it says nothing of what one tick finds";
+  EXPECT_LT(ticks, 5);
+}
+
 // On a belt that comes to rest meanwhile: what swings out beside its place comes down on its neighbour.
 TEST_F(SetDownTest, WhatIsTooHeavyIsBroughtBackSoftly) {
   const auto hardest_m_s2 = [&](double mass_kg) {

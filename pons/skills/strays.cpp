@@ -91,16 +91,21 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
   }
 }
 
-void Strays::counted(const std::string& arm, const std::string& load, const std::string& place, Time now) {
-  std::erase_if(counted_, [&](const Fall& one) { return now > one.time + kTornOff; });
-  counted_.push_back({arm, place, now, load});
-}
-
 // With others, whatever is counted next may be one of them.
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
   const bool with_others = std::ranges::any_of(
       doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go && !one.stray.code.empty(); });
   leave(arm, load, now, with_others);
+}
+
+void Strays::lost(const std::string& arm, const std::string& load, Time when, Time now) {
+  dropped(arm, load, now);
+  const auto since = [&](const Fall& one) { return one.arm == arm && one.time > when; };
+  const auto fall = std::ranges::find_if(nobodys_, since);
+  if (fall == nobodys_.end()) return;
+  const std::string place = fall->place;
+  nobodys_.erase(fall);
+  fell(arm, place, now);
 }
 
 void Strays::fell(const std::string& arm, const std::string& place, Time now) {
@@ -110,7 +115,7 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
     const bool there = one.arm == arm || one.put_back;  // the belt carries it on to the next arm
     return there && !told && !(one.let_go && now > *one.let_go + within);
   });
-  if (torn == doubted_.rend()) return fell_off_rim(arm, place, now);
+  if (torn == doubted_.rend()) return void(nobodys_.push_back({arm, place, now}));
   if (torn->put_back) return fell_beside(torn->load, place, now);
   // Who grazes one mouth and falls into the next is counted twice.
   const auto of_load = [&](const auto& one) { return one.load == torn->load; };
@@ -123,15 +128,6 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
   found_gone(*torn);
-}
-
-void Strays::fell_off_rim(const std::string& arm, const std::string& place, Time now) {
-  const auto counted = std::ranges::find_if(counted_.rbegin(), counted_.rend(), [&](const Fall& one) {
-    return one.arm == arm && one.place != place && now <= one.time + kTornOff;
-  });
-  if (counted == counted_.rend()) return nobodys_.push_back({arm, place, now});
-  found_gone_.push_back({counted->load, place});
-  counted->place = place;
 }
 
 void Strays::uncounted(const std::string& arm, const std::string& load, Time let_go) {
@@ -262,13 +258,6 @@ const Strays::Doubted* Strays::of(const std::string& code) const {
   const auto found =
       std::ranges::find_if(doubted_, [&](const Doubted& one) { return one.let_go && one.stray.code == code; });
   return found == doubted_.end() ? nullptr : &*found;
-}
-
-bool Strays::is_any_astray(const std::string& arm, const std::string& load, Time now) const {
-  return std::ranges::any_of(doubted_, [&](const Doubted& one) {
-    const bool lies_somewhere = one.track == kNoTrack && !one.put_back && !one.told && one.seen == Time{};
-    return lies_somewhere && one.arm == arm && one.load != load && now < *one.let_go + kAstray;
-  });
 }
 
 bool Strays::is_gone(const std::string& code) const {

@@ -34,12 +34,11 @@ class Strays {
   void put_back(const std::string& arm, const std::string& load, Time now);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
-  // What the arm lost was counted in that place. It may lie on its rim: what another place of the arm's counts soon,
-  // and is nobody else's, is it.
-  void counted(const std::string& arm, const std::string& load, const std::string& place, Time now);
   // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
   // load. Once it is lifted again, it is not astray.
   void dropped(const std::string& arm, const std::string& load, Time now);
+  // Likewise, but at `when`: it may have been counted since.
+  void lost(const std::string& arm, const std::string& load, Time when, Time now);
   // Something fell into that place of the arm's, over which nothing was let go of: one was torn off a load of this
   // moment, or is what was dropped or put back, by whichever arm. Whose nobody tells soon is named without a code.
   void fell(const std::string& arm, const std::string& place, Time now);
@@ -56,8 +55,6 @@ class Strays {
   void taken(std::uint32_t track);
   // Where it went, if it did; nullptr: it was nobody's company, or was seen since.
   [[nodiscard]] const std::string* place_of(const std::string& code) const;
-  // Whether another than that load is astray: dropped by the arm not long ago, and nobody knows where.
-  [[nodiscard]] bool is_any_astray(const std::string& arm, const std::string& load, Time now) const;
   // It was found gone, and not seen since.
   [[nodiscard]] bool is_gone(const std::string& code) const;
   // It was put back beside others, and since a curtain counted one of them no camera has seen it: what lies in its
@@ -81,11 +78,10 @@ class Strays {
     Time seen;  // since its load was let go of
     bool missed = false, gone = false, told = false, put_back = false;
   };
-  // What fell into a place of an arm's, and was nobody's; or that load, as counted() there.
+  // What fell into a place of an arm's, and was nobody's.
   struct Fall {
     std::string arm, place;
     Time time;
-    std::string load = {};
   };
   // One of a load's company, where a light curtain has told.
   struct Torn {
@@ -94,7 +90,6 @@ class Strays {
   };
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
-  void fell_off_rim(const std::string& arm, const std::string& place, Time now);
   void fell_beside(const std::string& load, const std::string& place, Time now);
   [[nodiscard]] static bool has_stayed(const Doubted& one);
   void forget_stayed();
@@ -109,7 +104,7 @@ class Strays {
 
   std::vector<Doubted> doubted_;
   std::vector<Torn> torn_;  // and not found gone yet
-  std::vector<Fall> nobodys_, counted_;
+  std::vector<Fall> nobodys_;
   std::vector<Stray> found_gone_;
   std::vector<double> rode_off_;  // the belt's travel each time
 };

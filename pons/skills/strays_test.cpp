@@ -281,20 +281,19 @@ TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "it was found";
 }
 
-// Out of the cameras' view what should have ridden off and did not is not on the belt any more.
-// A load that was lost over its mouth lay on the rim for two seconds, and slid into the next one.
-TEST_F(StraysTest, WhatWasCountedAndLayOnTheRimIsNamedWhereItFell) {
-  strays_.counted("arm", "A", "chute_3", at(11));
-  strays_.fell("arm_2", "chute_4", at(11.5));
-  strays_.fell("arm", "chute_3", at(11.5));
-  EXPECT_TRUE(strays_.take_found_gone().empty()) << "another arm's mouth, or its own once more";
-  strays_.fell("arm", "chute_5", at(11.6));
-  auto gone = strays_.take_found_gone();
+// A stop took it off the cups when its task had ended; the next one tells of it.
+TEST_F(StraysTest, WhatFellBeforeItsLossIsToldIsNamedAllTheSame) {
+  strays_.fell("arm", "chute_4", at(9));
+  strays_.fell("arm_2", "chute_1", at(10.4));
+  strays_.fell("arm", "chute_5", at(10.5));
+  strays_.lost("arm", "A", at(10), at(11));
+  const std::vector<Stray> gone = strays_.take_found_gone();
   ASSERT_EQ(gone.size(), 1U);
   EXPECT_EQ(gone[0].code, "A");
   EXPECT_EQ(gone[0].place, "chute_5");
-  strays_.fell("arm", "chute_6", at(14.5));
-  EXPECT_TRUE(strays_.take_found_gone().empty()) << "much later it is another";
+  strays_.lost("arm", "B", at(12), at(13));
+  strays_.fell("arm", "chute_6", at(15));
+  EXPECT_EQ(strays_.take_found_gone().at(0).code, "B") << "or after that, off a rim";
 }
 
 TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
@@ -403,18 +402,6 @@ TEST_F(StraysTest, WhenAllOfTheCompanyStayedWhatWasTornOffIsNobodys) {
   ASSERT_EQ(gone.size(), 1U);
   EXPECT_EQ(gone[0].code, "");
   EXPECT_EQ(gone[0].place, "chute_5");
-}
-
-TEST_F(StraysTest, WhatWasDroppedIsAstrayForAWhileOrUntilItIsSeen) {
-  const auto any = [&](const char* arm, const char* load, double s) { return strays_.is_any_astray(arm, load, at(s)); };
-  EXPECT_FALSE(any("arm", "B", 11));
-  strays_.dropped("arm", "A", at(11));
-  EXPECT_TRUE(any("arm", "B", 20));
-  EXPECT_FALSE(any("arm", "A", 20)) << "itself";
-  EXPECT_FALSE(any("other", "B", 20));
-  EXPECT_FALSE(any("arm", "B", 50));
-  look({box(5, "A", 0, 12)});
-  EXPECT_FALSE(any("arm", "B", 20));
 }
 
 }  // namespace
