@@ -85,16 +85,15 @@ struct FakeReader;
 
 // What stands where the network would be.
 struct Wire {
-  bool cyclone_first = false;
+  bool cyclone_serves = false;
   std::map<std::string, FakeReader*> readers;  // by topic
   std::uint8_t entities = 0;
   std::optional<std::array<std::byte, kHeaderRoom>> asked;  // the header of the node's last request to Cyclone's rules
 
-  // Of one server, client and topic of either make, that are always there.
-  [[nodiscard]] std::vector<Guid> matched(std::uint8_t kind) const {
-    std::vector<Guid> all{guid_of(kFast, 1, kind), guid_of(kCyclone, 1, kind)};
-    if (cyclone_first) std::ranges::reverse(all);
-    return all;
+  // Of a client and topic of either make, and a server of one, that are always there.
+  [[nodiscard]] std::vector<Guid> matched(const std::string& topic, std::uint8_t kind) const {
+    if (topic.contains("/other/")) return {guid_of(cyclone_serves ? kCyclone : kFast, 1, kind)};
+    return {guid_of(kFast, 1, kind), guid_of(kCyclone, 1, kind)};
   }
 };
 
@@ -110,7 +109,7 @@ struct FakeReader final : Reader {
     return true;
   }
   [[nodiscard]] Guid guid() const override { return id; }
-  [[nodiscard]] std::vector<Guid> matched() const override { return wire.matched(kWriterKind); }
+  [[nodiscard]] std::vector<Guid> matched() const override { return wire.matched(topic, kWriterKind); }
 
   Wire& wire;
   std::string topic;
@@ -154,7 +153,7 @@ struct FakeWriter final : Writer {
     return ++sequence;
   }
   [[nodiscard]] Guid guid() const override { return id; }
-  [[nodiscard]] std::vector<Guid> matched() const override { return wire.matched(kReaderKind); }
+  [[nodiscard]] std::vector<Guid> matched() const override { return wire.matched(topic, kReaderKind); }
 
   Wire& wire;
   std::string topic;
@@ -189,7 +188,7 @@ T must(Expected<T> value) {
 class Course {
  public:
   explicit Course(Bytes bytes) : input_(bytes) {
-    wire_.cyclone_first = (input_.byte() & 1U) != 0;
+    wire_.cyclone_serves = (input_.byte() & 1U) != 0;
     node_ = must(Node::open({.participant = {}, .name = {"/", "pons"}, .remaps = {}},
                             [this](const ParticipantSettings&, const auto&) -> Expected<std::unique_ptr<Participant>> {
                               return std::make_unique<FakeParticipant>(wire_, heard_);
