@@ -245,8 +245,8 @@ class Cell {
   std::optional<Held> held;
   std::optional<Miss> missed;
   std::optional<Hooked> hooked;  // the last one
-  std::optional<Held> lost;      // from the cups in a stop, as long as nobody has told what became of it; and when
-  Time lost_at;
+  std::optional<Held> lost;      // from the cups in a stop, as long as nobody has told what became of it
+  std::optional<Time> lost_at;   // when; of what was lost before this bridge lived, nobody knows
   std::shared_ptr<Strays> strays = std::make_shared<Strays>();  // of all arms of a belt
   double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
   bool lifts = true;      // false: the vacuum is too weak to seal; nothing is picked

@@ -118,8 +118,9 @@ class Pick final : public ArmSkill {
     if (!cell_.world.robot.wrist_sensor)
       return {Status::kFailed, "the robot has no wrist sensor to weigh a load with: see robot.wrist_sensor", {}};
     cell_.keep_clear(now);
-    // Its own task has ended, and tells of it no more.
-    if (auto lost = std::exchange(cell_.lost, {})) cell_.strays->lost(cell_.world.arm, lost->code, cell_.lost_at, now);
+    // Its own task has ended, and tells of it no more; what was lost before this bridge lived, has been told.
+    if (auto lost = std::exchange(cell_.lost, {}); lost && cell_.lost_at)
+      cell_.strays->lost(cell_.world.arm, lost->code, *cell_.lost_at, now);
     if (cell_.held) {
       if (tried_ && now - *tried_ < kTryEvery) return {};
       tried_ = now;

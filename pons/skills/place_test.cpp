@@ -250,6 +250,12 @@ TEST_F(CarriedTest, WhatAStopTookOffTheCupsAfterItsTaskIsToldByTheNextPick) {
   ASSERT_EQ(gone.size(), 1U) << "once";
   EXPECT_EQ(gone[0].code, "P1");
   EXPECT_EQ(gone[0].place, "chute_3");
+
+  cell_.lost = held_;
+  cell_.lost_at.reset();
+  (void)pick(cell_).start(task::Json{{"object", "P2"}}, now_)->tick(now_);
+  cell_.strays->fell(world_.arm, "chute_5", now_);
+  EXPECT_TRUE(cell_.strays->take_found_gone().empty()) << "who took over has told of it";
 }
 
 // With an edge on the belt it weighed nothing on the scale.
