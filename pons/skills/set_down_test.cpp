@@ -52,7 +52,7 @@ class SetDownOfTheFirstArmTest : public ObedientArmTest {
   SetDownOfTheFirstArmTest() : ObedientArmTest(shipped_world("parcel_cell_two_arms").arms()[0]) {}
 };
 
-// An arm held its load for ten minutes: the search is longer than a tick's, and began anew in each.
+// An arm held its load for eight minutes: the search is longer than a tick's, and began anew in each.
 TEST_F(SetDownOfTheFirstArmTest, AWayFromAFarMouthIsFoundInAFewTicks) {
   is_stopped_at({-1.797, -0.459, 1.020});
   cell_.held = Held{"P1", {{0.236, 0.200, 0.106}, -1.571, {}}, 2.3};

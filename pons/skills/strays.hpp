@@ -1,5 +1,5 @@
 // Who may lie in a chute that was not theirs, because it came along with another unfelt, or nowhere that was theirs: as
-// far as cameras, the light curtains in the mouths and the belt's encoder tell.
+// far as cameras, the light curtains below the mouths and the belt's encoder tell.
 #pragma once
 
 #include <cstdint>

@@ -296,6 +296,7 @@ TEST_F(StraysTest, WhatFellBeforeItsLossIsToldIsNamedAllTheSame) {
   EXPECT_EQ(strays_.take_found_gone().at(0).code, "B") << "or after that, off a rim";
 }
 
+// Out of the cameras' view what should have ridden off and did not is not on the belt any more.
 TEST_F(StraysTest, WhoShouldHaveRiddenOffAndDidNotHasGone) {
   carry({{2, "B", {0, 0}}, {3, "C", {0, 0}}});
   look({box(2, "B", 0.4), box(3, "C", 0.7)}, 5.0);  // at the end at a travel of 5.6 and 5.3 m
