@@ -113,21 +113,21 @@ void Strays::fell(const std::string& arm, const std::string& place, Time now) {
     const bool told = one.told || (one.put_back && !one.stray.place.empty());
     const Duration within = one.stray.place.empty() && one.seen == Time{} ? kAstray : kTornOff;
     const bool there = one.arm == arm || one.put_back;  // the belt carries it on to the next arm
-    return there && !told && !(one.let_go && now > *one.let_go + within);
+    return there && !told && !(one.let_go && now > *one.let_go + within) && !have_all_fallen(one.load);
   });
   if (torn == doubted_.rend()) return void(nobodys_.push_back({arm, place, now}));
   if (torn->put_back) return fell_beside(torn->load, place, now);
-  // Who grazes one mouth and falls into the next is counted twice.
-  const auto of_load = [&](const auto& one) { return one.load == torn->load; };
-  const auto last = std::ranges::find_if(torn_.rbegin(), torn_.rend(), of_load);
-  if (last != torn_.rend() && std::ranges::count_if(torn_, of_load) >= std::ranges::count_if(doubted_, of_load))
-    last->place = place;
-  else
-    torn_.push_back({torn->load, arm, place, now});
+  torn_.push_back({torn->load, arm, place, now});
   forget_oldest(torn_);
   if (!torn->let_go || !torn->stray.place.empty()) return;
   torn->gone = true;
   found_gone(*torn);
+}
+
+// Each is counted once, and what is counted beyond them is another's.
+bool Strays::have_all_fallen(const std::string& load) const {
+  return std::ranges::count(torn_, load, &Torn::load) >=
+         std::ranges::count_if(doubted_, [&](const Doubted& one) { return one.load == load && !one.told; });
 }
 
 void Strays::uncounted(const std::string& arm, const std::string& load, Time let_go) {

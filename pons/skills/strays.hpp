@@ -91,6 +91,7 @@ class Strays {
   [[nodiscard]] const std::string& place_of(const Doubted& one) const;
   void found_gone(Doubted& one);
   void fell_beside(const std::string& load, const std::string& place, Time now);
+  [[nodiscard]] bool have_all_fallen(const std::string& load) const;
   [[nodiscard]] static bool has_stayed(const Doubted& one);
   void forget_stayed();
   [[nodiscard]] std::ptrdiff_t may_have_fallen_of(const std::string& load) const;
