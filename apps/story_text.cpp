@@ -147,7 +147,9 @@ std::string stopped(const Json& d) { return fmt::format("by {}: {}", text(d, "by
 
 std::string stray(const Json& d) {
   const std::string place = text(d, "fell_into");
-  return place.empty() ? "its chute's light curtain has not counted it" : "fell into " + place;
+  if (!place.empty()) return "fell into " + place;
+  return text(d, "code").empty() ? "hung on another that fell, and no camera has seen it since"
+                                 : "its chute's light curtain has not counted it";
 }
 
 std::string recognised(const Json& d) { return "on the belt again, as track " + text(d, "track"); }

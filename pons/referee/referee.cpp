@@ -150,15 +150,12 @@ class Judge {
   }
 
   // After the last parcel. That one was never identified says nothing of where it lies: of those below, as many are
-  // accounted for as something without a code was told to have fallen there, or as a camera has seen come there then,
-  // beside those that have an entry of their own.
+  // accounted for as something without a code was told to have fallen there, or nobody knows where, or as a camera has
+  // seen come there then, beside those that have an entry of their own.
   void below_unread() {
     for (const ParcelTruth* const parcel : with_entry_) (void)was_seen(*parcel);
     for (const auto& [parcel, entry] : unread_) {
-      int& unread = story_.unread[parcel->place];
-      const bool told = unread > 0;
-      if (told) --unread;
-      if (was_seen(*parcel) || told) {
+      if (was_seen(*parcel) || was_told(parcel->place) || was_told("")) {
         astray(*parcel, entry, "fell, as the journal says of one that nobody has read");
       } else {
         lost(*parcel, entry, "fell, and was never identified");
@@ -190,6 +187,12 @@ class Judge {
     return false;
   }
 
+  // Each told of is one.
+  bool was_told(const std::string& place) {
+    int& unread = story_.unread[place];
+    return unread > 0 && unread-- > 0;
+  }
+
   // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is
   // nobody's.
   [[nodiscard]] static bool is_given_up(const Entry& entry) {
@@ -199,8 +202,7 @@ class Judge {
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
     if ((!entry.succeeded || entry.astray) && parcel.place == entry.fell_into) {
       astray(parcel, entry, "fell into another chute, which the journal names");
-    } else if (is_given_up(entry) && story_.unread[parcel.place] > 0) {
-      --story_.unread[parcel.place];
+    } else if (is_given_up(entry) && was_told(parcel.place)) {
       astray(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
     } else if (parcel.place != parcel.destination) {
       ++verdict_.missorted;

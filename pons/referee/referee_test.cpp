@@ -303,6 +303,17 @@ TEST_F(RefereeTest, OfTheUnreadBelowAsManyAreAccountedForAsACameraCountsBesideTh
   EXPECT_EQ(judge(parcels).lost, 0);
 }
 
+// It hung on another that fell, and no camera has seen it since.
+TEST_F(RefereeTest, OneThatFellNobodyKnowsWhereIsOneOfTheUnreadBelow) {
+  for (const char* const code : {"A", "B"}) unseen(code);
+  const std::vector<ParcelTruth> parcels{parcel("A", Whereabouts::kTray, "tray"),
+                                         parcel("B", Whereabouts::kFloor, "floor")};
+  stray("", "");
+  EXPECT_EQ(judge(parcels).lost, 1);
+  stray("", "");
+  EXPECT_EQ(judge(parcels).lost, 0);
+}
+
 TEST_F(RefereeTest, WhatBearsAnUnknownCodeIsToldOfByThat) {
   for (const char* const code : {"A", "B", "C"}) unseen(code);
   for (const char* const code : {"X1", "X2"}) ride(code);

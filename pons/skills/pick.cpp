@@ -399,7 +399,7 @@ class Pick final : public ArmSkill {
     const bool odd = weighed && (weighed->mass_kg > (1 - kNearLimit) * limit || weighed->mass_kg < kLightest_kg);
     const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
     const auto beside = weighed ? hangs_beside(cell_.held->load, *weighed, cell_.held->company, hooked) : std::nullopt;
-    if (beside) cell_.hold_belt(now);
+    if (beside) cell_.hold_belt(now), cell_.strays->felt(code_);
     if ((!weighed || odd || beside || hooked) && !at_rest) return {};
     if ((target_.crowded || !cell_.held->alone) && now < lift_end_) return {};
     // What swings the arm so that it cannot be weighed is heavier than any parcel should be.

@@ -270,6 +270,7 @@ class Place final : public ArmSkill {
       const std::string why = fmt::format("another hangs on {}: {:.2f} kg are felt where {:.2f} were weighed",
                                           cell_.held->code, *felt_kg, cell_.held->mass_kg);
       cell_.held->alone = false;
+      cell_.strays->felt(cell_.held->code);
       cell_.weighs(std::min(*felt_kg, kFeltMost * cell_.world.rules.max_mass_kg));
       hold(now, why);
       return {};

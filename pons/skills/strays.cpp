@@ -39,6 +39,10 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
   forget_oldest(doubted_);
 }
 
+void Strays::felt(const std::string& load) {
+  for (Doubted& one : doubted_) one.felt = one.felt || (one.load == load && !one.let_go);
+}
+
 void Strays::put_back(const std::string& arm, const std::string& load, Time now) { leave(arm, load, now, true); }
 
 // What a curtain counted while it hung there may be itself: the cups are open a while before they are known to be.
@@ -95,6 +99,8 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
   const bool with_others = std::ranges::any_of(
       doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go && !one.stray.code.empty(); });
+  for (Doubted& one : doubted_)
+    if (one.load == load && one.felt && one.stray.code.empty() && !one.let_go) one.let_go = now;
   leave(arm, load, now, with_others);
 }
 

@@ -29,13 +29,16 @@ class Strays {
  public:
   // A load with that company hangs on the arm's cups.
   void lifted(const std::string& arm, const std::string& load, const Company& company);
+  // One of its company hangs there: its weight is felt.
+  void felt(const std::string& load);
   // It lies on the belt again, and who came along, too, most likely: unless a light curtain tells otherwise, of then or
   // soon after. Who is not seen again then is the one that fell.
   void put_back(const std::string& arm, const std::string& load, Time now);
   // It was let go of, or fell, into that place.
   void let_go(const std::string& load, const std::string& place, Time now);
   // The arm lost it, and nobody knows where to; it may lie on a rim, off which it falls later, or hang on the next
-  // load. Once it is lifted again, it is not astray.
+  // load. Once it is lifted again, it is not astray. Who was felt on it fell with it: if no camera sees it where it
+  // lay, it is named, even if nobody has read it.
   void dropped(const std::string& arm, const std::string& load, Time now);
   // Likewise, but at `when`: it may have been counted since.
   void lost(const std::string& arm, const std::string& load, Time when, Time now);
@@ -77,6 +80,7 @@ class Strays {
     double half_m = 0, ends_m = 0;
     Time seen;  // since its load was let go of
     bool missed = false, gone = false, told = false, put_back = false;
+    bool felt = false;  // it or another of them, on the load
   };
   // What fell into a place of an arm's, and was nobody's.
   struct Fall {

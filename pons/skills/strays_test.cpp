@@ -295,6 +295,25 @@ TEST_F(StraysTest, WhatFellNobodyKnowsWhereIsNamedOnceACurtainCountsIt) {
   EXPECT_TRUE(strays_.take_found_gone().empty()) << "it was found";
 }
 
+// Nobody has read who hung there.
+TEST_F(StraysTest, WhoWasFeltOnWhatFellIsNamedOnceNoCameraSeesIt) {
+  for (const bool is_felt : {true, false}) {
+    strays_.lifted("arm", "A", {{2, "", {0.2, 0}}, {3, "", {0, 0.2}}});
+    if (is_felt) strays_.felt("A");
+    look({box(2, "", 0), box(3, "", 0)});
+    strays_.dropped("arm", "A", at(11));
+    look({box(3, "", 0, 11.1)}, 0, 11.1);
+    EXPECT_TRUE(strays_.take_found_gone().empty()) << "a curtain may count it yet";
+    look({box(3, "", 0, 12.1)}, 0, 12.1);
+    const std::vector<Stray> gone = strays_.take_found_gone();
+    ASSERT_EQ(gone.size(), is_felt ? 1U : 0U);
+    if (is_felt) {
+      EXPECT_EQ(gone[0].code, "");
+      EXPECT_EQ(gone[0].place, "");
+    }
+  }
+}
+
 // A stop took it off the cups when its task had ended; the next one tells of it.
 TEST_F(StraysTest, WhatFellBeforeItsLossIsToldIsNamedAllTheSame) {
   strays_.fell("arm", "chute_4", at(9));
