@@ -116,7 +116,7 @@ class Place final : public ArmSkill {
 
   void plan_anew() {
     phase_ = Phase::kPlan;
-    search_ = {};
+    search_ = halfway_search_ = {};
   }
 
   void hold(Time now, std::string why) {
@@ -187,7 +187,7 @@ class Place final : public ArmSkill {
                           std::max(tip.translation().z(), belt.surface_z_m + kOverBelt_m));
       return cell_.model.inverse(Cell::tip_down(point, yaw_of(tip.linear())), from);
     };
-    const auto way = cell_.carry(now, halfway, search_);
+    const auto way = cell_.carry(now, halfway, halfway_search_);
     if (!way || !cell_.arm.stream(*way)) return cell_.router.spent();
     halfway_at_ = way->back().end();
     blocked_since_.reset();
@@ -404,7 +404,7 @@ class Place final : public ArmSkill {
   Eigen::Vector2d felt_nm_ = Eigen::Vector2d::Zero(), turns_nm_s_ = Eigen::Vector2d::Zero();
   Time felt_at_;
   std::optional<Time> tried_, blocked_since_, halfway_at_;
-  Cell::Search search_;
+  Cell::Search search_, halfway_search_;
   world::Entry entry_;
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
