@@ -12,7 +12,8 @@ constexpr double kOverlap_m = 0.01;  // footprints that share less only touch
 constexpr double kHidden_m = 0.03;   // how far one may go on under what leans on it
 constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
-constexpr double kShared_m = 0.02, kLevel_m = 0.01;             // footprints share more, as high: one thing cut in two
+constexpr double kShared_m = 0.02, kLevel_m = 0.01;  // footprints share more, as high: one thing cut in two
+constexpr double kAsWide = 0.75;
 constexpr double kUpright = 0.9986;                             // cosine of 3 degrees
 constexpr Duration kTogether = std::chrono::milliseconds(700);  // seen last: two pictures
 constexpr int kGlimpses = 3;  // seen less often, and not read, it may have been a bad cut between two
@@ -21,28 +22,39 @@ bool leans(const ObjectBelief& object) { return object.world_from_top.linear()(2
 
 bool is_glimpse(const ObjectBelief& object) { return object.frames_seen < kGlimpses && object.code.empty(); }
 
+// How far the footprint reaches along that direction from one end to the other.
+double extent_m(const ObjectBelief& object, const Eigen::Vector2d& along) {
+  double extent_m = 0;
+  for (const Eigen::Index side : {0, 1})
+    extent_m += object.size_m[side] * std::abs(along.dot(object.world_from_top.linear().col(side).head<2>()));
+  return extent_m;
+}
+
+struct Gap {
+  double apart_m = -std::numeric_limits<double>::infinity();
+  Eigen::Vector2d along = Eigen::Vector2d::UnitX();
+};
+
+// Two rectangles are apart when they are along a side of one of them.
+Gap gap_between(const ObjectBelief& a, const ObjectBelief& b) {
+  const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
+  Gap widest;
+  for (const ObjectBelief* one : {&a, &b}) {
+    for (const Eigen::Index side : {0, 1}) {
+      const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
+      const double reach_m = 0.5 * (extent_m(a, along) + extent_m(b, along));
+      const double apart_m = std::abs(along.dot(between.head<2>())) - reach_m;
+      if (apart_m > widest.apart_m) widest = {apart_m, along};
+    }
+  }
+  return widest;
+}
+
 bool overlap(const ObjectBelief& a, const ObjectBelief& b, double least_m) { return apart_m(a, b) <= -least_m; }
 
 }  // namespace
 
-// Two rectangles are apart when they are along a side of one of them.
-double apart_m(const ObjectBelief& a, const ObjectBelief& b) {
-  const Vector3 between = b.world_from_top.translation() - a.world_from_top.translation();
-  double most_m = -std::numeric_limits<double>::infinity();
-  for (const ObjectBelief* one : {&a, &b}) {
-    for (const Eigen::Index side : {0, 1}) {
-      const Eigen::Vector2d along = one->world_from_top.linear().col(side).head<2>().normalized();
-      double reach_m = 0;
-      for (const ObjectBelief* each : {&a, &b}) {
-        for (const Eigen::Index s : {0, 1}) {
-          reach_m += 0.5 * each->size_m[s] * std::abs(along.dot(each->world_from_top.linear().col(s).head<2>()));
-        }
-      }
-      most_m = std::max(most_m, std::abs(along.dot(between.head<2>())) - reach_m);
-    }
-  }
-  return most_m;
-}
+double apart_m(const ObjectBelief& a, const ObjectBelief& b) { return gap_between(a, b).apart_m; }
 
 bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
   if (upper.track == lower.track || is_glimpse(upper)) return false;
@@ -56,13 +68,20 @@ bool lies_on(const ObjectBelief& upper, const ObjectBelief& lower) {
 
 namespace {
 
+// What is cut in two is about as wide on either side of the cut.
+bool as_wide(const ObjectBelief& a, const ObjectBelief& b) {
+  const Eigen::Vector2d across = gap_between(a, b).along.unitOrthogonal();
+  const auto [narrower_m, wider_m] = std::minmax({extent_m(a, across), extent_m(b, across)});
+  return narrower_m > kAsWide * wider_m - kShared_m;
+}
+
 // Where one stands, no other does: a thing with two labels was cut between them.
 bool share_room(const ObjectBelief& a, const ObjectBelief& b) {
   const double rise_m = b.world_from_top.translation().z() - a.world_from_top.translation().z();
   const bool named = !a.code.empty() && !b.code.empty(), whole = std::min(a.confidence, b.confidence) >= kSure;
   const bool together = a.last_seen <= b.last_seen + kTogether && b.last_seen <= a.last_seen + kTogether;
   return named && whole && together && std::abs(rise_m) < kLevel_m && !leans(a) && !leans(b) &&
-         overlap(a, b, kShared_m);
+         overlap(a, b, kShared_m) && as_wide(a, b);
 }
 
 }  // namespace

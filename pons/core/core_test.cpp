@@ -101,6 +101,10 @@ TEST(Belief, OneWithTwoLabelsThatWasCutBetweenThemIsNotTwo) {
   other.confidence = 0.3;
   EXPECT_FALSE(is_part(one, other)) << "partly hidden, it may end elsewhere";
   other.confidence = 0.97;
+  other.size_m.x() = 0.19;
+  EXPECT_FALSE(is_part(one, other)) << "much narrower, it is a neighbour, cut badly";
+  other.size_m.x() = 0.25;
+  EXPECT_TRUE(is_part(one, other));
   other.last_seen = one.last_seen + from_s(1);
   EXPECT_FALSE(is_part(one, other)) << "where the first was, it may have been pushed";
 }
