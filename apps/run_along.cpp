@@ -21,7 +21,9 @@ Expected<RunAlong> RunAlong::begin(const RecordOptions& options, const FoxgloveO
     along.foxglove_ = *std::move(foxglove);
   }
   if (!options.on()) return along;
-  auto notes = notes_of(facts, world);
+  RunFacts recorded = facts;
+  recorded.depth = options.depth;
+  auto notes = notes_of(recorded, world);
   if (!notes) return std::unexpected(notes.error());
   auto recorder = RunRecorder::open(options, earlier, facts.pace, bytes_of(facts.keep_free_mib), *std::move(notes));
   if (!recorder) return std::unexpected(recorder.error());

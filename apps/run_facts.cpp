@@ -132,6 +132,7 @@ RunFacts read_facts(Reading& from) {
   facts.attended = from.text_or_none("attended");
   facts.seed = from.number<std::uint64_t>("seed");
   facts.keep_free_mib = from.number<std::uint64_t>("keep_free_mib");
+  facts.depth = !from.text_or_none("depth").empty();
   facts.parcels = from.number_or_none<std::int64_t>("parcels");
   facts.manifest = from.text_or_none("manifest");
   facts.faults = from.text("faults");
@@ -192,6 +193,7 @@ Expected<std::vector<mcap::Metadata>> notes_of(const RunFacts& facts, const worl
     if (!text.empty()) texts.emplace(key, text);
   };
   add("attended", facts.attended);
+  if (facts.depth) add("depth", "yes");
   if (facts.parcels) add("parcels", fmt::format("{}", *facts.parcels));
   add("manifest", facts.manifest);
   add("faults_file", facts.faults_file);

@@ -23,6 +23,7 @@ struct RunFacts {
   std::string attended;  // by which options others may have asked for something; empty: by none
   std::uint64_t seed = 1;
   std::uint64_t keep_free_mib = 0;
+  bool depth = false;  // pictures of it are in the recording
   // Of a cell with an arm.
   std::optional<std::int64_t> parcels;  // nothing: the whole manifest
   std::string manifest;                 // what its file holds; empty: drawn

@@ -83,6 +83,8 @@ void add_record_options(CLI::App& command, RecordOptions& options) {
                   "Keep no more than the newest files of so many MiB together; 2 to 1000000 (all)")
       ->check(whole_number(1'000'000))
       ->needs(file);
+  command.add_flag("--record-depth", options.depth, "Pictures of depth, too: several times as large a recording")
+      ->needs(file);
 }
 
 Expected<std::string> recorded_name(std::string_view topic) { return gate::ros::expanded(topic, {"/", "pons"}, {}); }
@@ -102,18 +104,18 @@ Expected<std::unique_ptr<RunRecorder>> RunRecorder::open(const RecordOptions& op
   }
   auto recorder = record::Recorder::open(*std::move(made));
   if (!recorder) return std::unexpected(recorder.error());
-  return std::unique_ptr<RunRecorder>(new RunRecorder(*std::move(recorder), options.file, pace));
+  return std::unique_ptr<RunRecorder>(new RunRecorder(*std::move(recorder), options, pace));
 }
 
-RunRecorder::RunRecorder(std::unique_ptr<record::Recorder> recorder, fs::path file, runner::Pace pace)
-    : recorder_(std::move(recorder)), file_(std::move(file)), pace_(pace) {
+RunRecorder::RunRecorder(std::unique_ptr<record::Recorder> recorder, const RecordOptions& options, runner::Pace pace)
+    : recorder_(std::move(recorder)), file_(options.file), depth_(options.depth), pace_(pace) {
   if (pace_ == runner::Pace::kRealTime) writes_ = std::thread([this] { recorder_->work(); });
 }
 
 RunRecorder::~RunRecorder() { close(); }
 
 Expected<std::size_t> RunRecorder::add(const ShownTopic& topic) {
-  if (topic.audience == Audience::kLive) return kNotRecorded;
+  if (!is_recorded(topic.audience, depth_)) return kNotRecorded;
   auto name = recorded_name(topic.name);
   if (!name) return std::unexpected(name.error());
   const std::string type(topic.type);

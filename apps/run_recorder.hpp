@@ -28,6 +28,7 @@ namespace pons::apps {
 struct RecordOptions {
   std::filesystem::path file;                 // NAME.mcap; empty: nothing is recorded
   std::uint64_t file_mib = 0, quota_mib = 0;  // 0: one file, however long; all of it is kept
+  bool depth = false;                         // pictures of depth, too
   [[nodiscard]] bool on() const { return !file.empty(); }
 };
 void add_record_options(CLI::App& command, RecordOptions& options);
@@ -77,11 +78,12 @@ class RunRecorder final : public Sink {
     record::TopicId id = 0;
   };
 
-  RunRecorder(std::unique_ptr<record::Recorder> recorder, std::filesystem::path file, runner::Pace pace);
+  RunRecorder(std::unique_ptr<record::Recorder> recorder, const RecordOptions& options, runner::Pace pace);
   void close();
 
   std::unique_ptr<record::Recorder> recorder_;
   std::filesystem::path file_;
+  bool depth_;
   runner::Pace pace_;
   std::map<std::string, Known> topics_;  // by name
   std::vector<bool> ahead_;              // by TopicId

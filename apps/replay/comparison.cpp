@@ -78,7 +78,7 @@ std::string first_difference(std::string_view type, std::span<const std::byte> r
 }
 
 Expected<std::size_t> Comparison::add(const ShownTopic& topic) {
-  if (topic.audience == Audience::kLive) return kNotRecorded;
+  if (!is_recorded(topic.audience, depth_)) return kNotRecorded;
   auto name = recorded_name(topic.name);
   if (!name) return std::unexpected(name.error());
   const auto known = std::ranges::find(topics_, *name, &Topic::name);

@@ -21,7 +21,8 @@ namespace pons::apps {
 
 class Comparison final : public Sink {
  public:
-  explicit Comparison(const std::filesystem::path& file) : recorded_(file) {}
+  // `depth`: the recording holds pictures of it.
+  explicit Comparison(const std::filesystem::path& file, bool depth = false) : recorded_(file), depth_(depth) {}
 
   [[nodiscard]] Expected<std::size_t> add(const ShownTopic& topic) override;
   [[nodiscard]] bool wants(std::size_t topic) const override { return topic != kNotRecorded; }
@@ -50,6 +51,7 @@ class Comparison final : public Sink {
   void differ(const std::string& text);
 
   RecordedMessages recorded_;
+  bool depth_;
   std::vector<Topic> topics_;
   std::uint64_t equal_ = 0;
   Time latest_;

@@ -129,9 +129,10 @@ int replay(const ReplayOptions& options) {
   auto again = run_options(run->facts, inputs);
   if (!again) return bad_input(again.error());
   again->record = options.record;
+  again->record.depth = options.record.on() && (options.record.depth || run->facts.depth);
   if (!options.quiet) tell_differences(*run, *changed);
 
-  Comparison comparison(options.file);
+  Comparison comparison(options.file, run->facts.depth);
   const Onlooker onlooker{.sink = &comparison, .breaks_off = [&] {
                             return comparison.over() || (run->interrupted && comparison.latest() >= *run->interrupted);
                           }};

@@ -1,12 +1,14 @@
 #include "apps/views/cameras_view.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
 #include <utility>
 
 #include "apps/jpeg.hpp"
+#include "apps/png.hpp"
 #include "apps/views/frames.hpp"
 #include "pons/gate/ros/action.hpp"
 #include "pons/wire/cdr.hpp"
@@ -57,6 +59,23 @@ Image depth_image(const RgbdFrame& frame) {
   return image;
 }
 
+// As image_transport has it (compressedDepth): a header of 12 bytes, which says nothing of what is no inverse depth,
+// and a PNG; mm, 0 where it was not measured (REP 118).
+std::optional<CompressedImage> compressed_depth_image(const RgbdFrame& frame) {
+  constexpr std::size_t kHeader = 12;
+  constexpr float kMost_mm = std::numeric_limits<std::uint16_t>::max();
+  std::vector<std::uint16_t> depth_mm(frame.depth_m.size());
+  std::ranges::transform(frame.depth_m, depth_mm.begin(), [](float depth_m) {
+    const float mm = std::round(1000 * depth_m);
+    return mm > 0 && mm <= kMost_mm ? static_cast<std::uint16_t>(mm) : std::uint16_t{0};
+  });
+  auto image = headed<CompressedImage>(frame);
+  image.format = "16UC1; compressedDepth png";
+  image.data.resize(kHeader);
+  if (!append_png(frame.intrinsics.width, frame.intrinsics.height, depth_mm, image.data)) return std::nullopt;
+  return image;
+}
+
 CameraInfo camera_info(const RgbdFrame& frame) {
   auto info = headed<CameraInfo>(frame);
   const Intrinsics& lens = frame.intrinsics;
@@ -90,10 +109,13 @@ Expected<std::unique_ptr<CamerasView>> CamerasView::open(Outlets& outlets, const
     if (!compressed) return std::unexpected(compressed.error());
     auto info = outlets.outlet<CameraInfo>(name + "/camera_info");
     if (!info) return std::unexpected(info.error());
-    // Comes with depth alone: a recording would hold it where somebody looked on.
-    auto depth_info = outlets.outlet<CameraInfo>(name + "/depth/camera_info", gate::ros::kTopicQos, Audience::kLive);
+    auto compressed_depth =
+        outlets.outlet<CompressedImage>(name + "/depth/image_rect_raw/compressedDepth", kPicturesQos, Audience::kDepth);
+    if (!compressed_depth) return std::unexpected(compressed_depth.error());
+    // Comes with depth alone.
+    auto depth_info = outlets.outlet<CameraInfo>(name + "/depth/camera_info", gate::ros::kTopicQos, Audience::kDepth);
     if (!depth_info) return std::unexpected(depth_info.error());
-    view->cameras_.push_back({&camera, *raw, *depth, *compressed, *info, *depth_info});
+    view->cameras_.push_back({&camera, *raw, *depth, *compressed, *compressed_depth, *info, *depth_info});
     view->wanted_.emplace_back();
   }
   view->look_who_wants();
@@ -117,6 +139,7 @@ void CamerasView::look_who_wants() {
     wanted_[i].raw = cameras_[i].raw.wanted();
     wanted_[i].compressed = cameras_[i].compressed.wanted();
     wanted_[i].depth = cameras_[i].depth.wanted();
+    wanted_[i].compressed_depth = cameras_[i].compressed_depth.wanted();
   }
 }
 
@@ -137,10 +160,11 @@ void CamerasView::show(Time now) {
   for (const Made& made : due) {
     Camera& camera = cameras_[made.camera];
     camera.info.put_encoded(now, made.info);
-    if (!made.depth.empty()) camera.depth_info.put_encoded(now, made.info);
+    if (!made.depth.empty() || !made.compressed_depth.empty()) camera.depth_info.put_encoded(now, made.info);
     if (!made.raw.empty()) camera.raw.put_encoded(now, made.raw);
     if (!made.depth.empty()) camera.depth.put_encoded(now, made.depth);
     if (!made.compressed.empty()) camera.compressed.put_encoded(now, made.compressed);
+    if (!made.compressed_depth.empty()) camera.compressed_depth.put_encoded(now, made.compressed_depth);
   }
 }
 
@@ -148,7 +172,8 @@ void CamerasView::process(const RgbdFrame& frame, const perception::Moment& mome
   sight_.process(frame, moment);
   const auto of = std::ranges::find(cameras_, frame.camera, [](const Camera& each) { return each.spec->name; });
   const auto number = static_cast<std::size_t>(of - cameras_.begin());
-  const Task task{number, wanted_[number].raw, wanted_[number].compressed, wanted_[number].depth};
+  const Wanted& wanted = wanted_[number];
+  const Task task{number, wanted.raw, wanted.compressed, wanted.depth, wanted.compressed_depth};
   if (!aside_ || !task.any()) return make(task, frame);
   // The place that the picture lies in is given back.
   if (!aside_->put([this, task, kept = frame] { make(task, kept); })) ++left_out_;
@@ -159,6 +184,9 @@ void CamerasView::make(const Task& task, const RgbdFrame& frame) {
   encode(camera_info(frame), made.info);
   if (task.raw) encode(raw_image(frame), made.raw);
   if (task.depth) encode(depth_image(frame), made.depth);
+  if (task.compressed_depth) {
+    if (const auto image = compressed_depth_image(frame)) encode(*image, made.compressed_depth);
+  }
   if (task.compressed) {
     auto image = headed<CompressedImage>(frame);
     image.format = "rgb8; jpeg compressed bgr8";

@@ -66,25 +66,25 @@ class CamerasView final : public View, public perception::Sight {
   using CameraInfo = wire::sensor_msgs::msg::CameraInfo;
   using CompressedImage = wire::sensor_msgs::msg::CompressedImage;
   struct Wanted {
-    std::atomic<bool> raw{false}, compressed{false}, depth{false};
+    std::atomic<bool> raw{false}, compressed{false}, depth{false}, compressed_depth{false};
   };
   struct Camera {
     const world::CameraSpec* spec;
     Outlet<Image> raw, depth;
-    Outlet<CompressedImage> compressed;
+    Outlet<CompressedImage> compressed, compressed_depth;
     Outlet<CameraInfo> info, depth_info;
   };
   // What is to be made of one frame.
   struct Task {
     std::size_t camera = 0;
-    bool raw = false, compressed = false, depth = false;
-    [[nodiscard]] bool any() const { return raw || compressed || depth; }
+    bool raw = false, compressed = false, depth = false, compressed_depth = false;
+    [[nodiscard]] bool any() const { return raw || compressed || depth || compressed_depth; }
   };
   // Of one frame, encoded; empty where it was not wanted.
   struct Made {
     std::size_t camera = 0;
     Time due;
-    std::vector<std::byte> raw, compressed, depth, info;
+    std::vector<std::byte> raw, compressed, depth, compressed_depth, info;
   };
 
   CamerasView(const world::World& world, perception::Sight& sight, runner::Pace pace);

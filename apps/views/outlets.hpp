@@ -21,7 +21,14 @@
 namespace pons::apps {
 
 // Whom something is for.
-enum class Audience { kAll, kLive };  // kLive: not a recording, which has it in another form
+enum class Audience {
+  kAll,
+  kLive,   // not a recording, which has it in another form
+  kDepth,  // a recording only where depth was asked for: it makes that several times as large
+};
+[[nodiscard]] constexpr bool is_recorded(Audience audience, bool depth) {
+  return audience == Audience::kAll || (depth && audience == Audience::kDepth);
+}
 
 // What a sink needs to know of a topic.
 struct ShownTopic {

@@ -201,6 +201,19 @@ TEST_F(Replay, ARecordingHoldsThePicturesOfEachCamera) {
   EXPECT_TRUE(counted);
 }
 
+TEST_F(Replay, ARecordingHoldsDepthWhereItIsAskedFor) {
+  ASSERT_EQ(record("a.mcap", {"--parcels", "2", "--record-depth"}).code, 0);
+  const auto counts = counts_of(folder_ / "a.mcap");
+  for (const std::string camera : {"/overhead", "/label", "/tray"}) {
+    const auto pictures = counts.at(camera + "/image_raw/compressed");
+    EXPECT_EQ(counts.at(camera + "/depth/image_rect_raw/compressedDepth"), pictures);
+    EXPECT_EQ(counts.at(camera + "/depth/camera_info"), pictures);
+  }
+  const Finished again = replay("a.mcap", {"--record", file("b.mcap")});
+  EXPECT_THAT(again.out, testing::StartsWith("equal: "));
+  EXPECT_TRUE(bytes("a.mcap") == bytes("b.mcap"));
+}
+
 // Of one run: the journal tells the same of its tasks.
 TEST_F(Replay, ARecordingHoldsWhatTheJournalTellsOfTasks) {
   ASSERT_EQ(record("a.mcap", {"--parcels", "2", "--journal", file("j.db")}).code, 0);

@@ -1,6 +1,7 @@
 #include "apps/views/cameras_view.hpp"
 
 #include <gmock/gmock.h>
+#include <png.h>
 #include <turbojpeg.h>
 
 #include <cmath>
@@ -15,7 +16,7 @@
 namespace pons::apps {
 namespace {
 
-using ::testing::HasSubstr;
+using ::testing::HasSubstr, ::testing::Not;
 using wire::sensor_msgs::msg::CameraInfo;
 using wire::sensor_msgs::msg::CompressedImage;
 using wire::sensor_msgs::msg::Image;
@@ -139,10 +140,37 @@ TEST_F(CamerasViewTest, TheCompressedPictureIsThePicture) {
   EXPECT_LT(jpeg.size(), rgb.size() / 5);
 }
 
+// As image_transport's plugin reads it.
+TEST_F(CamerasViewTest, TheCompressedDepthIsTheDepth) {
+  open(runner::Pace::kLockstep);
+  RgbdFrame frame = frame_of(world_.cameras[0], at_);
+  frame.depth_m[2] = 0.8004F, frame.depth_m[3] = 65.536F;
+  view_->process(frame, {});
+  view_->show(at_ + from_s(1));
+  const auto pictures = take<CompressedImage>("top/depth/image_rect_raw/compressedDepth");
+  ASSERT_EQ(pictures.size(), 1U);
+  EXPECT_EQ(pictures[0].format, "16UC1; compressedDepth png");
+  EXPECT_EQ(pictures[0].header.frame_id, "top_optical_frame");
+  EXPECT_EQ(shown_.topic("top/depth/image_rect_raw/compressedDepth").audience, Audience::kDepth);
+  constexpr std::size_t kHeader = 12;
+  ASSERT_GT(pictures[0].data.size(), kHeader);
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_memory(&image, &pictures[0].data[kHeader], pictures[0].data.size() - kHeader), 0);
+  ASSERT_EQ(image.format, static_cast<png_uint_32>(PNG_FORMAT_LINEAR_Y)) << "16 bits, grey";
+  ASSERT_EQ(image.width * image.height, 64U * 48);
+  std::vector<std::uint16_t> depth_mm(64UL * 48);
+  ASSERT_NE(png_image_finish_read(&image, nullptr, depth_mm.data(), 0, nullptr), 0);
+  EXPECT_EQ(depth_mm[0], 0) << "not measured";
+  EXPECT_EQ(depth_mm[1], 1250);
+  EXPECT_EQ(depth_mm[2], 800);
+  EXPECT_EQ(depth_mm[3], 0) << "farther than 16 bits go";
+}
+
 TEST_F(CamerasViewTest, ARecordingIsTheSameWhoeverLooksOn) {
   const record::TestFolder folder;
-  const auto recorded = [&](const std::string& name, std::vector<std::string> unwanted) {
-    const RecordOptions options{.file = folder / name};
+  const auto recorded = [&](const std::string& name, std::vector<std::string> unwanted, bool depth = false) {
+    const RecordOptions options{.file = folder / name, .depth = depth};
     auto recorder = RunRecorder::open(options, Earlier::kRefused, runner::Pace::kLockstep, 0, {});
     EXPECT_TRUE(recorder) << recorder.error().line();
     Shown viewer;
@@ -160,10 +188,16 @@ TEST_F(CamerasViewTest, ARecordingIsTheSameWhoeverLooksOn) {
   const std::string alone = recorded("a.mcap", {"top/image_raw", "top/depth/image_rect_raw"});
   EXPECT_GT(alone.size(), 1000U);
   EXPECT_TRUE(recorded("b.mcap", {}) == alone);
+  EXPECT_THAT(alone, Not(HasSubstr("/top/depth")));
+  const std::string deep = recorded("c.mcap", {"top/image_raw", "top/depth/image_rect_raw"}, true);
+  EXPECT_THAT(deep, HasSubstr("/top/depth/image_rect_raw/compressedDepth"));
+  EXPECT_THAT(deep, HasSubstr("/top/depth/camera_info"));
+  EXPECT_TRUE(recorded("d.mcap", {}, true) == deep);
 }
 
 TEST_F(CamerasViewTest, MakesNothingForNobody) {
-  shown_.unwanted = {"top/image_raw", "top/depth/image_rect_raw", "top/image_raw/compressed"};
+  const std::string depth = "top/depth/image_rect_raw";
+  shown_.unwanted = {"top/image_raw", depth, "top/image_raw/compressed", depth + "/compressedDepth"};
   for (const auto pace : {runner::Pace::kLockstep, runner::Pace::kRealTime}) {
     open(pace);
     view_->process(frame_of(world_.cameras[0], at_), {});
@@ -171,7 +205,9 @@ TEST_F(CamerasViewTest, MakesNothingForNobody) {
     EXPECT_EQ(take<CameraInfo>("top/camera_info").size(), 1U);
     EXPECT_TRUE(take<Image>("top/image_raw").empty());
     EXPECT_TRUE(take<CompressedImage>("top/image_raw/compressed").empty());
-    EXPECT_TRUE(take<Image>("top/depth/image_rect_raw").empty());
+    EXPECT_TRUE(take<Image>(depth).empty());
+    EXPECT_TRUE(take<CompressedImage>(depth + "/compressedDepth").empty());
+    EXPECT_TRUE(take<CameraInfo>("top/depth/camera_info").empty());
   }
   // From the moment on that somebody does.
   shown_.unwanted.clear();
