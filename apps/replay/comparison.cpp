@@ -56,6 +56,8 @@ std::int64_t ns(record::mcap::Timestamp time) { return static_cast<std::int64_t>
 
 std::string moment(std::int64_t time_ns) { return fmt::format("{:.3f} s", 1e-9 * static_cast<double>(time_ns)); }
 
+std::string exactly(std::int64_t time_ns) { return fmt::format("{:.9f} s", 1e-9 * static_cast<double>(time_ns)); }
+
 std::string named(const RecordedMessage& message) {
   return fmt::format("number {} of {} ({}) at {}", message.number, message.topic, message.type,
                      moment(ns(message.time)));
@@ -91,6 +93,7 @@ void Comparison::put(std::size_t topic, Time now, std::span<const std::byte> mes
   if (topic == kNotRecorded) return;
   if (over_) return;
   const Topic& of = topics_[topic];
+  const std::int64_t logged_ns = std::max<std::int64_t>(0, (of.is_ahead ? latest_ : std::max(latest_, now)).ns());
   const RecordedMessage* const recorded = recorded_.front();
   if (recorded == nullptr) {
     over_ = true;
@@ -103,11 +106,14 @@ void Comparison::put(std::size_t topic, Time now, std::span<const std::byte> mes
                        moment(now.ns())));
   } else if (ns(recorded->time) != now.ns()) {
     differ(fmt::format("recorded is {}; the run shows it at {}", named(*recorded), moment(now.ns())));
+  } else if (ns(recorded->logged) != logged_ns) {
+    differ(fmt::format("recorded is {}, logged at {}; the run logs it at {}", named(*recorded),
+                       exactly(ns(recorded->logged)), exactly(logged_ns)));
   } else if (!std::ranges::equal(recorded->bytes, message)) {
     differ(fmt::format("{}: {}", named(*recorded), first_difference(of.type, recorded->bytes, message)));
   } else {
     ++equal_;
-    if (!of.is_ahead) latest_ = std::max(latest_, now);
+    latest_ = Time(Duration(logged_ns));
     recorded_.pop();
   }
 }

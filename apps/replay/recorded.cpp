@@ -16,14 +16,20 @@ namespace mcap = record::mcap;
 
 constexpr std::size_t kAheadBytes = std::size_t{16} << 20U;
 
+fs::path file_after(const fs::path& first, std::size_t number) {
+  return first.parent_path() / fmt::format("{}_{}.mcap", first.stem().string(), number);
+}
+
+bool is_there(const fs::path& file) {
+  std::error_code error;
+  return fs::exists(file, error);
+}
+
 std::vector<fs::path> files_of(const fs::path& first) {
   std::vector<fs::path> files{first};
-  std::error_code error;
-  for (std::uint64_t number = 1;; ++number) {
-    fs::path next = first.parent_path() / fmt::format("{}_{}.mcap", first.stem().string(), number);
-    if (!fs::exists(next, error)) return files;
-    files.push_back(std::move(next));
-  }
+  for (std::size_t number = 1; is_there(file_after(first, number)); ++number)
+    files.push_back(file_after(first, number));
+  return files;
 }
 
 }  // namespace
@@ -63,11 +69,18 @@ void RecordedMessages::read(const std::vector<fs::path>& files) {
   const bool goes_on = std::ranges::all_of(files, [this](const fs::path& file) { return read_one(file); });
   {
     const std::scoped_lock lock(mutex_);
-    // As what was repaired, or finished because the disk was full.
-    if (goes_on) cut_ = fmt::format("{}: its run did not end there", files.back().string());
+    if (goes_on) cut_ = why_it_ends(files);
     ended_ = true;
   }
   changed_.notify_all();
+}
+
+// A file that is missing; or it was repaired, or finished because the disk was full.
+std::string RecordedMessages::why_it_ends(const std::vector<fs::path>& files) {
+  const fs::path missing = file_after(files.front(), files.size());
+  if (is_there(file_after(files.front(), files.size() + 1)))
+    return fmt::format("{}: there is no such file, and others follow it", missing.string());
+  return fmt::format("{}: its run did not end there", files.back().string());
 }
 
 bool RecordedMessages::read_one(const fs::path& file) {
@@ -79,22 +92,26 @@ bool RecordedMessages::read_one(const fs::path& file) {
   const auto reader = record::McapReader::open(file);
   if (!reader) return cut(reader.error().line());
   bool goes_on = true;
+  bool stands = !next_.empty();  // what is said again at the beginning of a file that follows another
   std::string gap;
   const auto read = (*reader)->each_message({}, [&](const mcap::Message& message, const mcap::Channel& channel) {
     // What stands, said again: a run begins with what is new.
     if (next_.empty() && message.publish_time < message.log_time)
       gap = fmt::format("{}: begins in the middle of its run", file.string());
     std::uint32_t& next = next_[channel.topic];
-    if (message.sequence < next) return true;
+    const bool repeated = message.sequence < next;
+    if (repeated && stands) return true;
+    stands = false;
     if (gap.empty() && message.sequence > next)
       gap = fmt::format("{}: of {} the messages from number {} to {} are missing", file.string(), channel.topic, next,
                         message.sequence - 1);
     if (!gap.empty()) return false;
-    ++next;
+    if (!repeated) ++next;
     goes_on = push({channel.topic,
                     std::string((*reader)->contents().type_of(channel)),
                     message.sequence,
                     message.publish_time,
+                    message.log_time,
                     {message.data.begin(), message.data.end()}});
     return goes_on;
   });

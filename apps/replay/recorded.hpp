@@ -21,7 +21,7 @@ namespace pons::apps {
 struct RecordedMessage {
   std::string topic, type;
   std::uint32_t number = 0;  // of its topic's, from 0
-  record::mcap::Timestamp time = 0;
+  record::mcap::Timestamp time = 0, logged = 0;
   std::vector<std::byte> bytes;
 };
 
@@ -47,6 +47,7 @@ class RecordedMessages {
   [[nodiscard]] bool read_one(const std::filesystem::path& file);
   // False: nobody wants any more.
   [[nodiscard]] bool push(RecordedMessage message);
+  [[nodiscard]] static std::string why_it_ends(const std::vector<std::filesystem::path>& files);
 
   std::mutex mutex_;
   std::condition_variable changed_;

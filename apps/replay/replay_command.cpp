@@ -97,8 +97,11 @@ int verdict(const ReplayOptions& options, Comparison& comparison) {
     return kExitInterrupted;
   }
   if (const std::string why = comparison.cut(); !why.empty()) {
-    if (comparison.equal() == 0)
-      return bad_input({"nothing of it can be replayed: " + why, options.file.string(), "name the first of its files"});
+    if (comparison.equal() == 0) {
+      const std::string file = options.file.string(), named = file + ": ";
+      return bad_input({"nothing of it can be replayed: " + (why.starts_with(named) ? why.substr(named.size()) : why),
+                        file, "name the first of its files"});
+    }
     say(stdout, fmt::format("equal as far as it goes: {} messages, {}; {}\n", comparison.equal(), at, why));
     return kExitGood;
   }

@@ -31,6 +31,7 @@ class DataCheck : public DataVisitor {
   void channel(const mcap::Channel& channel) override { contents_.channels.emplace(channel.id, channel); }
   void chunk(const ChunkPlace& place) override {
     end_chunk();
+    behind_damage_ = false;
     const auto& head = place.head;
     chunk_ = mcap::ChunkIndex{head.start, head.end,         place.offset,      place.length,          {},
                               0,          head.compression, head.records_size, head.uncompressed_size};
@@ -52,6 +53,7 @@ class DataCheck : public DataVisitor {
   }
   [[nodiscard]] bool wants_message_indexes() const override { return true; }
   void message_index(const mcap::MessageIndex& index, std::uint64_t at, std::uint64_t length) override {
+    if (!chunk_ && behind_damage_) return;  // of a chunk that could not be read
     if (!chunk_) return tell(verdict_, at, "a Message Index follows no chunk");
     if (index.entries.empty()) return;  // of a channel that the chunk does not hold, some writers put one
     if (!chunk_->message_indexes.emplace(index.channel, at).second)
@@ -73,7 +75,12 @@ class DataCheck : public DataVisitor {
     end_chunk();
     contents_.metadata.push_back(index);
   }
-  void damage(const Damage& damage) override { tell(verdict_, damage.at, damage.what); }
+  void damage(const Damage& damage) override {
+    tell(verdict_, damage.at, damage.what);
+    if (chunk_ && damage.at < chunk_->offset + chunk_->length) forget_chunk();
+    end_chunk();
+    behind_damage_ = true;
+  }
 
   // After the last of its indexes.
   void end_chunk() {
@@ -82,19 +89,25 @@ class DataCheck : public DataVisitor {
       tell(verdict_, chunk_->offset, "the chunk says other times than its messages have");
     if (!chunk_->message_indexes.empty() && chunk_->message_indexes.size() != entries_.size())
       tell(verdict_, chunk_->offset, "the chunk has messages of channels of which there is no index behind it");
-    contents_.chunks.push_back(*std::exchange(chunk_, std::nullopt));
-    entries_.clear();
-    start_ = end_ = 0;
+    contents_.chunks.push_back(*chunk_);
+    forget_chunk();
   }
 
   [[nodiscard]] const Contents& contents() const { return contents_; }
   [[nodiscard]] std::uint64_t loose() const { return loose_; }
 
  private:
+  void forget_chunk() {
+    chunk_.reset();
+    entries_.clear();
+    start_ = end_ = 0;
+  }
+
   Verdict& verdict_;
   Contents contents_;
   std::optional<mcap::ChunkIndex> chunk_;
   std::map<std::uint16_t, std::vector<mcap::MessageIndexEntry>> entries_;  // of the chunk
+  bool behind_damage_ = false;
   mcap::Timestamp start_ = 0, end_ = 0;
   std::uint64_t index_at_ = 0;  // the first behind the chunk
   std::uint64_t loose_ = 0;     // messages outside of chunks

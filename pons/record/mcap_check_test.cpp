@@ -59,7 +59,29 @@ TEST_F(CheckTest, WhatIsWrittenIsWhole) {
 }
 
 TEST_F(CheckTest, AnyByteThatIsOtherThanItWasIsFound) {
-  for (std::size_t at = 8; at < whole_.size(); ++at) EXPECT_FALSE(spoilt(at).whole()) << at;
+  for (std::size_t at = 0; at < whole_.size(); ++at) EXPECT_FALSE(spoilt(at).whole()) << at;
+}
+
+TEST_F(CheckTest, AFileWhoseBeginIsSpoiltIsOneAllTheSame) {
+  const Verdict verdict = spoilt(3);
+  EXPECT_THAT(first_line(verdict), HasSubstr("byte 0: the file does not begin as MCAP files do"));
+  EXPECT_EQ(verdict.messages, 12U);
+  EXPECT_EQ(verdict.metadata, 1U);
+  // A page that was never written, with the first chunk, perhaps.
+  std::string blank = whole_;
+  std::fill_n(blank.begin(), contents_.chunks.at(0).offset + 20, '\0');
+  EXPECT_EQ(check_text(blank).chunks, contents_.chunks.size() - 1);
+  write_bytes(folder_ / "blank.mcap", blank);
+  ASSERT_TRUE(repair(**open_file(folder_ / "blank.mcap"), folder_ / "mended.mcap", Overwrite::kNever));
+  const auto mended = read_all(**McapReader::open(folder_ / "mended.mcap"));
+  EXPECT_EQ(mended.messages.size(), 12U - 3);
+}
+
+// Its indexes are there, and nothing that they are of.
+TEST_F(CheckTest, OfADamagedChunkNothingElseIsFound) {
+  const Verdict verdict = spoilt(contents_.chunks.at(1).offset + 55);
+  ASSERT_EQ(verdict.damage.size(), 2U);
+  EXPECT_THAT(verdict.damage[1].what, HasSubstr("not those of which the Data End has the checksum"));
 }
 
 // Fewer bytes than a record's prefix, where a chunk's records should go on.

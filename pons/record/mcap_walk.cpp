@@ -40,11 +40,24 @@ class Walk {
     const std::uint64_t there = std::min<std::uint64_t>(source_.size(), mcap::kMagic.size());
     const auto magic = window_.view(0, there);
     if (!magic) return std::unexpected(magic.error());
-    if (!std::ranges::equal(*magic, std::span(mcap::kMagic).first(there)))
-      return fail("is no MCAP file", source_.name(), "name a recording: FILE.mcap");
+    if (!std::ranges::equal(*magic, std::span(mcap::kMagic).first(there))) return begin_anyhow();
     at_ = there;
     over_ = there < mcap::kMagic.size();
     if (over_) damaged(there, "the file ends before its first record");
+    return {};
+  }
+
+  // What holds a whole chunk was an MCAP file once.
+  Expected<void> begin_anyhow() {
+    const auto found = find_chunk(0);
+    if (!found) return std::unexpected(found.error());
+    if (!*found) return fail("is no MCAP file", source_.name(), "name a recording: FILE.mcap");
+    damaged(0, "the file does not begin as MCAP files do");
+    at_ = **found;
+    const auto first = window_.view(mcap::kMagic.size(), kPrefix);
+    if (!first) return std::unexpected(first.error());
+    const mcap::Prefix prefix = mcap::read_prefix(first->first<kPrefix>());
+    if (prefix.opcode == Opcode::kHeader && prefix.length < at_) at_ = mcap::kMagic.size();
     return {};
   }
 
@@ -272,7 +285,7 @@ class Walk {
   // The next byte at which a whole chunk begins; nothing: there is none.
   Expected<std::optional<std::uint64_t>> find_chunk(std::uint64_t from) {
     constexpr std::uint64_t kBlock = std::uint64_t{128} * 1024;
-    while (source_.size() - from > kPrefix + kHead && effort_ > 0) {
+    while (source_.size() > from + kPrefix + kHead && effort_ > 0) {
       const std::uint64_t count = std::min(source_.size() - from, kBlock);
       const auto block = window_.view(from, count);
       if (!block) return std::unexpected(block.error());

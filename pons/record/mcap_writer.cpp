@@ -209,7 +209,7 @@ Expected<void> McapWriter::finish() {
   auto flushed = flush();
   failed_.reset();
   auto summed = write_summary();
-  if (summed && options_.sync_every) summed = file_.sync();
+  if (summed) summed = file_.sync();
   failed_ = Error{"the recording is finished", path().string(), "begin another one"};
   if (before) return std::unexpected(*before);
   return flushed ? summed : flushed;

@@ -31,7 +31,7 @@ struct WriterOptions {
   std::size_t chunk_bytes = 1024 * 1024;
   Duration chunk_span = std::chrono::seconds(1);
   // After log time has gone on so far, and in the end, what was written is brought onto the disk, so that it survives
-  // the loss of power; the writing thread waits for it. Without, the system decides when.
+  // the loss of power; the writing thread waits for it. Without, in the end alone.
   std::optional<Duration> sync_every;
   std::string profile = "ros2", library = "pons";
 };

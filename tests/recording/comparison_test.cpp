@@ -190,20 +190,52 @@ TEST_F(ComparisonTest, WhatIsMadeAheadOfItsTimeIsLoggedWhenItIsShown) {
   EXPECT_EQ(comparison.latest(), Time(kPeriod * 9));
 }
 
-TEST_F(ComparisonTest, WhereMessagesAreMissingItEnds) {
-  const auto file = folder_ / "gap.mcap";
-  auto writer = record::McapWriter::create(file, {});
-  ASSERT_TRUE(writer);
-  const auto facts = record::ros_topic<Point>("/pons/points");
-  const auto schema = (*writer)->add_schema(facts.type, facts.schema_encoding, facts.schema);
-  const auto channel = (*writer)->add_channel(*schema, facts.name, "cdr", {});
-  for (const std::uint32_t number : {0U, 1U, 4U})
-    ASSERT_TRUE((*writer)->write(
-        {*channel, number, number, number * 10'000'000ULL, bytes_of(Point{1, static_cast<double>(number), 3})}));
-  ASSERT_TRUE((*writer)->finish());
-  Comparison comparison(file);
-  const auto points = comparison.add(topic<Point>("~/points"));
-  for (int i = 0; i < 5; ++i) comparison.put(*points, Time(kPeriod * i), bytes_of(Point{1, static_cast<double>(i), 3}));
+// Points by their numbers, each but the first logged so much later than it should be, ns.
+class PlantedTest : public ComparisonTest {
+ protected:
+  void plant(const std::vector<std::uint32_t>& numbers, std::uint64_t later_ns = 0) {
+    auto writer = record::McapWriter::create(folder_ / "planted.mcap", {});
+    ASSERT_TRUE(writer);
+    const auto facts = record::ros_topic<Point>("/pons/points");
+    const auto schema = (*writer)->add_schema(facts.type, facts.schema_encoding, facts.schema);
+    const auto channel = (*writer)->add_channel(*schema, facts.name, "cdr", {});
+    for (const std::uint32_t number : numbers) {
+      const auto at = number * static_cast<record::mcap::Timestamp>(kPeriod.count());
+      ASSERT_TRUE((*writer)->write(
+          {*channel, number, number > 0 ? at + later_ns : at, at, bytes_of(Point{1, static_cast<double>(number), 3})}));
+    }
+    ASSERT_TRUE((*writer)->finish());
+    comparison_.emplace(folder_ / "planted.mcap");
+    const auto points = comparison_->add(topic<Point>("~/points"));
+    for (int i = 0; i < 5; ++i)
+      comparison_->put(*points, Time(kPeriod * i), bytes_of(Point{1, static_cast<double>(i), 3}));
+  }
+  std::optional<Comparison> comparison_;
+};
+
+TEST_F(PlantedTest, WhatIsLoggedAtAnotherTimeDiffers) {
+  plant({0, 1, 2, 3, 4}, 1);
+  EXPECT_EQ(comparison_->difference(),
+            "recorded is number 1 of /pons/points (geometry_msgs/msg/Point) at 0.010 s, logged at 0.010000001 s; the "
+            "run logs it at 0.010000000 s");
+}
+
+// At the beginning of a file that follows another what stands is said again, and nowhere else.
+TEST_F(PlantedTest, WhatStandsThereTwiceDiffers) {
+  plant({0, 1, 2, 2, 3, 4});
+  EXPECT_EQ(comparison_->difference(),
+            "recorded is number 2 of /pons/points (geometry_msgs/msg/Point) at 0.020 s; the run shows it at 0.030 s");
+}
+
+TEST_F(PlantedTest, AFileThatIsMissingAmongOthersIsNamed) {
+  record::write_bytes(folder_ / "planted_2.mcap", "");
+  plant({0, 1, 2});
+  EXPECT_THAT(comparison_->cut(), HasSubstr("planted_1.mcap: there is no such file, and others follow it"));
+}
+
+TEST_F(PlantedTest, WhereMessagesAreMissingItEnds) {
+  plant({0, 1, 4});
+  Comparison& comparison = *comparison_;
   EXPECT_EQ(comparison.difference(), "");
   EXPECT_EQ(comparison.equal(), 2U);
   EXPECT_THAT(comparison.cut(), HasSubstr("of /pons/points the messages from number 2 to 3 are missing"));

@@ -315,7 +315,7 @@ TEST_F(Replay, FurtherFilesBeginWithWhatStandsAndAreFollowed) {
   EXPECT_EQ(again.code, 0) << again.out;
   const Finished middle = replay("a_1.mcap");
   EXPECT_EQ(middle.code, 2) << middle.out;
-  EXPECT_THAT(middle.err, HasSubstr("a_1.mcap: begins in the middle of its run"));
+  EXPECT_THAT(middle.err, HasSubstr("a_1.mcap: nothing of it can be replayed: begins in the middle of its run"));
 }
 
 TEST_F(Replay, TheOldestFilesGoByTheQuota) {
