@@ -83,6 +83,10 @@ Expected<Exported> each_json(const McapReader& reader, const Query& query, const
   return exported;
 }
 
+// What the recording says of each message, in columns before its own, none of which can have such a name: messages have
+// fields `sequence`, but none has a field `record` that has one of these.
+constexpr std::string_view kRecordNames = "record.log_time_ns,record.publish_time_ns,record.sequence";
+
 // RFC 4180.
 std::string cell(const Json& json) {
   std::string text = json.is_string() ? json.get<std::string>() : json.is_null() ? "" : wire::line_of(json);
@@ -121,7 +125,7 @@ class Tables {
       auto file = NewText::create(path, overwrite_);
       if (!file) return std::unexpected(file.error());
       there = tables_.emplace(std::pair(channel.topic, channel.schema), std::move(*file)).first;
-      auto headed = there->second.add("log_time_ns,publish_time_ns,sequence" + names + "\r\n");
+      auto headed = there->second.add(fmt::format("{}{}\r\n", kRecordNames, names));
       if (!headed) return headed;
     }
     return there->second.add(

@@ -29,7 +29,8 @@ struct Exported {
                                               const std::filesystem::path& path, Overwrite overwrite);
 
 // The same as tables (RFC 4180) in `folder`, which is made if it is missing: one file a topic, its '/' made '_'. Fields
-// of fields have columns of their own ("pose.position.x"); arrays are JSON in one.
+// of fields have columns of their own ("pose.position.x"); arrays are JSON in one. The first three columns are
+// record.log_time_ns, record.publish_time_ns and record.sequence; each has a name of its own.
 [[nodiscard]] Expected<Exported> export_csv(const McapReader& reader, const Query& query,
                                             const std::filesystem::path& folder, Overwrite overwrite);
 

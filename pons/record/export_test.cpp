@@ -108,8 +108,8 @@ TEST_F(ExportTest, EachTopicIsATable) {
   const auto exported = export_csv(*reader_, {}, folder_ / "tables", Overwrite::kNever);
   ASSERT_TRUE(exported) << exported.error().line();
   EXPECT_EQ(read_bytes(folder_ / "tables" / "joint_states.csv"),
-            "log_time_ns,publish_time_ns,sequence,header.stamp.sec,header.stamp.nanosec,header.frame_id,name,position,"
-            "velocity,effort\r\n"
+            "record.log_time_ns,record.publish_time_ns,record.sequence,header.stamp.sec,header.stamp.nanosec,"
+            "header.frame_id,name,position,velocity,effort\r\n"
             "100,90,0,7,0,,\"[\"\"a,\\\"\"b\\\"\"\"\",\"\"c\"\"]\",\"[0.5,-1.0]\",[],[]\r\n");
   EXPECT_THAT(read_bytes(folder_ / "tables" / "tool_pose.csv"), HasSubstr(",pose.position.x,pose.position.y,"));
   EXPECT_THAT(read_bytes(folder_ / "tables" / "tool_pose.csv"),

@@ -8,6 +8,9 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <fstream>
+#include <set>
+#include <sstream>
 
 #include "pons/record/mcap_check.hpp"
 #include "pons/record/recorder.hpp"
@@ -161,6 +164,26 @@ TEST_F(RecordingCommand, ExportWritesTablesOrSaysWhyNot) {
   EXPECT_EQ(recording({"export", file, "--jsonl", out, "--overwrite", "--topic", "/no"}).code, 2);
   EXPECT_THAT(recording({"export", file}).err, HasSubstr("--csv DIR, --jsonl FILE or --mp4 FILE"));
   EXPECT_EQ(recording({"export", (folder_ / "none.mcap").string(), "--jsonl", out}).code, 2);
+}
+
+// Python's csv.DictReader, and others likewise, keep but one column of a name.
+TEST_F(RecordingCommand, ATableOfAnyTypeHasColumnsOfDifferentNames) {
+  const std::string file = (folder_ / "types.mcap").string();
+  ASSERT_EQ(run_program(PONS_RECORDING_PEER, {"write", file, "none"}).code, 0);
+  ASSERT_EQ(recording({"export", file, "--csv", (folder_ / "tables").string()}).code, 0);
+  std::size_t tables = 0;
+  for (const auto& each : std::filesystem::directory_iterator(folder_ / "tables")) {
+    std::ifstream in(each.path());
+    std::string header, name;
+    std::getline(in, header);
+    std::istringstream names(header.substr(0, header.find('\r')));
+    std::set<std::string> seen;
+    while (std::getline(names, name, ','))
+      EXPECT_TRUE(seen.insert(name).second) << each.path() << " has two columns called " << name;
+    EXPECT_TRUE(seen.contains("record.sequence")) << each.path();
+    ++tables;
+  }
+  EXPECT_GT(tables, 200U);
 }
 
 // Under whatever name.
