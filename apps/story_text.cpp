@@ -145,11 +145,14 @@ std::string allowed(const Json& d) { return fmt::format("by {}, {}", text(d, "by
 
 std::string stopped(const Json& d) { return fmt::format("by {}: {}", text(d, "by"), text(d, "cause")); }
 
+// What has no code needs another subject: the event is of no order.
 std::string stray(const Json& d) {
   const std::string place = text(d, "fell_into");
-  if (!place.empty()) return "fell into " + place;
-  return text(d, "code").empty() ? "hung on another that fell, and no camera has seen it since"
-                                 : "its chute's light curtain has not counted it";
+  const bool unread = text(d, "code").empty();
+  const std::string who = unread ? "a parcel that nobody has read " : "";
+  if (!place.empty()) return who + "fell into " + place;
+  return unread ? who + "hung on another that fell, and no camera has seen it since"
+                : "its chute's light curtain has not counted it";
 }
 
 std::string recognised(const Json& d) { return "on the belt again, as track " + text(d, "track"); }
@@ -202,6 +205,8 @@ std::string story_line(const Json& event) {
   return fmt::format("{:>10.3f} s  {:<14} {:<13} {}\n", number(event, "time_s"), text(event, "task"), kind,
                      told(event));
 }
+
+std::string stray_text(const Json& detail) { return stray(detail); }
 
 std::string story_text(const Json& event) {
   const std::string kind = text(event, "kind");

@@ -12,5 +12,7 @@ namespace pons::apps {
 [[nodiscard]] std::string story_line(const task::Json& event);
 // Likewise, without time, task and end: "attempt: step 0, pick, try 1".
 [[nodiscard]] std::string story_text(const task::Json& event);
+// What the detail of a `stray` says: where it fell, or what is known instead; with a subject where it has no code.
+[[nodiscard]] std::string stray_text(const task::Json& detail);
 
 }  // namespace pons::apps

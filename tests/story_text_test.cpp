@@ -22,8 +22,9 @@ std::string told(std::string_view kind, const task::Json& detail) {
 TEST(StoryText, SaysWhereAParcelIsThatWasNotCounted) {
   EXPECT_EQ(told("stray", {{"code", "P1"}, {"fell_into", "chute_3"}}), "fell into chute_3");
   EXPECT_EQ(told("stray", {{"code", "P1"}, {"fell_into", ""}}), "its chute's light curtain has not counted it");
+  EXPECT_EQ(told("stray", {{"code", ""}, {"fell_into", "chute_1"}}), "a parcel that nobody has read fell into chute_1");
   EXPECT_EQ(told("stray", {{"code", ""}, {"fell_into", ""}}),
-            "hung on another that fell, and no camera has seen it since");
+            "a parcel that nobody has read hung on another that fell, and no camera has seen it since");
 }
 
 TEST(StoryText, SaysThatAnotherWasTakenForIt) {
@@ -51,7 +52,8 @@ TEST(StoryText, SaysWhatWasRefused) {
 
 TEST(StoryText, WhatItDoesNotKnowIsShownAsItIs) {
   EXPECT_EQ(told("novel", {{"a", 1}}), "{\"a\":1}");
-  EXPECT_EQ(told("stray", "no object"), "hung on another that fell, and no camera has seen it since");
+  EXPECT_EQ(told("stray", "no object"),
+            "a parcel that nobody has read hung on another that fell, and no camera has seen it since");
 }
 
 }  // namespace

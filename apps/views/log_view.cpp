@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "apps/story_text.hpp"
 #include "pons/gate/ros/action.hpp"
 #include "pons/task/json_value.hpp"
 
@@ -63,8 +64,11 @@ Line refused(const bridge::Event& event) {
                                  text_of(event.detail, "reason"))};
 }
 
+// Its order is the parcel's code, which nobody may have read.
 Line stray(const bridge::Event& event) {
-  return {Log::WARN, fmt::format("{} is not where it was brought", event.order)};
+  const std::string where = stray_text(event.detail);
+  if (event.order.empty()) return {Log::WARN, where};
+  return {Log::WARN, fmt::format("{} is not where it was brought: {}", event.order, where)};
 }
 
 Line rest(const bridge::Event& event) {

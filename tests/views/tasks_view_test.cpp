@@ -199,6 +199,19 @@ TEST_F(LogViewTest, TellsOfStopsPeopleAndRefusals) {
                                             HasSubstr("refused: ")));
 }
 
+TEST_F(LogViewTest, TellsOfParcelsThatAreNotWhereTheyWereBroughtAlsoOfThoseThatNobodyHasRead) {
+  for (const char* code : {"P1", ""}) {
+    for (const char* place : {"chute_1", ""})
+      bridge_->note("stray", {{"code", code}, {"fell_into", place}}, now_, code);
+  }
+  (void)periods(2);
+  EXPECT_THAT(lines(Log::WARN),
+              ElementsAre("P1 is not where it was brought: fell into chute_1",
+                          "P1 is not where it was brought: its chute's light curtain has not counted it",
+                          "a parcel that nobody has read fell into chute_1",
+                          "a parcel that nobody has read hung on another that fell, and no camera has seen it since"));
+}
+
 TEST_F(LogViewTest, TellsOfTasksThatWentWrongAndOfNoOthers) {
   for (const char* skill : {"pick", "heavy"}) ASSERT_TRUE(submit(skill, skill));
   (void)periods(100);
