@@ -119,10 +119,17 @@ std::string_view pace_of(const RunFacts& facts) {
   return facts.pace == runner::Pace::kRealTime ? "by the clock" : "in virtual time";
 }
 
+// Nothing where nobody said how many, or where none came. Earlier versions wrote down a number for a base, too, whose
+// errands show what it is.
+std::optional<std::int64_t> parcels_of(const RunFacts& facts) {
+  return facts.parcels.value_or(0) > 0 && facts.errands.empty() ? facts.parcels : std::nullopt;
+}
+
 // "run of parcel_cell, seed 1, 20 parcels, in virtual time: complete"
 std::string run_line(const RecordedRun& run) {
   const RunFacts& facts = run.facts;
-  const std::string parcels = facts.parcels ? fmt::format(", {} parcels", *facts.parcels) : "";
+  const auto count = parcels_of(facts);
+  const std::string parcels = count ? fmt::format(", {} parcel{}", *count, *count == 1 ? "" : "s") : "";
   return plain(fmt::format("run of {}, seed {}{}, {}: {}", facts.world, facts.seed, parcels, pace_of(facts),
                            run.ended.empty() ? "its end is not in this file" : run.ended));
 }
@@ -130,7 +137,8 @@ std::string run_line(const RecordedRun& run) {
 wire::Json run_json(const RecordedRun& run) {
   const RunFacts& facts = run.facts;
   wire::Json json{{"world", facts.world}, {"seed", facts.seed}, {"pace", pace_of(facts)}};
-  json["parcels"] = facts.parcels ? wire::Json(*facts.parcels) : wire::Json();
+  const auto parcels = parcels_of(facts);
+  json["parcels"] = parcels ? wire::Json(*parcels) : wire::Json();
   json["ended"] = run.ended.empty() ? wire::Json() : wire::Json(run.ended);
   return json;
 }

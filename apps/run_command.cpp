@@ -139,7 +139,7 @@ Expected<RunFacts> facts_of(const RunOptions& options, const world::World& world
   facts.seed = options.parcels.seed;
   facts.keep_free_mib = options.keep_free_mib;
   const bool whole = !options.parcels.manifest.empty() && !options.parcels.parcels_given;
-  if (!whole) facts.parcels = has_parcels(options) ? options.parcels.parcels : 0;
+  if (!whole && !world.base) facts.parcels = has_parcels(options) ? options.parcels.parcels : 0;
   facts.faults = options.body.faults;  // of a file its name is kept below
   facts.visits = options.body.visits;
   facts.arm_at = options.body.arm_at;

@@ -25,7 +25,7 @@ struct RunFacts {
   std::uint64_t keep_free_mib = 0;
   bool depth = false;  // pictures of it are in the recording
   // Of a cell with an arm.
-  std::optional<std::int64_t> parcels;  // nothing: the whole manifest
+  std::optional<std::int64_t> parcels;  // nothing: the whole manifest, or a base, which sorts none
   std::string manifest;                 // what its file holds; empty: drawn
   std::string faults = "none";          // a plan of the world's, or the name of a file,
   std::string faults_file;              // and what that holds

@@ -370,6 +370,9 @@ TEST_P(ReplayOfABreak, CtrlCComesAgainAtItsTime) {
   run.signal(SIGINT);
   EXPECT_EQ(run.wait().code, 130);
   EXPECT_TRUE(whole(folder_ / "a.mcap"));
+  const std::string parcels = GetParam().size() > 1 ? fmt::format(", {} parcels", GetParam().back()) : "";
+  EXPECT_THAT(run_pons({"recording", "info", file("a.mcap")}).out,
+              HasSubstr(fmt::format("\nrun of small_cell, seed 1{}, in virtual time: ", parcels)));
   const Finished again = replay("a.mcap", {"--record", file("b.mcap")});
   EXPECT_EQ(again.code, 0) << again.out;
   EXPECT_THAT(again.out, testing::StartsWith("equal: "));
@@ -385,6 +388,8 @@ TEST_F(Replay, ABaseMakesItsRoundsAgain) {
     ASSERT_EQ(run.code, 0) << run.err;
   }
   EXPECT_TRUE(bytes("a.mcap") == bytes("b.mcap"));
+  EXPECT_THAT(run_pons({"recording", "info", file("a.mcap")}).out,
+              HasSubstr("\nrun of rounds, seed 1, in virtual time: complete\n"));
   const auto counts = counts_of(folder_ / "a.mcap");
   EXPECT_GT(counts.at("/pons/pose"), 10U);
   EXPECT_GT(counts.at("/pons/commands"), 10U);
