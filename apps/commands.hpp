@@ -44,9 +44,10 @@ void add_completion(CLI::App& app, Chosen& chosen);
 // Whether `pons run WORDS` would begin: all that can be told before anything is built. Errors: what it would say.
 [[nodiscard]] Expected<void> check_run(const std::vector<std::string>& words);
 
-// Of an option: a whole number from 0 to `most`. The parser's own conversion clamps what does not fit, and its own
-// range from 0 on names the largest double there is.
+// Of an option: a whole number from 0, or `least`, to `most`. The parser's own conversion clamps what does not fit, and
+// its own range from 0 on names the largest double there is.
 [[nodiscard]] CLI::Validator whole_number(std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
+[[nodiscard]] CLI::Validator whole_number(std::uint64_t least, std::uint64_t most);
 
 // A line for a person, on stdout or stderr. Never throws.
 void say(std::FILE* out, const std::string& text);

@@ -76,12 +76,12 @@ void add_record_options(CLI::App& command, RecordOptions& options) {
   command
       .add_option("--record-file", options.file_mib,
                   "Go on in another file after so many MiB: NAME_1.mcap, NAME_2.mcap …; 1 to 1000000 (one file)")
-      ->check(whole_number(1'000'000))
+      ->check(whole_number(1, 1'000'000))
       ->needs(file);
   command
       .add_option("--record-quota", options.quota_mib,
                   "Keep no more than the newest files of so many MiB together; 2 to 1000000 (all)")
-      ->check(whole_number(1'000'000))
+      ->check(whole_number(2, 1'000'000))
       ->needs(file);
   command.add_flag("--record-depth", options.depth, "Pictures of depth, too: several times as large a recording")
       ->needs(file);

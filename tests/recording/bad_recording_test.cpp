@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <csignal>
 
 #include "pons/record/mcap_check.hpp"
@@ -49,6 +50,11 @@ TEST_F(Recording, WhatCannotBeRecordedIsRefusedByName) {
   expect_run_refused({"--record", ""}, {"--record", "is empty"});
   expect_run_refused({"--record-quota", "8"}, {"--record-quota", "--record"});
   expect_run_refused({"--record", file("a.mcap"), "--record-quota", "x"}, {"--record-quota", "whole number"});
+  // As --help says.
+  for (const auto& [option, count, range] :
+       {std::array{"--record-file", "0", "1"}, {"--record-file", "1000001", "1"}, {"--record-quota", "1", "2"}})
+    expect_run_refused({"--record", file("a.mcap"), option, count},
+                       {fmt::format("'{}' is not a whole number from {} to 1000000", count, range)});
   expect_run_refused({"--record", file("a.mcap"), "--record-quota", "9", "--record-file", "5"},
                      {"--record-quota 9: is less than two files take; ask for 10 at least"});
   expect_run_refused({"--record", file("a.mcap"), "--journal", file("a.mcap")}, {"--journal", "--record"});
