@@ -23,6 +23,24 @@ std::string help_of(const CLI::App& app) {
                      chosen.empty() ? "" : " ");
 }
 
+// CLI11 says no more than that a command is missing where it knows none of the words.
+Error without_command(const CLI::App& app, const CLI::RequiredError& error) {
+  const CLI::App* at = &app;
+  std::string where = "pons";
+  while (!at->get_subcommands().empty()) {
+    at = at->get_subcommands().front();
+    where += " " + at->get_name();
+  }
+  if (at->get_require_subcommand_min() == 0) return {error.what(), "", help_of(app)};
+  const std::vector<std::string> words = at->remaining();
+  const std::string what = words.empty() ? "no command is named" : fmt::format("no command '{}'", words.front());
+  if (at == &app) return {what, "", help_of(app)};
+  std::string names;
+  for (const CLI::App* each : at->get_subcommands([](const CLI::App*) { return true; }))
+    names += (names.empty() ? "" : ", ") + each->get_name();
+  return {what, where, fmt::format("there are {}: {} --help", names, where)};
+}
+
 // Of pons sweep, what stands after -- is for its runs: taken out of `words`.
 std::vector<std::string> taken_further(std::vector<std::string>& words) {
   const auto dashes = std::ranges::find(words, "--");
@@ -65,10 +83,7 @@ int run_command_line(int argc, char** argv) {
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
   } catch (const CLI::RequiredError& error) {
-    // CLI11 says only that a command is missing when it knows none of the words.
-    const bool unknown = app.get_subcommands().empty() && argc > 1;
-    const std::string what = unknown ? fmt::format("no command '{}'", argv[1]) : error.what();
-    return bad_input({what, "", help_of(app)});
+    return bad_input(without_command(app, error));
   } catch (const CLI::ParseError& error) {
     return bad_input({error.what(), "", help_of(app)});
   }

@@ -211,6 +211,12 @@ std::string held(const record::Verdict& verdict) {
   return fmt::format("{} messages in {} chunks, {} attachments", verdict.messages, verdict.chunks, verdict.attachments);
 }
 
+// What the library cannot know: how a person allows it.
+int cannot_make(Error error) {
+  if (error.mend == record::kAllowIt) error.mend = "choose another name, or give --overwrite";
+  return bad_input(error);
+}
+
 int check(const RecordingOptions& options) {
   const auto source = record::open_file(options.file);
   if (!source) return bad_input(source.error());
@@ -236,7 +242,7 @@ int repair(const RecordingOptions& options) {
     output.replace_filename(options.file.stem().string() + "_repaired.mcap");
   }
   if (auto repaired = record::repair(**source, output, options.overwriting()); !repaired)
-    return bad_input(repaired.error());
+    return cannot_make(repaired.error());
   const auto made = record::open_file(output);
   if (!made) return bad_run(made.error());
   const auto verdict = record::check(**made);
@@ -249,7 +255,7 @@ int film(const RecordingOptions& options, const McapReader& reader) {
   if (options.topics.size() != 1)
     return bad_input({"a film is of one topic", options.mp4.string(), "name it with --topic"});
   const auto filmed = record::export_mp4(reader, options.topics.front(), options.mp4, options.overwriting());
-  if (!filmed) return bad_input(filmed.error());
+  if (!filmed) return cannot_make(filmed.error());
   if (filmed->damage) say(stderr, fmt::format("pons: {}\n", filmed->damage->error(options.file.string()).line()));
   say(stdout, fmt::format("{} pictures, {:.2f} a second\n", filmed->pictures, filmed->a_second));
   return filmed->damage ? kExitBadRun : kExitGood;
@@ -264,7 +270,7 @@ int export_it(const RecordingOptions& options) {
   const auto exported = options.csv.empty()
                             ? record::export_jsonl(**reader, query, options.jsonl, options.overwriting())
                             : record::export_csv(**reader, query, options.csv, options.overwriting());
-  if (!exported) return bad_input(exported.error());
+  if (!exported) return cannot_make(exported.error());
   for (const auto& [topic, why] : exported->left_out)
     say(stderr, fmt::format("pons: {} is left out: {}\n", plain(topic), plain(why)));
   if (exported->first_unreadable)

@@ -30,6 +30,8 @@ namespace fs = std::filesystem;
   return target;
 }
 
+std::string part_ending() { return fmt::format(".{}.part", ::getpid()); }
+
 // 0, or the errno of what went wrong.
 [[nodiscard]] int write_and_sync(const fs::path& path, std::string_view bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
@@ -53,6 +55,13 @@ std::unexpected<Error> cannot(std::string_view what, const fs::path& where, int 
   if (error == EROFS) mend = "choose a path on a file system that is not read-only";
   if (error == EIO) mend = "look after the disk: the kernel's log says more";
   return fail(fmt::format("cannot {}: {}", what, std::generic_category().message(error)), where.string(), mend);
+}
+
+fs::path part_of(const fs::path& path) { return path.native() + part_ending(); }
+
+fs::path whole_of(const fs::path& part) {
+  const std::string ending = part_ending(), &name = part.native();
+  return name.ends_with(ending) ? name.substr(0, name.size() - ending.size()) : name;
 }
 
 fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
@@ -87,9 +96,7 @@ Expected<void> check_writable(const fs::path& path) {
 Expected<void> write_whole(const fs::path& path, std::string_view bytes) {
   if (auto writable = check_writable(path); !writable) return writable;
   const fs::path target = behind_links(path);
-  fs::path part = target;
-  part += fmt::format(".{}.part", ::getpid());
-
+  const fs::path part = part_of(target);
   if (const int error = write_and_sync(part, bytes); error != 0) {
     ::unlink(part.c_str());
     return cannot("write", path, error);

@@ -4,18 +4,19 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <string>
 
-#include <sys/resource.h>
+#include "pons/record/new_file.hpp"
+#include "pons/record/test_recording.hpp"
 
 namespace pons::record {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 class FileTest : public ::testing::Test {
  protected:
@@ -80,19 +81,28 @@ TEST_F(FileTest, LeavesTheOldFileWhenTheDiskIsFull) {
   const fs::path path = folder_ / "a.json";
   ASSERT_TRUE(write_whole(path, "old"));
 
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit tight{.rlim_cur = 1000, .rlim_max = before.rlim_max};
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
-  const auto full = write_whole(path, std::string(4000, 'x'));
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, handler);
-
+  const auto full = [&] {
+    const FullDisk limit(1000);
+    return write_whole(path, std::string(4000, 'x'));
+  }();
   ASSERT_FALSE(full);
   EXPECT_THAT(full.error().line(), HasSubstr("cannot write"));
   EXPECT_EQ(read(path), "old");
   EXPECT_EQ(files(), 1);
+}
+
+// Not that of the file which would have become it.
+TEST_F(FileTest, WhatCannotBeWrittenHasTheNameThatItWasGiven) {
+  const fs::path path = folder_ / "a.jsonl";
+  {
+    auto file = NewText::create(path, Overwrite::kNever);
+    ASSERT_TRUE(file) << file.error().line();
+    const FullDisk limit(1000);
+    const auto full = file->add(std::string(100'000, 'x'));
+    ASSERT_FALSE(full);
+    EXPECT_THAT(full.error().line(), StartsWith(path.string() + ": cannot write: "));
+  }
+  EXPECT_EQ(files(), 0);
 }
 
 TEST_F(FileTest, AsksWithoutWriting) {

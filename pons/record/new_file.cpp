@@ -1,7 +1,6 @@
 #include "pons/record/new_file.hpp"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -18,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPiece = std::size_t{64} * 1024;
 
 std::unexpected<Error> taken(const fs::path& path) {
-  return fail("there is such a file already", path.string(), "choose another name, or allow it to be overwritten");
+  return fail("there is such a file already", path.string(), std::string(kAllowIt));
 }
 
 // 0, or an errno.
@@ -37,8 +36,7 @@ Expected<fs::path> begin_file(const fs::path& path, Overwrite overwrite) {
   if (auto writable = check_writable(path); !writable) return std::unexpected(writable.error());
   std::error_code ignored;
   if (overwrite == Overwrite::kNever && fs::exists(path, ignored)) return taken(path);
-  fs::path part = path;
-  part += fmt::format(".{}.part", ::getpid());
+  fs::path part = part_of(path);
   ::unlink(part.c_str());  // of a process that had this number and was killed
   return part;
 }

@@ -13,6 +13,9 @@ namespace pons::record {
 
 enum class Overwrite { kNever, kAllowed };
 
+// How to mend that there is such a file already: programs tell in their own words how to allow it.
+inline constexpr std::string_view kAllowIt = "choose another name, or allow it to be overwritten";
+
 // The name under which a file is written that shall become `path`. Errors: those of check_writable; `path` exists and
 // may not be overwritten.
 [[nodiscard]] Expected<std::filesystem::path> begin_file(const std::filesystem::path& path, Overwrite overwrite);

@@ -13,16 +13,17 @@ Expected<OutputFile> OutputFile::create(const std::filesystem::path& path) {
   if (file.open()) return OutputFile(path, std::move(file));
   const int error = errno;
   if (error == EEXIST)
-    return fail("there is such a file already", path.string(), "choose another name or move it away");
+    return fail("there is such a file already", whole_of(path).string(), "choose another name or move it away");
   if (error == ENOENT)
     return fail("the folder does not exist", folder_of(path).string(), "create it or choose another path");
-  return cannot("create the file", path, error);
+  return cannot("create the file", whole_of(path), error);
 }
 
 Expected<void> OutputFile::append(std::span<const std::byte> bytes) {
   struct stat now{};
   if (::fstat(file_.number(), &now) == 0 && now.st_nlink == 0)
-    return fail("the file was removed while it was written", path_.string(), "leave a recording alone until it ends");
+    return fail("the file was removed while it was written", whole_of(path_).string(),
+                "leave a recording alone until it ends");
   const std::uint64_t end = size_ + bytes.size();
   while (!bytes.empty()) {
     const ssize_t written = ::write(file_.number(), bytes.data(), bytes.size());
@@ -33,7 +34,7 @@ Expected<void> OutputFile::append(std::span<const std::byte> bytes) {
       // know.
       if (::ftruncate(file_.number(), static_cast<off_t>(size_)) == 0)
         ::lseek(file_.number(), static_cast<off_t>(size_), SEEK_SET);
-      return cannot("write", path_, error);
+      return cannot("write", whole_of(path_), error);
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
@@ -42,7 +43,7 @@ Expected<void> OutputFile::append(std::span<const std::byte> bytes) {
 }
 
 Expected<void> OutputFile::sync() {
-  if (::fdatasync(file_.number()) != 0) return cannot("sync", path_, errno);
+  if (::fdatasync(file_.number()) != 0) return cannot("sync", whole_of(path_), errno);
   return {};
 }
 

@@ -11,6 +11,7 @@
 
 namespace pons::record {
 
+// Of what is yet to get its name (begin_file) errors tell that name.
 class OutputFile {
  public:
   // Errors: a file of that name is there already; the folder is missing, or nothing can be written into it.

@@ -37,6 +37,11 @@ class Descriptor {
 // "cannot WHAT: …", with how to mend what `error`, an errno, says.
 [[nodiscard]] std::unexpected<Error> cannot(std::string_view what, const std::filesystem::path& where, int error);
 
+// Where a file is written that shall become `path` once it is whole; and what such a one shall become, for messages:
+// people know the name that they gave. What is no such file becomes itself.
+[[nodiscard]] std::filesystem::path part_of(const std::filesystem::path& path);
+[[nodiscard]] std::filesystem::path whole_of(const std::filesystem::path& part);
+
 [[nodiscard]] std::filesystem::path folder_of(const std::filesystem::path& path);
 
 // What was made, renamed or removed in a folder lasts only once this has returned. 0, or the errno of what went wrong.

@@ -3,9 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-
-#include <csignal>
 
 #include "pons/record/mcap_check.hpp"
 #include "pons/record/test_recording.hpp"
@@ -277,26 +274,6 @@ TEST_F(RecorderTest, AnAttachmentIsInTheFile) {
   finish(**recorder);
   EXPECT_EQ((*McapReader::open(folder_ / "run_0.mcap"))->contents().attachments.at(0).name, "world.yaml");
 }
-
-// A disk that is full, as a limit of the size of files.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-
- private:
-  void (*handler_)(int);
-  rlimit before_{};
-};
 
 TEST_F(RecorderTest, AFullDiskIsSaidCountedAndLeavesAFileThatCanBeRead) {
   RecorderOptions told = options();

@@ -24,16 +24,17 @@ using wire::sensor_msgs::msg::CompressedImage;
 // ffmpeg, which is given pictures one behind the other.
 class Film {
  public:
-  static Expected<Film> begin(const std::filesystem::path& path, const std::string& codec, double a_second) {
+  static Expected<Film> begin(const std::filesystem::path& part, const std::string& codec, double a_second) {
     std::array<int, 2> ends{};
     // Not a pipe: writing to one that nobody reads any more would end this process.
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) return cannot("begin", path, errno);
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
+      return cannot("begin", whole_of(part), errno);
     Descriptor ours(ends[0]), theirs(ends[1]);
     posix_spawn_file_actions_t actions{};
     ::posix_spawn_file_actions_init(&actions);
     ::posix_spawn_file_actions_adddup2(&actions, theirs.number(), STDIN_FILENO);
     // H.264 wants even sides. A path is a name, whatever is in it: no option, and of no other protocol.
-    const std::string file = "file:" + path.string();
+    const std::string file = "file:" + part.string();
     std::vector<std::string> words{"ffmpeg",     "-loglevel",
                                    "error",      "-y",
                                    "-f",         "image2pipe",
@@ -50,6 +51,7 @@ class Film {
     pid_t child = -1;
     const int error = ::posix_spawnp(&child, "ffmpeg", &actions, nullptr, arguments.data(), environ);
     ::posix_spawn_file_actions_destroy(&actions);
+    const auto path = whole_of(part);
     if (error == ENOENT) return fail("ffmpeg is not installed", path.string(), "install it: apt-get install ffmpeg");
     if (error != 0) return cannot("start ffmpeg", path, error);
     return Film(std::move(ours), child);

@@ -148,7 +148,8 @@ TEST_F(RecordingCommand, CheckTellsAndRepairMends) {
   EXPECT_EQ(recording({"check", (folder_ / "cut_repaired.mcap").string()}).code, 0);
   const Finished again = recording({"repair", (folder_ / "cut.mcap").string()});
   EXPECT_EQ(again.code, 2);
-  EXPECT_THAT(again.err, HasSubstr("cut_repaired.mcap: there is such a file already"));
+  EXPECT_THAT(again.err,
+              HasSubstr("cut_repaired.mcap: there is such a file already; choose another name, or give --overwrite"));
   const std::string cut_file = (folder_ / "cut.mcap").string();
   EXPECT_EQ(recording({"repair", cut_file, "--output", cut_file, "--overwrite"}).code, 0);
   EXPECT_EQ(recording({"check", cut_file}).code, 0);
@@ -184,6 +185,14 @@ TEST_F(RecordingCommand, ATableOfAnyTypeHasColumnsOfDifferentNames) {
     ++tables;
   }
   EXPECT_GT(tables, 200U);
+}
+
+TEST_F(RecordingCommand, AWordThatIsNoCommandIsNamedBesideThoseThatAre) {
+  const Finished unknown = recording({"foo", "a.mcap"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("pons recording: no command 'foo'; there are info, check, repair, export"));
+  EXPECT_THAT(recording({}).err, HasSubstr("pons recording: no command is named; there are info,"));
+  EXPECT_THAT(run_pons({"foo"}).err, HasSubstr("pons: no command 'foo'; pons --help"));
 }
 
 // Under whatever name.
@@ -261,7 +270,7 @@ TEST_F(RecordingFilm, PicturesGoToFfmpegOneBehindTheOther) {
 }
 
 TEST_F(RecordingFilm, WhatCannotBeFilmedIsNamedAndLeavesNothing) {
-  EXPECT_THAT(film("/camera").err, HasSubstr("ffmpeg is not installed; install it"));
+  EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg is not installed; install it"));
   ffmpeg("echo no such codec >&2; exit 1");
   EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg has made no film of it"));
   EXPECT_THAT(film("/other").err, HasSubstr("/other: picture 0 is neither JPEG nor PNG"));
