@@ -2,10 +2,13 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include "apps/commands.hpp"
 #include "apps/run_facts.hpp"
@@ -261,15 +264,40 @@ int film(const RecordingOptions& options, const McapReader& reader) {
   return filmed->damage ? kExitBadRun : kExitGood;
 }
 
+// As a name of a file.
+constexpr std::string_view kStandardOutput = "-";
+constexpr std::string_view kNobodyReads = "nobody reads it any more";
+
+// Past stdio, which tells of a line some time after it that it could not be written.
+Expected<void> write_out(std::string_view lines) {
+  while (!lines.empty()) {
+    const ssize_t written = ::write(STDOUT_FILENO, lines.data(), lines.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0 && errno == EPIPE) return fail(std::string(kNobodyReads), "the standard output");
+    if (written < 0)
+      return fail(fmt::format("cannot write: {}", std::generic_category().message(errno)), "the standard output",
+                  "look after what it is redirected to");
+    lines.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return {};
+}
+
+Expected<record::Exported> export_texts(const RecordingOptions& options, const McapReader& reader,
+                                        const record::Query& query) {
+  if (!options.csv.empty()) return record::export_csv(reader, query, options.csv, options.overwriting());
+  if (options.jsonl == kStandardOutput) return record::export_jsonl(reader, query, write_out);
+  return record::export_jsonl(reader, query, options.jsonl, options.overwriting());
+}
+
 int export_it(const RecordingOptions& options) {
   const auto reader = McapReader::open(options.file);
   if (!reader) return bad_input(reader.error());
   if (!options.mp4.empty()) return film(options, **reader);
   record::Query query;
   if (!options.topics.empty()) query.topics.emplace(options.topics.begin(), options.topics.end());
-  const auto exported = options.csv.empty()
-                            ? record::export_jsonl(**reader, query, options.jsonl, options.overwriting())
-                            : record::export_csv(**reader, query, options.csv, options.overwriting());
+  const auto exported = export_texts(options, **reader, query);
+  // A reader that has seen enough (head).
+  if (!exported && exported.error().what == kNobodyReads) return kExitGood;
   if (!exported) return cannot_make(exported.error());
   for (const auto& [topic, why] : exported->left_out)
     say(stderr, fmt::format("pons: {} is left out: {}\n", plain(topic), plain(why)));
@@ -277,7 +305,7 @@ int export_it(const RecordingOptions& options) {
     say(stderr, fmt::format("pons: {} messages left out; the first: {}\n", exported->unreadable,
                             plain(exported->first_unreadable->line())));
   if (exported->damage) say(stderr, fmt::format("pons: {}\n", exported->damage->error(options.file.string()).line()));
-  say(stdout, fmt::format("{} messages\n", exported->messages));
+  say(options.jsonl == kStandardOutput ? stderr : stdout, fmt::format("{} messages\n", exported->messages));
   const bool all = exported->unreadable == 0 && !exported->damage && (exported->left_out.empty() || !query.topics);
   return all ? kExitGood : kExitBadRun;
 }
@@ -304,7 +332,8 @@ void add_recording(CLI::App& app, Chosen& chosen) {
   CLI::App* tables =
       add("export", "Its messages as text, of the types that Pons knows; or pictures as a film", export_it);
   auto* csv = tables->add_option("--csv", options->csv, "A folder for one table a topic");
-  auto* jsonl = tables->add_option("--jsonl", options->jsonl, "A file for one JSON object a line");
+  auto* jsonl =
+      tables->add_option("--jsonl", options->jsonl, "A file for one JSON object a line; -: the standard output");
   auto* mp4 = tables->add_option("--mp4", options->mp4, "A film of a topic of compressed images, by ffmpeg");
   csv->excludes(jsonl);
   mp4->excludes(csv)->excludes(jsonl);

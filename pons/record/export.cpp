@@ -17,6 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using wire::Json;
 
+constexpr std::size_t kLinesAtOnce = std::size_t{16} * 1024;
+
 Expected<Json> json_itself(std::span<const std::byte> bytes) {
   const auto* begin = reinterpret_cast<const char*>(bytes.data());
   Json json = Json::parse(begin, begin + bytes.size(), nullptr, false);
@@ -165,17 +167,27 @@ Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, co
   if (auto another = check_is_not(reader.source().name(), path); !another) return std::unexpected(another.error());
   auto file = NewText::create(path, overwrite);
   if (!file) return std::unexpected(file.error());
-  auto exported =
-      each_json(reader, query, [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) {
-        const Json line{{"topic", channel.topic},
-                        {"log_time_ns", message.log_time},
-                        {"publish_time_ns", message.publish_time},
-                        {"sequence", message.sequence},
-                        {"message", json}};
-        return file->add(wire::line_of(line) + "\n");
-      });
+  auto exported = export_jsonl(reader, query, [&](std::string_view lines) { return file->add(lines); });
   if (!exported) return exported;
   if (auto ended = file->end(); !ended) return std::unexpected(ended.error());
+  return exported;
+}
+
+Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, const TakeLines& take) {
+  std::string waiting;
+  auto exported =
+      each_json(reader, query,
+                [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) -> Expected<void> {
+                  const Json line{{"topic", channel.topic},
+                                  {"log_time_ns", message.log_time},
+                                  {"publish_time_ns", message.publish_time},
+                                  {"sequence", message.sequence},
+                                  {"message", json}};
+                  waiting += wire::line_of(line) + "\n";
+                  return waiting.size() < kLinesAtOnce ? Expected<void>{} : take(std::exchange(waiting, {}));
+                });
+  if (!exported || waiting.empty()) return exported;
+  if (auto taken = take(waiting); !taken) return std::unexpected(taken.error());
   return exported;
 }
 

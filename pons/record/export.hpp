@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "pons/core/error.hpp"
 #include "pons/record/mcap_check.hpp"
@@ -27,6 +29,11 @@ struct Exported {
 // overwritten; those of writing.
 [[nodiscard]] Expected<Exported> export_jsonl(const McapReader& reader, const Query& query,
                                               const std::filesystem::path& path, Overwrite overwrite);
+
+// The same for whom `take` hands it on to: whole lines, some ten thousand bytes at a time. Errors: a topic that was
+// asked for is not in the recording; those of `take`, which is called no more then.
+using TakeLines = std::function<Expected<void>(std::string_view)>;
+[[nodiscard]] Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, const TakeLines& take);
 
 // The same as tables (RFC 4180) in `folder`, which is made if it is missing: one file a topic, its '/' made '_'. Fields
 // of fields have columns of their own ("pose.position.x"); arrays are JSON in one. The first three columns are

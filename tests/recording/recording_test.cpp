@@ -187,6 +187,18 @@ TEST_F(RecordingCommand, ATableOfAnyTypeHasColumnsOfDifferentNames) {
   EXPECT_GT(tables, 200U);
 }
 
+TEST_F(RecordingCommand, LinesGoToTheStandardOutputToo) {
+  const std::string types = (folder_ / "types.mcap").string(), out = (folder_ / "types.jsonl").string();
+  ASSERT_EQ(run_program(PONS_RECORDING_PEER, {"write", types, "none"}).code, 0);
+  ASSERT_EQ(recording({"export", types, "--jsonl", out}).code, 0);
+  const Finished told = recording({"export", types, "--jsonl", "-"});
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_TRUE(told.out == record::read_bytes(out)) << "and nothing else";
+  EXPECT_THAT(told.err, testing::EndsWith(" messages\n"));
+  EXPECT_FALSE(std::filesystem::exists("-"));
+  EXPECT_EQ(run_pons_unheard({"recording", "export", types, "--jsonl", "-"}), 2) << "a full disk";
+}
+
 TEST_F(RecordingCommand, AWordThatIsNoCommandIsNamedBesideThoseThatAre) {
   const Finished unknown = recording({"foo", "a.mcap"});
   EXPECT_EQ(unknown.code, 2);
