@@ -1,11 +1,13 @@
 #include "pons/record/export.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <functional>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "pons/record/new_file.hpp"
 #include "pons/record/posix.hpp"
@@ -108,6 +110,30 @@ void flatten(const Json& json, const std::string& way, std::string& names, std::
   cells += ',' + cell(json);
 }
 
+// Those that a path lacks: made, and removed again where nothing came into them.
+class NewFolders {
+ public:
+  static Expected<NewFolders> make(const fs::path& path) {
+    NewFolders folders;
+    std::error_code error;
+    for (fs::path each = path; !each.empty() && !fs::exists(each, error); each = each.parent_path())
+      folders.made_.push_back(each);
+    fs::create_directories(path, error);
+    if (error) return cannot("make the folder", path, error.value());
+    return folders;
+  }
+  ~NewFolders() {
+    for (const fs::path& each : made_) ::rmdir(each.c_str());  // the innermost first
+  }
+  NewFolders(NewFolders&&) = default;
+  NewFolders& operator=(NewFolders&&) = delete;
+
+ private:
+  NewFolders() = default;
+
+  std::vector<fs::path> made_;
+};
+
 class Tables {
  public:
   Tables(fs::path recording, fs::path folder, Overwrite overwrite)
@@ -193,9 +219,8 @@ Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, co
 
 Expected<Exported> export_csv(const McapReader& reader, const Query& query, const fs::path& folder,
                               Overwrite overwrite) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return cannot("make the folder", folder, error.value());
+  const auto made = NewFolders::make(folder);
+  if (!made) return std::unexpected(made.error());
   Tables tables(reader.source().name(), folder, overwrite);
   auto exported =
       each_json(reader, query, [&](const mcap::Message& message, const mcap::Channel& channel, const Json& json) {

@@ -35,9 +35,10 @@ struct Exported {
 using TakeLines = std::function<Expected<void>(std::string_view)>;
 [[nodiscard]] Expected<Exported> export_jsonl(const McapReader& reader, const Query& query, const TakeLines& take);
 
-// The same as tables (RFC 4180) in `folder`, which is made if it is missing: one file a topic, its '/' made '_'. Fields
-// of fields have columns of their own ("pose.position.x"); arrays are JSON in one. The first three columns are
-// record.log_time_ns, record.publish_time_ns and record.sequence; each has a name of its own.
+// The same as tables (RFC 4180) in `folder`, which is made if it is missing, and gone again if there is no table to put
+// into it: one file a topic, its '/' made '_'. Fields of fields have columns of their own ("pose.position.x"); arrays
+// are JSON in one. The first three columns are record.log_time_ns, record.publish_time_ns and record.sequence; each has
+// a name of its own.
 [[nodiscard]] Expected<Exported> export_csv(const McapReader& reader, const Query& query,
                                             const std::filesystem::path& folder, Overwrite overwrite);
 

@@ -136,6 +136,25 @@ TEST_F(ExportTest, OnlyWhatIsAskedForAndNothingIsOverwritten) {
     EXPECT_FALSE(each.path().string().ends_with(".part")) << each.path();
 }
 
+TEST_F(ExportTest, AFolderThatWasMadeForNoTableGoesAgain) {
+  const auto there = [&](const char* name) { return std::filesystem::exists(folder_ / name); };
+  Query query{.topics = std::set<std::string, std::less<>>{"/no"}};
+  EXPECT_FALSE(export_csv(*reader_, query, folder_ / "new" / "tables", Overwrite::kNever));
+  EXPECT_FALSE(there("new"));
+  query.topics = std::set<std::string, std::less<>>{"/unknown"};
+  EXPECT_TRUE(export_csv(*reader_, query, folder_ / "new/", Overwrite::kNever));
+  EXPECT_FALSE(there("new"));
+  {
+    const FullDisk limit(10);
+    EXPECT_FALSE(export_csv(*reader_, {}, folder_ / "new" / "tables", Overwrite::kNever));
+  }
+  EXPECT_FALSE(there("new"));
+  std::filesystem::create_directory(folder_ / "old");
+  query.topics = std::set<std::string, std::less<>>{"/no"};
+  EXPECT_FALSE(export_csv(*reader_, query, folder_ / "old", Overwrite::kNever));
+  EXPECT_TRUE(there("old"));
+}
+
 TEST_F(ExportTest, OfTwoFormsOfATypeTheOneIsTakenWhoseFieldsAreTheFiles) {
   const auto& channels = reader_->contents().channels;
   for (const auto& [id, channel] : channels) {
