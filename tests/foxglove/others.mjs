@@ -1,19 +1,20 @@
 // Looks at a run as Foxglove does: with npm's @foxglove/ws-protocol, each message by the schema of its channel with
-// @foxglove/rosmsg and @foxglove/rosmsg2-serialization. Run by hand, where node is.
+// @foxglove/rosmsg and @foxglove/rosmsg2-serialization. npm_test.py runs it; or by hand, with what tools/setup --npm
+// installs:
 //
-// usage: npm install @foxglove/ws-protocol@0.8.0 ws@8.23.0 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0
-//        build/release/apps/pons run parcel_cell --realtime --foxglove &
-//        node tests/foxglove/others.mjs ws://127.0.0.1:8765
+// usage: build/release/apps/pons run parcel_cell --realtime --foxglove &
+//        node tests/foxglove/others.mjs .npm-check ws://127.0.0.1:8765
 import { createRequire } from "node:module";
+import { resolve } from "node:path";
 
-const require = createRequire(process.cwd() + "/");
+const require = createRequire(resolve(process.argv[2]) + "/");
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const { WebSocket } = require("ws");
 const { parse } = require("@foxglove/rosmsg");
 const { MessageReader } = require("@foxglove/rosmsg2-serialization");
 
 const SECONDS = 10;
-const client = new FoxgloveClient({ ws: new WebSocket(process.argv[2], [FoxgloveClient.SUPPORTED_SUBPROTOCOL]) });
+const client = new FoxgloveClient({ ws: new WebSocket(process.argv[3], [FoxgloveClient.SUPPORTED_SUBPROTOCOL]) });
 const subscribed = new Map();
 let time = 0n, failed = 0;
 client.on("error", (error) => { console.log(`error: ${error.message}`); process.exit(1); });
