@@ -101,7 +101,7 @@ Expected<Task> task_from(const Json& json) {
       return fail("it has both arguments and params", fmt::format("/steps/{}", task.steps.size()),
                   "they mean the same: give one of them");
     task.steps.push_back(
-        {step.at("skill").get<std::string>(), step.value(params ? "params" : "arguments", Json::object())});
+        {step.at("skill").get<std::string>(), step.value(params ? "params" : "arguments", Json::object()), params});
   }
   return task;
 }

@@ -19,6 +19,7 @@ using Json = nlohmann::json;
 struct Step {
   std::string skill;
   Json arguments = Json::object();
+  bool params = false;  // whoever sent it calls them so, and hears of them by that name
 };
 
 // A behaviour tree instead of steps: one that the world has, by its name, or one sent along (BehaviorTree.CPP 4 XML).

@@ -97,8 +97,8 @@ TEST_F(RoundsProgram, WhatNobodyCanDoIsRefusedBeforeTheRun) {
   expect_task_refused(R"({"id":"x","steps":[{"skill":"navigate","params":{"x":4.5,"y":1.2}}]})",
                       {"x/steps/0", "no room for the base"});
   expect_task_refused(R"({"id":"x","steps":[{"skill":"navigate","params":{"x":1,"y":0,"frame_id":"odom"}}]})",
-                      {"/steps/0/arguments/frame_id"});
-  expect_task_refused(R"({"id":"x","steps":[{"skill":"speak","params":{"text":""}}]})", {"/steps/0/arguments/text"});
+                      {"/steps/0/params/frame_id"});
+  expect_task_refused(R"({"id":"x","steps":[{"skill":"speak","params":{"text":""}}]})", {"/steps/0/params/text"});
   expect_task_refused("{", {"bad.json"});
   expect_refused({"run", "rounds", "--task", folder_ / "none.json"}, {"none.json", "cannot be read"});
   expect_refused({"run", "rounds", "--task", (folder_ / "inspect.json").string() + "@soon"}, {"is no time"});

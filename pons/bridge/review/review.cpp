@@ -76,7 +76,7 @@ Expected<void> Review::check_step(const task::Step& step, const std::string& whe
     return fail(fmt::format("the skill '{}' cannot be used: {}", step.skill, schema.error().line()), where + "/skill",
                 "mend the skill");
   }
-  if (auto fits = schema->check(step.arguments, where + "/arguments"); !fits) return fits;
+  if (auto fits = schema->check(step.arguments, where + (step.params ? "/params" : "/arguments")); !fits) return fits;
   return check_resources(*type, where + "/skill");
 }
 

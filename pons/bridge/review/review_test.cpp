@@ -38,6 +38,8 @@ TEST_F(ReviewTest, NamesTheNearestSkill) {
 TEST_F(ReviewTest, ChecksArgumentsAgainstTheSkillsSchema) {
   EXPECT_EQ(check(R"([{"skill":"pick","arguments":{"object":3}}])").error().where, "/steps/0/arguments/object");
   EXPECT_EQ(check(R"([{"skill":"pick","arguments":{"speed":3}}])").error().where, "/steps/0/arguments");
+  // By the name that the sender gave them.
+  EXPECT_EQ(check(R"([{"skill":"pick","params":{"object":3}}])").error().where, "/steps/0/params/object");
 }
 
 TEST_F(ReviewTest, RefusesDeadlinesThatHavePassed) {
