@@ -18,7 +18,10 @@ void add_ros_options(CLI::App& command, RosOptions& options) {
       ->needs(on);
   command.add_option("--ros-namespace", options.space, "Before its topics' names (/)")->needs(on);
   command.add_option("--ros-node", options.name, "The node's name (pons)")->needs(on);
-  command.add_option("--ros-remap", options.remaps, "FROM:=TO, as ros2 run takes it; again for each name")->needs(on);
+  command
+      .add_option("--ros-remap", options.remaps,
+                  "FROM:=TO, __node:=NAME or __ns:=/NAME, as ros2 run takes them; again for each")
+      ->needs(on);
 }
 
 Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& options) {
@@ -28,7 +31,8 @@ Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& 
   std::string domain = options.domain;
   if (domain.empty() && environment != nullptr) domain = environment;
   if (!domain.empty()) {
-    const auto id = gate::ros::domain_id(domain);
+    auto id = gate::ros::domain_id(domain);
+    if (!id && !options.domain.empty()) id.error().where = "--ros-domain";
     if (!id) return std::unexpected(id.error());
     settings.participant.domain = *id;
   }
@@ -36,10 +40,17 @@ Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& 
     return fail(fmt::format("'{}' would be asked who is there, and Pons asks no server", server),
                 "ROS_DISCOVERY_SERVER", "unset it, for Pons and for all whom it shall meet");
   settings.participant.interface = options.interface;
-  auto name = gate::ros::node_name(options.space, options.name);
+  constexpr std::string_view kNode = "__node:=", kSpace = "__ns:=";
+  std::string of_node = options.name, of_space = options.space;
+  for (const std::string& rule : options.remaps) {
+    if (rule.starts_with(kNode)) of_node = rule.substr(kNode.size());
+    if (rule.starts_with(kSpace)) of_space = rule.substr(kSpace.size());
+  }
+  auto name = gate::ros::node_name(of_space, of_node);
   if (!name) return std::unexpected(name.error());
   settings.name = *std::move(name);
   for (const std::string& rule : options.remaps) {
+    if (rule.starts_with(kNode) || rule.starts_with(kSpace)) continue;
     if (auto added = gate::ros::add_remap(rule, settings.name, settings.remaps); !added)
       return std::unexpected(added.error());
   }

@@ -32,6 +32,7 @@ using test::PeerProcess;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using wire::pons_msgs::action::ExecuteTask;
 using wire::pons_msgs::srv::CommandTask;
 using wire::pons_msgs::srv::SubmitTask;
@@ -205,7 +206,7 @@ TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
   tests::Running run(
       folder.path(), "run",
       {"run", "small_cell", "--parcels", "100", "--realtime", "--quiet", "--socket", folder / "s", "--ros",
-       "--ros-domain", std::to_string(test_domain()), "--ros-namespace", "/hall", "--ros-node", "cell",
+       "--ros-domain", std::to_string(test_domain()), "--ros-namespace", "/hall", "--ros-remap=__node:=cell",
        "--ros-remap=robot_description:=/urdf", "--ros-remap=~/execute_task:=/work", "--ros-remap=scan:=/left/scan"});
   const auto node = test_node("test");
   const auto there = [&](const std::string& topic) {
@@ -220,6 +221,8 @@ TEST(RosOptions, NamesFollowNamespaceNodeAndRules) {
   EXPECT_TRUE(spin_until({node.get()}, [&] { return run.err().contains("called /hall/scan"); })) << run.err();
   run.signal(SIGINT);
   (void)run.wait();
+  EXPECT_THAT(run.err(), Not(HasSubstr("serves it, too"))) << "what it has itself is nobody else's";
+  EXPECT_THAT(run.err(), Not(HasSubstr("tells the time")));
 }
 
 TEST(RosOptions, OfTwoRunsOnOneDomainEachIsWholeAndWhoHasTheNameOfTheOtherSaysSo) {
@@ -265,7 +268,7 @@ TEST(RosOptions, WhatCannotBeIsRefused) {
     return run.err;
   };
   EXPECT_THAT(refused({"--ros-domain", "7"}), HasSubstr("--ros"));
-  EXPECT_THAT(refused({"--ros", "--ros-domain", "233"}), HasSubstr("'233' is no domain"));
+  EXPECT_THAT(refused({"--ros", "--ros-domain", "233"}), HasSubstr("--ros-domain: '233' is no domain"));
   EXPECT_THAT(refused({"--ros", "--ros-interface", "no_such0"}), HasSubstr("'no_such0' is no network interface"));
   EXPECT_THAT(refused({"--ros", "--ros-node", "my-node"}), HasSubstr("'my-node' is no name"));
   EXPECT_THAT(refused({"--ros", "--ros-remap", "a"}), HasSubstr("'a' is no remapping"));

@@ -50,6 +50,17 @@ std::vector<std::byte> announce(const NodeName& node, const Guid& participant, c
   return bytes;
 }
 
+// Topics and types as people write them, where they are ROS 2's.
+std::string as_asked_for(const std::string& topic) {
+  const RosName name = ros_name(topic);
+  return name.name.empty() ? topic : name.name;
+}
+
+std::string as_written(const std::string& type) {
+  const std::string written = ros_type(type);
+  return written.empty() ? type : written;
+}
+
 std::string qualities(const Qos& qos) {
   return fmt::format("{}, {}", qos.reliability == Qos::Reliability::kReliable ? "reliable" : "best effort",
                      qos.durability == Qos::Durability::kVolatile ? "volatile" : "transient local");
@@ -79,11 +90,12 @@ void Graph::heard(const Heard& heard) {
       const char* const what =
           own != own_.end() && own->writes ? "a reader wants more than we offer" : "a writer offers less than we want";
       const std::string ours = own == own_.end() ? "" : fmt::format(" (ours: {})", qualities(own->qos));
-      return warn(fmt::format("{}: {}: {} does not fit{}; give both the same qualities of service", heard.topic, what,
-                              heard.policy, ours));
+      return warn(fmt::format("{}: {}: {} does not fit{}; give both the same qualities of service",
+                              as_asked_for(heard.topic), what, heard.policy, ours));
     }
     case Heard::Kind::kWriter:
     case Heard::Kind::kReader:
+      if (participant_of(heard.guid) == participant_) return;  // Fast DDS tells of ours, too
       if (others_.size() >= kEndpointsMost) return warn(fmt::format("more than {} endpoints", kEndpointsMost));
       Endpoint other{.guid = heard.guid,
                      .writes = heard.kind == Heard::Kind::kWriter,
@@ -112,12 +124,13 @@ void Graph::compare(const Endpoint& own, const Endpoint& other) {
   if (own.topic != other.topic) return;
   if (own.writes == other.writes) return compare_role(own, other);
   if (own.type != other.type)
-    return warn(fmt::format("{}: {} has the type {} there, ours is {}; nothing goes between them", own.topic,
-                            owner_of(other.guid), other.type, own.type));
+    return warn(fmt::format("{}: {} has the type {} there, ours is {}; nothing goes between them",
+                            as_asked_for(own.topic), owner_of(other.guid), as_written(other.type),
+                            as_written(own.type)));
   const std::string_view ours = value_of(own.user_data, "typehash"), theirs = value_of(other.user_data, "typehash");
   if (!ours.empty() && !theirs.empty() && ours != theirs)
     warn(fmt::format("{}: {} has another definition of {} ({}, ours is {}); build both from the same interface file",
-                     own.topic, owner_of(other.guid), own.type, theirs, ours));
+                     as_asked_for(own.topic), owner_of(other.guid), as_written(own.type), theirs, ours));
 }
 
 // Of some things there is to be one on a domain.
@@ -172,8 +185,21 @@ void Graph::learn(const Guid& participant, Peer peer) {
     if (node.name == node_)
       warn(fmt::format("{}: another node of that name is in the graph; give one of them another name or domain",
                        node_.full()));
-  peers_.insert_or_assign(participant, std::move(peer));
+  Peer& known = peers_[participant];
+  const std::vector<Node> before = std::exchange(known, std::move(peer)).nodes;
   choose_form();
+  for (const Node& node : known.nodes) compare_named(node, before);
+}
+
+// Whose they are was not known before.
+void Graph::compare_named(const Node& node, const std::vector<Node>& before) {
+  std::set<Guid> named;
+  for (const Node& each : before) named.insert(each.endpoints.begin(), each.endpoints.end());
+  for (const Guid& guid : node.endpoints) {
+    const auto other = others_.find(guid);
+    if (other == others_.end() || named.contains(guid)) continue;
+    for (const Endpoint& own : own_) compare(own, other->second);
+  }
 }
 
 void Graph::choose_form() {

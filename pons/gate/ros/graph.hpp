@@ -77,6 +77,7 @@ class Graph {
   [[nodiscard]] bool is_heard_otherwise(const Endpoint& own, std::string_view policy) const;
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);
+  void compare_named(const Node& node, const std::vector<Node>& before);
   void choose_form();
   void warn(std::string_view text);
 

@@ -16,10 +16,12 @@
 #include <string>
 #include <vector>
 
+#include "pons/gate/ros/service.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
 #include "pons/wire/types/sensor_msgs/msg/image.hpp"
 #include "pons/wire/types/std_msgs/msg/int64.hpp"
 #include "pons/wire/types/std_msgs/msg/string.hpp"
+#include "pons/wire/types/std_srvs/srv/set_bool.hpp"
 
 namespace pons::gate::ros {
 namespace {
@@ -93,8 +95,20 @@ TEST(RosNode, QualitiesThatDoNotFitAreToldOnBothSides) {
     for (std::string& line : there->take_warnings()) there_told.push_back(std::move(line));
     return !here_told.empty() && !there_told.empty();
   }));
-  EXPECT_THAT(here_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("wants more"))));
-  EXPECT_THAT(there_told, Contains(AllOf(HasSubstr("rt/chatter"), HasSubstr("reliability"), HasSubstr("offers less"))));
+  EXPECT_THAT(here_told, Contains(AllOf(HasSubstr("/chatter: "), HasSubstr("reliability"), HasSubstr("wants more"))));
+  EXPECT_THAT(there_told, Contains(AllOf(HasSubstr("/chatter: "), HasSubstr("reliability"), HasSubstr("offers less"))));
+}
+
+TEST(RosNode, OfWhatItHasItselfItSaysNothing) {
+  const auto here = test_node("here"), there = test_node("there");
+  using wire::std_srvs::srv::SetBool;
+  ASSERT_TRUE(serve<SetBool>(*here, "switch", [](const SetBool::Request&, const Answer<SetBool>&) {}));
+  auto clock = here->advertise<Int64>("/clock");
+  ASSERT_TRUE(there->subscribe<Int64>("/clock", kTopicQos, [](const Int64&) {}));
+  ASSERT_TRUE(spin_until({here.get(), there.get()}, [&] {
+    return clock->matched() == 1 && there->graph().endpoints().size() > 3 && !here->graph().nodes().empty();
+  }));
+  EXPECT_THAT(here->take_warnings(), IsEmpty());
 }
 
 TEST(RosNode, AllWhoPublishAreHeardOnceAndWithoutAWord) {
