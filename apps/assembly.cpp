@@ -47,6 +47,12 @@ Expected<task::Json> body_in(const bridge::Journal& journal) {
   return body;
 }
 
+task::Json json_of(const skills::Stray& stray) {
+  task::Json json{{"code", stray.code}, {"fell_into", stray.place}};
+  if (!stray.counted) json["counted"] = false;
+  return json;
+}
+
 }  // namespace
 
 bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done) {
@@ -345,8 +351,7 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
          .take_strays =
              [&cell] {
                std::vector<task::Json> strays;
-               for (const skills::Stray& stray : cell.strays->take_found_gone())
-                 strays.push_back({{"code", stray.code}, {"fell_into", stray.place}});
+               for (const skills::Stray& stray : cell.strays->take_found_gone()) strays.push_back(json_of(stray));
                return strays;
              },
          .arm = [&cell](Time now) { cell.arm.arm(now); },

@@ -150,7 +150,8 @@ std::string stray(const Json& d) {
   const std::string place = text(d, "fell_into");
   const bool unread = text(d, "code").empty();
   const std::string who = unread ? "a parcel that nobody has read " : "";
-  if (!place.empty()) return who + "fell into " + place;
+  const bool counted = !d.is_object() || d.value("counted", true);
+  if (!place.empty()) return who + "fell into " + place + (counted ? "" : ", or beside: its light curtain counted one");
   return unread ? who + "hung on another that fell, and no camera has seen it since"
                 : "its chute's light curtain has not counted it";
 }

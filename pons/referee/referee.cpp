@@ -85,6 +85,7 @@ struct Sight {
 struct Story {
   std::map<std::string, Entry> entries;                   // by code
   std::map<std::string, int> unread = {};                 // by the place into which nobody knows whose parcels went
+  std::map<std::string, int> uncounted = {};              // likewise, or beside it: no light curtain tells
   std::map<std::string, std::vector<Sight>> sights = {};  // by the place
 };
 
@@ -101,7 +102,7 @@ Expected<Story> read(const bridge::Journal& journal) {
     if (event.kind == "stray") {
       const std::string place = task::text_of(event.detail, "fell_into");
       if (code.empty())
-        ++story.unread[place];
+        ++(event.detail.value("counted", true) ? story.unread : story.uncounted)[place];
       else
         stray(entries[code], place, {event.run, event.stamp});
     }
@@ -155,7 +156,7 @@ class Judge {
   void below_unread() {
     for (const ParcelTruth* const parcel : with_entry_) (void)was_seen(*parcel);
     for (const auto& [parcel, entry] : unread_) {
-      if (was_seen(*parcel) || was_told(parcel->place) || was_told("")) {
+      if (was_seen(*parcel) || was_told(parcel->place) || was_told("") || may_have_fallen_beside()) {
         astray(*parcel, entry, "fell, as the journal says of one that nobody has read");
       } else {
         lost(*parcel, entry, "fell, and was never identified");
@@ -190,7 +191,14 @@ class Judge {
   // Each told of is one.
   bool was_told(const std::string& place) {
     int& unread = story_.unread[place];
-    return unread > 0 && unread-- > 0;
+    int& left = unread > 0 ? unread : story_.uncounted[place];
+    return left > 0 && left-- > 0;
+  }
+
+  // Of what went into a place or beside it, what is not in the place, for all that are have been judged.
+  bool may_have_fallen_beside() {
+    const auto one = std::ranges::find_if(story_.uncounted, [](const auto& each) { return each.second > 0; });
+    return one != story_.uncounted.end() && one->second-- > 0;
   }
 
   // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is

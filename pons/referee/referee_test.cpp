@@ -314,6 +314,17 @@ TEST_F(RefereeTest, OneThatFellNobodyKnowsWhereIsOneOfTheUnreadBelow) {
   EXPECT_EQ(judge(parcels).lost, 0);
 }
 
+// It went with another that was let go of, and no light curtain counted it.
+TEST_F(RefereeTest, OneThatFellIntoAPlaceOrBesideIsFoundInEither) {
+  for (const char* const code : {"A", "B"}) unseen(code);
+  const ParcelTruth in_it = parcel("A", Whereabouts::kChute, "chute_3"),
+                    below = parcel("B", Whereabouts::kTray, "tray");
+  ASSERT_TRUE(journal_->note(Time{}, "stray", {{"code", ""}, {"fell_into", "chute_3"}, {"counted", false}}));
+  EXPECT_EQ(judge({below}).lost, 0);
+  EXPECT_EQ(judge({in_it}).missorted, 0);
+  EXPECT_EQ(judge({below, in_it}).lost, 1) << "one of them";
+}
+
 TEST_F(RefereeTest, WhatBearsAnUnknownCodeIsToldOfByThat) {
   for (const char* const code : {"A", "B", "C"}) unseen(code);
   for (const char* const code : {"X1", "X2"}) ride(code);

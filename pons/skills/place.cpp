@@ -315,14 +315,17 @@ class Place final : public ArmSkill {
     if (const auto chutes = cell_.mouths.fallen_since(fallen_.falls); !chutes.empty()) {
       cell_.await_no_more(fallen_.code);
       cell_.mouths.expect_anywhere(now);  // another may have come along
+      counted_ += static_cast<int>(chutes.size());
       fallen_.falls = cell_.falls();
       for (const world::Place* const chute : chutes) count(*chute, now);
     }
     if (into_ != nullptr) {
       if (now < counted_at_ + kTogether) return {};
       cell_.strays->let_go(fallen_.code, into_->name, now);
-      if (into_->name == name_) return {Status::kSucceeded, "let go early", std::move(detail)};
+      const bool is_it = fallen_.alone || counted_ > 1;  // else it may be who was felt to hang on it
+      if (into_->name == name_ && is_it) return {Status::kSucceeded, "let go early", std::move(detail)};
       detail["fell_into"] = into_->name;
+      if (!is_it) return {Status::kException, "it or what hung on it fell into " + into_->name, std::move(detail)};
       return {Status::kException, "fell into " + into_->name, std::move(detail)};
     }
     if (cell_.awaits(fallen_.code)) return look_for_it(now);
@@ -409,6 +412,7 @@ class Place final : public ArmSkill {
   Held fallen_;                         // what the cups lost on the way
   const world::Place* into_ = nullptr;  // the chute whose curtain counted it last
   Time counted_at_, fell_at_;
+  int counted_ = 0;  // that fell since its load was lost
   bool cancelled_ = false, aside_ = false, stopped_ = false;
   int times_struck_ = 0, more_ticks_ = 0;
   Scale scale_;

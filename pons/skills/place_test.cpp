@@ -110,6 +110,23 @@ TEST_F(LostOverItsChuteTest, OfTwoThatFellTheOneInItsOwnMouthIsTheLoad) {
   EXPECT_EQ(*cell_.strays->place_of("P2"), "chute_7");
 }
 
+// Which of them was counted nobody knows.
+TEST_F(LostOverItsChuteTest, OfTwoOfWhichOneIsCountedEitherMayBeTheLoad) {
+  pass();
+  cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0.2, 0}}});
+  cell_.lost = held_;
+  cell_.lost->falls = falls_;
+  cell_.lost->alone = false;
+  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+  fell_ = now_;
+  ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  ++falls_[0];
+  const Progress progress = ends();
+  EXPECT_EQ(progress.status, Status::kException);
+  EXPECT_EQ(progress.reason, "it or what hung on it fell into chute_1");
+  EXPECT_EQ(progress.detail.at("fell_into"), "chute_1");
+}
+
 // It was too light for the scale, and nobody has read it. Curtains count both before the cups are known to be open, or
 // after.
 TEST_F(LostOverItsChuteTest, WhoMayHaveHungOnItUnfeltFellBeside) {

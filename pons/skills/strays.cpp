@@ -91,6 +91,7 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
     });
     one.let_go = now;
     one.stray.place = place;
+    one.stray.counted = false;
     doubted_.push_back(std::move(one));
   }
 }
@@ -199,6 +200,7 @@ void Strays::found_gone(Doubted& one) {
   const auto torn = std::ranges::find(torn_, one.load, &Torn::load);
   if (torn != torn_.end()) {
     one.stray.place = torn->place;
+    one.stray.counted = true;
     torn_.erase(torn);
   }
   one.told = true;

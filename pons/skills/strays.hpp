@@ -15,8 +15,9 @@
 namespace pons::skills {
 
 struct Stray {
-  std::string code;   // empty: nobody has read it
-  std::string place;  // empty: it was let go of over its mouth, and has not fallen into it; nobody knows where to
+  std::string code;     // empty: nobody has read it
+  std::string place;    // empty: it was let go of over its mouth, and has not fallen into it; nobody knows where to
+  bool counted = true;  // by that place's light curtain; else it went with its load: into it, or beside
 };
 
 // How far the belt has come, and where along it, world frame, it is seen and ends.
