@@ -13,13 +13,11 @@ namespace {
 using gate::Json;
 using wire::std_msgs::msg::Bool;
 
-// For people: how the robot is now, or why it is not as they wanted.
+// For people: how the robot was when it was asked, for what comes of it takes a while; or why it is not as they wanted.
 std::string message_of(const Json& told) {
   const Json robot = told.value("robot", Json::object());
   if (robot.empty()) return told.value("error", "no answer");
-  const std::string needs = task::text_of(robot, "needs");
-  return fmt::format("the arm's state is: {}{}{}", task::text_of(robot, "state"), needs.empty() ? "" : "; it needs ",
-                     needs);
+  return fmt::format("asked for; the robot's state was: {}", task::text_of(robot, "state"));
 }
 
 }  // namespace

@@ -154,7 +154,7 @@ TEST_F(RosRun, IsStoppedResetAndArmedAgain) {
     const auto before = said("armed");
     const Trigger::Response stopped = ask(stop);
     EXPECT_TRUE(stopped.success) << stopped.message;
-    EXPECT_THAT(stopped.message, HasSubstr("the arm's state is"));
+    EXPECT_THAT(stopped.message, HasSubstr("asked for; the robot's state was: "));
     EXPECT_TRUE(until("reset")) << stop;
     EXPECT_TRUE(until("arm")) << stop;
     ASSERT_TRUE(spun([&] { return said("armed") > before; })) << stop;
