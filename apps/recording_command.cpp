@@ -122,10 +122,9 @@ std::string_view pace_of(const RunFacts& facts) {
   return facts.pace == runner::Pace::kRealTime ? "by the clock" : "in virtual time";
 }
 
-// Nothing where nobody said how many, or where none came. Earlier versions wrote down a number for a base, too, whose
-// errands show what it is.
+// Nothing where nobody said how many, or where none came.
 std::optional<std::int64_t> parcels_of(const RunFacts& facts) {
-  return facts.parcels.value_or(0) > 0 && facts.errands.empty() ? facts.parcels : std::nullopt;
+  return facts.parcels.value_or(0) > 0 ? facts.parcels : std::nullopt;
 }
 
 // "run of parcel_cell, seed 1, 20 parcels, in virtual time: complete"

@@ -13,8 +13,8 @@ constexpr double kHidden_m = 0.03;   // how far one may go on under what leans o
 constexpr double kLargerPart = 1.3;  // times the whole: of equal ones, each may be a part
 constexpr double kSameHeight_m = 0.02;
 constexpr double kShared_m = 0.02, kLevel_m = 0.01;  // footprints share more, as high: one thing cut in two
-constexpr double kAsWide = 0.75;
-constexpr double kUpright = 0.9986;                             // cosine of 3 degrees
+constexpr double kAsWide = 0.75;     // times the wider one, less what may be shared: narrower, they are two
+constexpr double kUpright = 0.9986;  // cosine of 3 degrees
 constexpr Duration kTogether = std::chrono::milliseconds(700);  // seen last: two pictures
 constexpr int kGlimpses = 3;  // seen less often, and not read, it may have been a bad cut between two
 

@@ -20,6 +20,8 @@ using task::Outcome;
 // From when a camera sees one come, to when that lies at rest; and from then on to a picture of it, some of which the
 // arm may hide. What lies longer may have been carried off.
 constexpr Duration kComes = std::chrono::seconds(3), kIsSeen = std::chrono::seconds(9);
+// Until who fell with a load is found to be nowhere on the belt, out of the cameras' view where it should ride off.
+constexpr Duration kIsMissed = std::chrono::seconds(30);
 
 // What the journal says of one parcel.
 struct Entry {
@@ -81,11 +83,17 @@ struct Sight {
   int more;
 };
 
+// One without a code went with a load into that place, or beside it; empty: nobody knows where.
+struct Uncounted {
+  std::string place;
+  Time told;
+};
+
 // What it says of all of them.
 struct Story {
   std::map<std::string, Entry> entries;                   // by code
   std::map<std::string, int> unread = {};                 // by the place into which nobody knows whose parcels went
-  std::map<std::string, int> uncounted = {};              // likewise, or beside it: no light curtain tells
+  std::vector<Uncounted> uncounted = {};                  // of which no light curtain tells
   std::map<std::string, std::vector<Sight>> sights = {};  // by the place
 };
 
@@ -101,8 +109,10 @@ Expected<Story> read(const bridge::Journal& journal) {
     const std::string code = task::text_of(event.detail, "code");
     if (event.kind == "stray") {
       const std::string place = task::text_of(event.detail, "fell_into");
-      if (code.empty())
-        ++(event.detail.value("counted", true) ? story.unread : story.uncounted)[place];
+      if (code.empty() && !place.empty() && event.detail.value("counted", true))
+        ++story.unread[place];
+      else if (code.empty())
+        story.uncounted.push_back({place, event.stamp});
       else
         stray(entries[code], place, {event.run, event.stamp});
     }
@@ -156,7 +166,7 @@ class Judge {
   void below_unread() {
     for (const ParcelTruth* const parcel : with_entry_) (void)was_seen(*parcel);
     for (const auto& [parcel, entry] : unread_) {
-      if (was_seen(*parcel) || was_told(parcel->place) || was_told("") || may_have_fallen_beside()) {
+      if (was_seen(*parcel) || was_told(parcel->place) || may_have_fallen_beside(*parcel)) {
         astray(*parcel, entry, "fell, as the journal says of one that nobody has read");
       } else {
         lost(*parcel, entry, "fell, and was never identified");
@@ -191,14 +201,22 @@ class Judge {
   // Each told of is one.
   bool was_told(const std::string& place) {
     int& unread = story_.unread[place];
-    int& left = unread > 0 ? unread : story_.uncounted[place];
-    return left > 0 && left-- > 0;
+    if (unread > 0) return unread-- > 0;
+    return take(std::ranges::find(story_.uncounted, place, &Uncounted::place));
   }
 
-  // Of what went into a place or beside it, what is not in the place, for all that are have been judged.
-  bool may_have_fallen_beside() {
-    const auto one = std::ranges::find_if(story_.uncounted, [](const auto& each) { return each.second > 0; });
-    return one != story_.uncounted.end() && one->second-- > 0;
+  // Of what went into a place or beside it, what is not in the place, for all that are have been judged. It has to be
+  // of this moment, or one that lies elsewhere would account for any.
+  bool may_have_fallen_beside(const ParcelTruth& parcel) {
+    return take(std::ranges::find_if(story_.uncounted, [&](const Uncounted& one) {
+      return one.told + kComes >= parcel.arrived && one.told <= parcel.arrived + kIsMissed;
+    }));
+  }
+
+  bool take(std::vector<Uncounted>::iterator one) {
+    if (one == story_.uncounted.end()) return false;
+    story_.uncounted.erase(one);
+    return true;
   }
 
   // Nobody says that it is sorted: whoever looks for it knows that, and finds what fell into that chute and is

@@ -321,6 +321,9 @@ TEST_F(RefereeTest, OneThatFellIntoAPlaceOrBesideIsFoundInEither) {
                     below = parcel("B", Whereabouts::kTray, "tray");
   ASSERT_TRUE(journal_->note(Time{}, "stray", {{"code", ""}, {"fell_into", "chute_3"}, {"counted", false}}));
   EXPECT_EQ(judge({below}).lost, 0);
+  ParcelTruth later = below;
+  later.arrived = Time(100s);
+  EXPECT_EQ(judge({later}).lost, 1) << "that one was told of long before";
   EXPECT_EQ(judge({in_it}).missorted, 0);
   EXPECT_EQ(judge({below, in_it}).lost, 1) << "one of them";
 }

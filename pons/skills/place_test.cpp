@@ -29,6 +29,17 @@ class LostOverItsChuteTest : public ObedientArmTest {
     EXPECT_EQ(skill_->tick(now_).status, Status::kRunning);
     ++falls_[0];
   }
+  // P2 was felt to hang on it.
+  void loses_it_with_another() {
+    pass();
+    cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0.2, 0}}});
+    cell_.lost = held_;
+    cell_.lost->falls = falls_;
+    cell_.lost->alone = false;
+    skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
+    fell_ = now_;
+    ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  }
   Progress ends() {
     Progress progress;
     while (progress.status == Status::kRunning && now_ < fell_ + from_s(5)) {
@@ -91,14 +102,7 @@ TEST_F(LostOverItsChuteTest, OfTwoCountsThatOfItsOwnMouthIsItsOwn) {
 
 // Who hung on it fell beside.
 TEST_F(LostOverItsChuteTest, OfTwoThatFellTheOneInItsOwnMouthIsTheLoad) {
-  pass();
-  cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0.2, 0}}});
-  cell_.lost = held_;
-  cell_.lost->falls = falls_;
-  cell_.lost->alone = false;
-  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
-  fell_ = now_;
-  ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  loses_it_with_another();
   for (const std::size_t place : {6U, 0U}) {
     ++falls_[place];
     pass();
@@ -112,14 +116,7 @@ TEST_F(LostOverItsChuteTest, OfTwoThatFellTheOneInItsOwnMouthIsTheLoad) {
 
 // Which of them was counted nobody knows.
 TEST_F(LostOverItsChuteTest, OfTwoOfWhichOneIsCountedEitherMayBeTheLoad) {
-  pass();
-  cell_.strays->lifted(world_.arm, "P1", {{2, "P2", {0.2, 0}}});
-  cell_.lost = held_;
-  cell_.lost->falls = falls_;
-  cell_.lost->alone = false;
-  skill_ = type_.start(task::Json{{"place", "chute_1"}, {"object", "P1"}}, now_);
-  fell_ = now_;
-  ASSERT_EQ(skill_->tick(now_).status, Status::kRunning);
+  loses_it_with_another();
   ++falls_[0];
   const Progress progress = ends();
   EXPECT_EQ(progress.status, Status::kException);

@@ -100,6 +100,7 @@ void Strays::let_go(const std::string& load, const std::string& place, Time now)
 void Strays::dropped(const std::string& arm, const std::string& load, Time now) {
   const bool with_others = std::ranges::any_of(
       doubted_, [&](const Doubted& one) { return one.load == load && !one.let_go && !one.stray.code.empty(); });
+  // Who was not read is forgotten with its load, but who was felt is known to have fallen.
   for (Doubted& one : doubted_)
     if (one.load == load && one.felt && one.stray.code.empty() && !one.let_go) one.let_go = now;
   leave(arm, load, now, with_others);
