@@ -2,8 +2,8 @@
 """Writes golden.txt: of each ROS 2 type its hash, and the bytes of a message that is filled as test_fill.hpp fills it, both
 as PyPI's rosbags has them.
 
-usage: pip install rosbags==0.11.9; pons/wire/golden.py [--json FILE] > pons/wire/golden.txt
-       FILE is for golden.mjs, which holds the same bytes against npm's @foxglove/rosmsg2-serialization"""
+usage: .venv-check/bin/python -B pons/wire/golden.py [--json FILE] > pons/wire/golden.txt
+       FILE is for golden.mjs, which holds the same bytes against npm's writers; golden_others.py runs both as tests"""
 
 import argparse
 import json
