@@ -91,13 +91,17 @@ Expected<void> BridgeHalf::open_inner_views(const world::World& world) {
 }
 
 HealthView::Sources BridgeHalf::health_sources(const world::World& world, const gate::ros::NodeName& name) {
-  HealthView::Sources sources{
-      .node = name.name, .hardware = world.name, .health = &bridge_side->health(), .loops = {}, .dropped = {}};
+  HealthView::Sources sources{.node = name.name,
+                              .hardware = world.name,
+                              .health = &bridge_side->health(),
+                              .loops = {},
+                              .ways_out = outlets.ways_out()};
   for (const auto& arm : arms)
     sources.loops.emplace_back(arms.size() > 1 ? arm->cell.world.arm : std::string(),
                                [&cell = arm->cell]() -> const link::State& { return cell.arm.state(); });
-  sources.dropped = outlets.ways_out();
-  if (cameras) sources.dropped.emplace_back("pictures", [made = cameras.get()] { return made->left_out(); });
+  if (cameras)
+    sources.ways_out.push_back(
+        {.name = "pictures", .health = [made = cameras.get()] { return SinkHealth{.dropped = made->left_out()}; }});
   return sources;
 }
 

@@ -62,6 +62,8 @@ Expected<std::size_t> FoxgloveSink::add(const ShownTopic& topic) {
 
 std::vector<std::string> FoxgloveSink::take_warnings() {
   std::vector<std::string> lines = server_->take_warnings();
+  findings_ += lines.size();
+  if (!lines.empty()) newest_ = lines.back();
   for (std::string& line : lines) line = "foxglove: " + line;
   if (!std::exchange(told_, true))
     lines.insert(lines.begin(), fmt::format("foxglove: ws://{}", gate::foxglove::text_of(server_->address())));

@@ -37,8 +37,10 @@ class FoxgloveSink final : public Sink {
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override {
     server_->put(topic, now, message);
   }
-  [[nodiscard]] std::string_view name() const override { return {}; }
-  [[nodiscard]] std::uint64_t dropped() const override { return server_->dropped(); }
+  [[nodiscard]] std::string_view name() const override { return "Foxglove"; }
+  [[nodiscard]] SinkHealth health() const override {
+    return {.dropped = server_->dropped(), .findings = findings_, .newest = newest_};
+  }
   // What is asked for; null where nothing may be. Gone with this.
   [[nodiscard]] gate::Visitors* visitors() { return tasks_ ? server_.get() : nullptr; }
   // What people should know, a line each: at first where it listens, then who was refused.
@@ -49,6 +51,8 @@ class FoxgloveSink final : public Sink {
 
   std::unique_ptr<gate::foxglove::Server> server_;
   bool tasks_ = false, told_ = false;
+  std::uint64_t findings_ = 0;
+  std::string newest_;
 };
 
 }  // namespace pons::apps

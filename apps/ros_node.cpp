@@ -99,8 +99,11 @@ Expected<void> RosNode::serve_parameters(std::string_view world) {
 
 Expected<std::size_t> RosNode::add(const ShownTopic& topic) {
   const rt::KeptOff off(rt::loop_cpu());  // the first that is large has a thread started that sends it
+  const auto known = numbers_.find({topic.name, std::string(topic.type)});
+  if (known != numbers_.end()) return known->second;
   auto number = gate_->add_topic(topic.name, topic.type, topic.hash, topic.qos, topic.apart);
   if (!number) return number;
+  numbers_.emplace(std::pair(topic.name, std::string(topic.type)), *number);
   paced_.resize(*number + 1);
   const bool latched = topic.qos.durability == gate::ros::Qos::Durability::kTransientLocal;
   const auto is_one_of = [&](std::initializer_list<std::string_view> types) {
@@ -127,6 +130,13 @@ bool RosNode::is_due(std::size_t topic, Time now) {
 void RosNode::put(std::size_t topic, Time now, std::span<const std::byte> message) {
   gate_->node().set_time(now);
   if (is_due(topic, now)) gate_->put(topic, {message.begin(), message.end()});
+}
+
+std::vector<std::string> RosNode::take_warnings() {
+  auto lines = gate_->take_warnings();
+  findings_ += lines.size();
+  if (!lines.empty()) newest_ = lines.back();
+  return lines;
 }
 
 std::unique_ptr<gate::Visitors> RosNode::visitors(std::unique_ptr<gate::Visitors> others) {

@@ -4,10 +4,12 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "apps/ros_drive.hpp"
@@ -58,10 +60,12 @@ class RosNode final : public Sink {
   // On the bridge's thread.
   [[nodiscard]] bool wants(std::size_t topic) const override { return gate_->wanted(topic); }
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
-  // What people should know, a line each.
-  [[nodiscard]] std::vector<std::string> take_warnings() { return gate_->take_warnings(); }
+  // What people should know, a line each: findings of health().
+  [[nodiscard]] std::vector<std::string> take_warnings();
   [[nodiscard]] std::string_view name() const override { return "ROS 2"; }
-  [[nodiscard]] std::uint64_t dropped() const override { return gate_->dropped(); }
+  [[nodiscard]] SinkHealth health() const override {
+    return {.dropped = gate_->dropped(), .findings = findings_, .newest = newest_};
+  }
   // What is asked for over ROS 2, and over what else there is (may be null). Ends before this.
   [[nodiscard]] std::unique_ptr<gate::Visitors> visitors(std::unique_ptr<gate::Visitors> others);
 
@@ -86,7 +90,10 @@ class RosNode final : public Sink {
   std::unique_ptr<RosLifecycle> lifecycle_;
   const std::atomic<double>* states_hz_ = nullptr;
   const std::atomic<double>* images_hz_ = nullptr;
-  std::vector<Paced> paced_;  // by the topics' numbers
+  std::map<std::pair<std::string, std::string>, std::size_t> numbers_;  // of the topics, by name and type
+  std::vector<Paced> paced_;                                            // by those numbers
+  std::uint64_t findings_ = 0;
+  std::string newest_;
 };
 
 }  // namespace pons::apps

@@ -149,8 +149,7 @@ Expected<void> Rounds::open_views(const RoundsSetup& setup) {
                              .hardware = world.name,
                              .health = &bridge_side->health(),
                              .loops = {{"", [this]() -> const link::State& { return chassis->wheels.state(); }}},
-                             .dropped = {}};
-  health.dropped = outlets.ways_out();
+                             .ways_out = outlets.ways_out()};
   auto run = RunViews::open(outlets, *bridge, name, std::move(health));
   if (!run) return std::unexpected(run.error());
   run_views_ = run->get();

@@ -137,10 +137,10 @@ void RunRecorder::put(std::size_t topic, Time now, std::span<const std::byte> me
   if (pace_ == runner::Pace::kLockstep) (void)recorder_->work_off();
 }
 
-std::uint64_t RunRecorder::dropped() const {
-  std::uint64_t dropped = 0;
-  for (const record::TopicStatus& topic : recorder_->status().topics) dropped += topic.dropped;
-  return dropped;
+SinkHealth RunRecorder::health() const {
+  SinkHealth health;
+  for (const record::TopicStatus& topic : recorder_->status().topics) health.dropped += topic.dropped;
+  return health;
 }
 
 void RunRecorder::interrupt() {

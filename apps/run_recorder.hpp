@@ -57,7 +57,8 @@ class RunRecorder final : public Sink {
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
 
   [[nodiscard]] std::string_view name() const override { return "recording"; }
-  [[nodiscard]] std::uint64_t dropped() const override;
+  [[nodiscard]] bool is_live() const override { return false; }
+  [[nodiscard]] SinkHealth health() const override;
 
   // A person breaks the run off; the first time counts.
   void interrupt();

@@ -29,7 +29,8 @@ class Comparison final : public Sink {
   void put(std::size_t topic, Time now, std::span<const std::byte> message) override;
   // In the recording's place, which drops nothing in virtual time.
   [[nodiscard]] std::string_view name() const override { return "recording"; }
-  [[nodiscard]] std::uint64_t dropped() const override { return 0; }
+  [[nodiscard]] bool is_live() const override { return false; }
+  [[nodiscard]] SinkHealth health() const override { return {}; }
   // The run has shown all that it will.
   void end();
 

@@ -31,11 +31,13 @@ constexpr Duration kStaleAfter = std::chrono::seconds(1);
 Expected<std::unique_ptr<HealthView>> HealthView::open(Outlets& outlets, Sources sources) {
   auto diagnostics = outlets.outlet<DiagnosticArray>("/diagnostics");
   if (!diagnostics) return std::unexpected(diagnostics.error());
-  return std::unique_ptr<HealthView>(new HealthView(*diagnostics, std::move(sources)));
+  auto live = outlets.outlet<DiagnosticArray>("/diagnostics", gate::ros::kTopicQos, Audience::kLive);
+  if (!live) return std::unexpected(live.error());
+  return std::unique_ptr<HealthView>(new HealthView(*diagnostics, *live, std::move(sources)));
 }
 
-HealthView::HealthView(Outlet<DiagnosticArray> diagnostics, Sources sources)
-    : diagnostics_(diagnostics), sources_(std::move(sources)), dropped_before_(sources_.dropped.size()) {}
+HealthView::HealthView(Outlet<DiagnosticArray> diagnostics, Outlet<DiagnosticArray> live, Sources sources)
+    : diagnostics_(diagnostics), live_(live), sources_(std::move(sources)), before_(sources_.ways_out.size()) {}
 
 DiagnosticStatus HealthView::status(const std::string& part) const {
   return {.name = fmt::format("{}: {}", sources_.node, part), .hardware_id = sources_.hardware};
@@ -61,14 +63,22 @@ DiagnosticStatus HealthView::of_loop(const std::string& robot, const link::State
   return made;
 }
 
-DiagnosticStatus HealthView::of_way_out(std::size_t which) {
-  const auto& [name, count] = sources_.dropped[which];
-  DiagnosticStatus made = status(name);
-  const std::uint64_t dropped = count(), before = std::exchange(dropped_before_[which], dropped);
-  made.level = dropped > before ? DiagnosticStatus::WARN : DiagnosticStatus::OK;
-  made.message = dropped > before ? fmt::format("{} messages found no room in the last second", dropped - before)
-                                  : std::string("good");
-  made.values = {{"dropped", fmt::format("{}", dropped)}};
+DiagnosticStatus HealthView::of_way_out(const WayOut& way, Before& before, Time now) const {
+  DiagnosticStatus made = status(way.name);
+  SinkHealth health = way.health();
+  const std::uint64_t dropped = health.dropped - before.health.dropped;
+  if (health.findings > before.health.findings) before.found_at = now;
+  const bool found = before.found_at && now - *before.found_at < kFoundFor;
+  made.level = dropped > 0 || found ? DiagnosticStatus::WARN : DiagnosticStatus::OK;
+  if (dropped > 0) {
+    made.message = fmt::format("{} messages found no room in the last second", dropped);
+  } else {
+    made.message = found ? health.newest : std::string("good");
+  }
+  made.values = {{"dropped", fmt::format("{}", health.dropped)}};
+  if (way.is_live) made.values.push_back({"findings", fmt::format("{}", health.findings)});
+  if (health.findings > 0) made.values.push_back({"newest", health.newest});
+  before.health = std::move(health);
   return made;
 }
 
@@ -82,8 +92,13 @@ void HealthView::show(Time now) {
     message.status.push_back(of_loop(robot, state()));
     if (now - state().stamp > kStaleAfter) message.status.back().level = DiagnosticStatus::STALE;
   }
-  for (std::size_t i = 0; i < sources_.dropped.size(); ++i) message.status.push_back(of_way_out(i));
+  DiagnosticArray live{.header = message.header};
+  for (std::size_t i = 0; i < before_.size(); ++i) {
+    const WayOut& way = sources_.ways_out[i];
+    (way.is_live ? live : message).status.push_back(of_way_out(way, before_[i], now));
+  }
   diagnostics_.put(now, message);
+  if (!live.status.empty()) live_.put(now, live);
 }
 
 }  // namespace pons::apps

@@ -1,4 +1,5 @@
-// How each part fares, and figures beside that, as ROS 2 has diagnostics.
+// How each part fares, and figures beside that, as ROS 2 has diagnostics: one message of the run itself, and one, which
+// no recording has, of those who look on.
 #pragma once
 
 #include <cstdint>
@@ -20,14 +21,16 @@ namespace pons::apps {
 class HealthView final : public View {
  public:
   static constexpr Duration kPeriod = std::chrono::seconds(1);
+  // For so long a finding is a warning. Whether what was found still is so nobody tells; how many there were, and the
+  // newest, it says as long as the run lasts.
+  static constexpr Duration kFoundFor = std::chrono::minutes(1);
 
   struct Sources {
     std::string node, hardware;    // before each part's name; which robot or cell it is
     const runner::Health* health;  // outlives it
     // The control loops, by the robots' names: empty where there is no other.
     std::vector<std::pair<std::string, std::function<const link::State&()>>> loops;
-    // Things that found no room on their way out, by who would have had them: never fewer than before.
-    std::vector<std::pair<std::string, std::function<std::uint64_t()>>> dropped;
+    std::vector<WayOut> ways_out;
   };
   // Errors: those of the outlets.
   [[nodiscard]] static Expected<std::unique_ptr<HealthView>> open(Outlets& outlets, Sources sources);
@@ -36,15 +39,20 @@ class HealthView final : public View {
  private:
   using DiagnosticArray = wire::diagnostic_msgs::msg::DiagnosticArray;
   using DiagnosticStatus = wire::diagnostic_msgs::msg::DiagnosticStatus;
-  HealthView(Outlet<DiagnosticArray> diagnostics, Sources sources);
+  HealthView(Outlet<DiagnosticArray> diagnostics, Outlet<DiagnosticArray> live, Sources sources);
   [[nodiscard]] DiagnosticStatus status(const std::string& part) const;
   [[nodiscard]] DiagnosticStatus of_part(const std::string& part, const runner::PartHealth& health) const;
   [[nodiscard]] DiagnosticStatus of_loop(const std::string& robot, const link::State& state) const;
-  [[nodiscard]] DiagnosticStatus of_way_out(std::size_t which);
+  // As it was when it was last shown, and when it was last seen that there was one finding more.
+  struct Before {
+    SinkHealth health;
+    std::optional<Time> found_at;
+  };
+  [[nodiscard]] DiagnosticStatus of_way_out(const WayOut& way, Before& before, Time now) const;
 
-  Outlet<DiagnosticArray> diagnostics_;
+  Outlet<DiagnosticArray> diagnostics_, live_;
   Sources sources_;
-  std::vector<std::uint64_t> dropped_before_;
+  std::vector<Before> before_;  // as Sources::ways_out
   std::optional<Time> shown_at_;
 };
 

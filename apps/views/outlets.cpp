@@ -16,13 +16,13 @@ Expected<std::size_t> Outlets::add(const ShownTopic& topic) {
   return topics_.size() - 1;
 }
 
-std::vector<std::pair<std::string, std::function<std::uint64_t()>>> Outlets::ways_out() const {
-  std::vector<std::pair<std::string, std::function<std::uint64_t()>>> named;
+std::vector<WayOut> Outlets::ways_out() const {
+  std::vector<WayOut> ways;
   for (const Sink* const sink : sinks_) {
-    const bool told = std::ranges::any_of(named, [&](const auto& each) { return each.first == sink->name(); });
-    if (!told && !sink->name().empty()) named.emplace_back(sink->name(), [sink] { return sink->dropped(); });
+    const bool told = std::ranges::any_of(ways, [&](const WayOut& each) { return each.name == sink->name(); });
+    if (!told) ways.push_back({std::string(sink->name()), sink->is_live(), [sink] { return sink->health(); }});
   }
-  return named;
+  return ways;
 }
 
 }  // namespace pons::apps

@@ -41,6 +41,20 @@ struct ShownTopic {
   [[nodiscard]] bool is_ahead() const { return apart > Duration{}; }
 };
 
+// How it goes with what a sink passes on.
+struct SinkHealth {
+  std::uint64_t dropped = 0;   // messages that found no room: never fewer than before
+  std::uint64_t findings = 0;  // about who is at the other end, likewise: who does not fit, what cannot be read
+  std::string newest = {};     // of those, for people
+};
+
+// A sink as /diagnostics tells of it.
+struct WayOut {
+  std::string name;
+  bool is_live = false;  // as Sink::is_live()
+  std::function<SinkHealth()> health;
+};
+
 class Sink {
  public:
   virtual ~Sink() = default;
@@ -51,10 +65,12 @@ class Sink {
   [[nodiscard]] virtual bool wants(std::size_t topic) const = 0;
   // CDR with its encapsulation, of run time `now`. What finds no room is dropped and counted.
   virtual void put(std::size_t topic, Time now, std::span<const std::byte> message) = 0;
-  // What it is called where /diagnostics tells how many messages found no room there; empty: it does not, for a run
-  // that is run again must tell the same, whoever looks on.
+  // What /diagnostics calls it.
   [[nodiscard]] virtual std::string_view name() const = 0;
-  [[nodiscard]] virtual std::uint64_t dropped() const = 0;
+  // Whether it depends on who looks on: a recording has nothing of how it goes with that, for the same run again must
+  // tell the same.
+  [[nodiscard]] virtual bool is_live() const { return true; }
+  [[nodiscard]] virtual SinkHealth health() const = 0;
 };
 
 class Outlets;
@@ -79,8 +95,8 @@ class Outlets {
   void add(Sink& sink) { sinks_.push_back(&sink); }
   // Whether there is any.
   [[nodiscard]] bool needed() const { return !sinks_.empty(); }
-  // The named ones, of one name the first, and what they have dropped so far. The sinks outlive it.
-  [[nodiscard]] std::vector<std::pair<std::string, std::function<std::uint64_t()>>> ways_out() const;
+  // The sinks, of one name the first. They outlive it.
+  [[nodiscard]] std::vector<WayOut> ways_out() const;
   // After the sinks. Errors: those of Sink::add().
   template <wire::Message T>
   [[nodiscard]] Expected<Outlet<T>> outlet(std::string name, const gate::ros::Qos& qos = gate::ros::kTopicQos,

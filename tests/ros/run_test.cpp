@@ -259,6 +259,22 @@ TEST(RosOptions, OfTwoRunsOnOneDomainEachIsWholeAndWhoHasTheNameOfTheOtherSaysSo
   EXPECT_EQ(story("left.db"), "");
 }
 
+// Who looks on is told how it goes with that; the recording is of the run alone.
+TEST(RosRecording, IsThatOfTheSameRunWithNobodyThere) {
+  const tests::Folder folder;
+  for (const char* const world : {"small_cell", "rounds"}) {
+    const std::string file = folder / (std::string(world) + ".mcap");
+    std::vector<std::string> line{"run", world, "--quiet", "--record", file};
+    if (std::string_view(world) == "small_cell") line.insert(line.end(), {"--parcels", "2"});
+    line.insert(line.end(), {"--ros", "--ros-domain", std::to_string(test_domain())});
+    const tests::Finished run = tests::run_pons(line);
+    EXPECT_EQ(run.code, 0) << run.err;
+    const tests::Finished again = tests::run_pons({"replay", file});
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_THAT(again.out, HasSubstr("equal: "));
+  }
+}
+
 TEST(RosOptions, WhatCannotBeIsRefused) {
   const auto refused = [](const std::vector<std::string>& more, const std::vector<std::string>& environment = {}) {
     std::vector<std::string> line{"run", "small_cell", "--parcels", "1", "--quiet"};

@@ -19,17 +19,18 @@ class HealthViewTest : public ::testing::Test {
                                               .hardware = "small_cell",
                                               .health = &health_,
                                               .loops = {{"", [this]() -> const link::State& { return state_; }}},
-                                              .dropped = {{"ROS 2", [this] { return dropped_; }}}});
+                                              .ways_out = {{"ROS 2", true, [this] { return health_of_ros_; }},
+                                                           {"recording", false, [] { return SinkHealth{}; }}}});
     ASSERT_TRUE(opened) << opened.error().line();
     view_ = *std::move(opened);
   }
   DiagnosticStatus status(const std::string& name, Time now) {
     state_.stamp = std::max(state_.stamp, now - stale_for_);
     view_->show(now);
-    const auto messages = shown_.take<DiagnosticArray>("/diagnostics");
-    if (messages.size() != 1) return {.message = "messages: " + std::to_string(messages.size())};
-    for (const DiagnosticStatus& each : messages[0].status)
-      if (each.name == name) return each;
+    for (const auto& message : shown_.take<DiagnosticArray>("/diagnostics", audience_)) {
+      for (const DiagnosticStatus& each : message.status)
+        if (each.name == name) return each;
+    }
     return {.message = "no " + name};
   }
 
@@ -38,7 +39,8 @@ class HealthViewTest : public ::testing::Test {
   runner::Health health_{{}};
   link::State state_;
   Duration stale_for_{0};
-  std::uint64_t dropped_ = 0;
+  SinkHealth health_of_ros_;
+  Audience audience_ = Audience::kAll;  // of what is looked at
   std::unique_ptr<HealthView> view_;
 };
 
@@ -61,7 +63,7 @@ TEST_F(HealthViewTest, OnceASecondAndNoMore) {
   int came = 0;
   for (int period = 0; period < 500; ++period) {
     view_->show(Time(from_s(0.01 * period)));
-    came += static_cast<int>(shown_.take<DiagnosticArray>("/diagnostics").size());
+    came += static_cast<int>(shown_.take<DiagnosticArray>("/diagnostics", Audience::kAll).size());
   }
   EXPECT_EQ(came, 5);
 }
@@ -76,9 +78,33 @@ TEST_F(HealthViewTest, ALoopThatIsNotHeardOfIsStale) {
   EXPECT_EQ(status("cell: control loop", Time(from_s(5))).level, DiagnosticStatus::STALE);
 }
 
-TEST_F(HealthViewTest, WhatFoundNoRoomIsAWarningWhileItLasts) {
+TEST_F(HealthViewTest, HowItGoesWithThoseWhoLookOnNoRecordingHas) {
+  EXPECT_EQ(status("cell: recording", Time(from_s(1))).message, "good");
+  EXPECT_EQ(status("cell: ROS 2", Time(from_s(2))).message, "no cell: ROS 2");
+  audience_ = Audience::kLive;
+  EXPECT_EQ(status("cell: ROS 2", Time(from_s(3))).message, "good");
+  EXPECT_EQ(status("cell: recording", Time(from_s(4))).message, "no cell: recording");
+}
+
+TEST_F(HealthViewTest, AFindingIsAWarningForAMinuteAndIsTold) {
+  audience_ = Audience::kLive;
   EXPECT_EQ(status("cell: ROS 2", Time(from_s(1))).level, DiagnosticStatus::OK);
-  dropped_ = 3;
+  health_of_ros_ = {.findings = 2, .newest = "/odom: /nav does not fit"};
+  for (const double at_s : {2.0, 61.0}) {
+    const DiagnosticStatus found = status("cell: ROS 2", Time(from_s(at_s)));
+    EXPECT_EQ(found.level, DiagnosticStatus::WARN) << at_s;
+    EXPECT_EQ(found.message, "/odom: /nav does not fit");
+  }
+  const DiagnosticStatus later = status("cell: ROS 2", Time(from_s(62)));
+  EXPECT_EQ(later.level, DiagnosticStatus::OK);
+  EXPECT_EQ(later.values.at(1).value, "2");
+  EXPECT_EQ(later.values.at(2).value, "/odom: /nav does not fit");
+}
+
+TEST_F(HealthViewTest, WhatFoundNoRoomIsAWarningWhileItLasts) {
+  audience_ = Audience::kLive;
+  EXPECT_EQ(status("cell: ROS 2", Time(from_s(1))).level, DiagnosticStatus::OK);
+  health_of_ros_.dropped = 3;
   const DiagnosticStatus drops = status("cell: ROS 2", Time(from_s(2)));
   EXPECT_EQ(drops.level, DiagnosticStatus::WARN);
   EXPECT_EQ(drops.values.at(0).value, "3");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -17,7 +18,9 @@ namespace pons::apps {
 class Shown final : public Sink {
  public:
   [[nodiscard]] Expected<std::size_t> add(const ShownTopic& topic) override {
-    const auto there = std::ranges::find(topics_, topic.name, [](const Topic& each) { return each.topic.name; });
+    const auto there = std::ranges::find_if(topics_, [&](const Topic& each) {
+      return each.topic.name == topic.name && each.topic.audience == topic.audience;
+    });
     if (there != topics_.end()) return static_cast<std::size_t>(there - topics_.begin());
     topics_.push_back({topic, {}});
     return topics_.size() - 1;
@@ -30,14 +33,14 @@ class Shown final : public Sink {
   }
 
   [[nodiscard]] std::string_view name() const override { return "test"; }
-  [[nodiscard]] std::uint64_t dropped() const override { return 0; }
+  [[nodiscard]] SinkHealth health() const override { return {}; }
 
-  // What came on that topic since the last call.
+  // What came on that topic since the last call; only what is for that audience.
   template <wire::Message T>
-  [[nodiscard]] std::vector<T> take(const std::string& name) {
+  [[nodiscard]] std::vector<T> take(const std::string& name, std::optional<Audience> audience = std::nullopt) {
     std::vector<T> read;
     for (Topic& each : topics_) {
-      if (each.topic.name != name) continue;
+      if (each.topic.name != name || each.topic.audience != audience.value_or(each.topic.audience)) continue;
       EXPECT_EQ(each.topic.type, T::kName);
       for (const auto& [at, bytes] : std::exchange(each.came, {})) {
         T message;
