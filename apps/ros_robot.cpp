@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "pons/task/json_value.hpp"
@@ -13,22 +15,19 @@ namespace {
 using gate::Json;
 using wire::std_msgs::msg::Bool;
 
-// For people: how the robot was when it was asked, for what comes of it takes a while; or why it is not as they wanted.
-std::string message_of(const Json& told) {
-  const Json robot = told.value("robot", Json::object());
-  if (robot.empty()) return told.value("error", "no answer");
-  return fmt::format("asked for; the robot's state was: {}", task::text_of(robot, "state"));
-}
-
 }  // namespace
 
 Expected<void> RosRobot::serve() {
+  auto later = std::make_unique<Later>();
+  later_ = later.get();
+  gate_.node().add_part(std::move(later));
   for (Verb* const verb : {&emergency_stop_, &stop_, &reset_, &arm_}) {
     auto served =
         gate::ros::serve<Trigger>(gate_.node(), fmt::format("~/{}", verb->name),
                                   [this, verb](const Trigger::Request&, const gate::ros::Answer<Trigger>& answer) {
-                                    if (verb->waiting.size() >= kWaitingMost)
+                                    if (verb->unanswered >= kUnansweredMost)
                                       return answer({.success = false, .message = "too many ask at once: ask again"});
+                                    ++verb->unanswered;
                                     verb->waiting.push_back(answer);
                                     ask(*verb);
                                   });
@@ -48,13 +47,29 @@ void RosRobot::pressed(Clock::time_point now) {
 
 void RosRobot::ask(Verb& verb) {
   if (std::exchange(verb.asked, true)) return;
-  gate_.ask(Json{{"op", verb.name}}, [this, &verb](const Json& told) { answer(verb, told); }, verb.urgency);
+  const auto answered = [this, &verb](const Json& told) {
+    verb.asked = false;
+    look(verb, told, std::exchange(verb.waiting, {}), Clock::now() + kPatience);
+  };
+  gate_.ask(Json{{"op", verb.name}}, answered, verb.urgency);
 }
 
-void RosRobot::answer(Verb& verb, const Json& told) {
-  verb.asked = false;
-  for (const auto& each : std::exchange(verb.waiting, {}))
-    each({.success = told.value("ok", false), .message = message_of(told)});
+void RosRobot::look(Verb& verb, const Json& told, Waiting waiting, Clock::time_point until) {
+  if (waiting.empty()) return;  // it was a button
+  if (!told.value("ok", false)) return answer(verb, waiting, false, told.value("error", "no answer"));
+  const std::string state = task::text_of(told.value("robot", Json::object()), "state");
+  if (verb.shown_by.empty()) return answer(verb, waiting, true, "asked for; the robot's state was: " + state);
+  if (std::ranges::find(verb.shown_by, state) != verb.shown_by.end())
+    return answer(verb, waiting, true, "the robot's state is: " + state);
+  if (Clock::now() >= until) return answer(verb, waiting, false, "asked for; the robot's state is still: " + state);
+  later_->put(kLook, [this, &verb, waiting = std::move(waiting), until] {
+    gate_.ask(Json{{"op", "robot"}}, [=, this, &verb](const Json& now) { look(verb, now, waiting, until); });
+  });
+}
+
+void RosRobot::answer(Verb& verb, const Waiting& waiting, bool success, const std::string& message) {
+  verb.unanswered -= waiting.size();
+  for (const auto& each : waiting) each({.success = success, .message = message});
 }
 
 }  // namespace pons::apps
