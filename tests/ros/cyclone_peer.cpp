@@ -1,8 +1,8 @@
 // A node as rmw_cyclonedds_cpp makes one (cyclone_node.hpp). What it hears it prints, a line each.
 //
-// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, stower, worker, client, or the
-// JSON of a task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled; ends when
-// its input does
+// usage: cyclone_peer DOMAIN NODE ROLE    ROLE: talker, listener, described, server, stower, navigator, worker, client,
+// or the JSON of a task to submit, after "act:" as an action's goal, after "cancel:" as one that is then cancelled;
+// ends when its input does
 #include <peer.h>
 #include <poll.h>
 #include <unistd.h>
@@ -24,6 +24,8 @@ using Response = std_srvs_srv_dds__SetBool_Response_;
 using Submitted = pons_msgs_srv_dds__SubmitTask_Request_;
 using Stow = warehouse_msgs_srv_dds__Stow_Request_;
 using Stowed = warehouse_msgs_srv_dds__Stow_Response_;
+using Navigate = navigation_interfaces_srv_dds__NavigateToPose_Request_;
+using Navigated = navigation_interfaces_srv_dds__NavigateToPose_Response_;
 using Accepted = pons_msgs_srv_dds__SubmitTask_Response_;
 
 class Talker final : public Role {
@@ -99,6 +101,25 @@ class Stower final : public Role {
   Server<Stow, Stowed> server_;
   std::string text_ = "there is no room";
   std::vector<std::uint16_t> left_;
+};
+
+// There is a way to where x is not negative.
+class Navigator final : public Role {
+ public:
+  explicit Navigator(Peer& peer)
+      : server_(peer, "/navigation/navigate_to_pose", navigation_interfaces_srv_dds__NavigateToPose_Request__desc,
+                navigation_interfaces_srv_dds__NavigateToPose_Response__desc,
+                [this](const Navigate& request, auto asker) {
+                  std::printf("goal %s %.2f %.2f, %.2f\n", request.frame_id, request.position.x, request.position.y,
+                              request.yaw);
+                  const bool there = request.position.x >= 0;
+                  server_.answer(asker, {request.client, request.number, there, (there ? arrived_ : walled_).data()});
+                }) {}
+  void step() override { server_.step(); }
+
+ private:
+  Server<Navigate, Navigated> server_;
+  std::string arrived_ = "arrived", walled_ = "there is no way";
 };
 
 // The action /chore: what each goal comes to, its task says. "refused": it is not accepted; "fails": aborted after some
@@ -309,6 +330,7 @@ std::unique_ptr<Role> role_of(const std::string& wanted, Peer& peer) {
   if (wanted == "server") return std::make_unique<SwitchServer>(peer);
   if (wanted == "worker") return std::make_unique<Worker>(peer);
   if (wanted == "stower") return std::make_unique<Stower>(peer);
+  if (wanted == "navigator") return std::make_unique<Navigator>(peer);
   if (wanted == "client") return std::make_unique<Switch>(peer);
   if (wanted.starts_with("act:") || wanted.starts_with("cancel:")) return std::make_unique<Actor>(peer, wanted);
   if (wanted.starts_with("{")) return std::make_unique<Submitter>(peer, wanted);

@@ -63,6 +63,16 @@ constexpr const char* kWork = R"(
     feedback: [text]
     reason: reason
 )";
+constexpr const char* kNavigate = R"(
+  - name: navigate
+    service: /navigation/navigate_to_pose
+    type: navigation_interfaces/srv/NavigateToPose
+    arguments: {x: number, y: number, yaw: {type: number, default: 0}}
+    request: {frame_id: map, position: {x: "{x}", y: "{y}"}, yaw: "{yaw}"}
+    timeout_s: 60
+    success: success
+    reason: message
+)";
 constexpr const char* kHurry = R"(
   - name: hurry_to
     action: /navigate_to_pose
@@ -198,6 +208,24 @@ TEST_F(Served, ATypeOfSomebodysOwnIsReadOfItsInterfaceFiles) {
   run_process.signal(SIGINT);
   (void)run_process.wait();
   ::unsetenv("AMENT_PREFIX_PATH");
+}
+
+// Likewise.
+TEST_F(Served, NavigationAsAServiceIsAskedAndSaysWhyNot) {
+  const auto own = folder_ / "worlds" / "small_cell" / "own" / "navigation_interfaces" / "srv";
+  std::filesystem::create_directories(own);
+  write_text(own / "NavigateToPose.srv",
+             "string frame_id\ngeometry_msgs/Point position\nfloat64 yaw\n---\nbool success\nstring message\n");
+  write_world(std::string(kSkills) + kNavigate + "interfaces: [own]\n");
+  Running run_process(folder_.path(), "run", run());
+  PeerProcess peer(PONS_CYCLONE_PEER, test_domain(), "navigation", "navigator");
+  submit("there", {{"x", 1.5}, {"y", 0.5}, {"yaw", 0.25}}, "navigate");
+  expect_end("there", "SUCCEEDED", R"("message":"arrived")");
+  EXPECT_TRUE(peer.said("goal map 1.50 0.50, 0.25"));
+  submit("walled", {{"x", -1}, {"y", 0}}, "navigate");
+  expect_end("walled", "FAILED", "/navigation/navigate_to_pose: not done: there is no way");
+  run_process.signal(SIGINT);
+  (void)run_process.wait();
 }
 
 // By Cyclone DDS.
