@@ -70,6 +70,7 @@ struct Hooked {
   double mass_kg = 0, most_kg = 0;
   int times = 1;
   std::string whose = {};  // by code, the last time; empty: nobody's that is known
+  double lowest_m = 0;     // of its company, whichever face each lies on
 };
 
 // Where set-points for the arm go, one after the other.

@@ -15,6 +15,7 @@ struct Companion {
   std::uint32_t track = 0;
   std::string code;         // empty: not read
   Eigen::Vector2d aside_m;  // the middle of its top from that of the load's, tip frame
+  Vector3 size_m = Vector3::Zero();
 };
 using Company = std::vector<Companion>;
 

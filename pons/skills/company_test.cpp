@@ -81,11 +81,11 @@ TEST_F(FeltTest, OneReadingDoesNotPartWhatNeverCameApart) {
   EXPECT_EQ(felt(0.35, 0.005, 0, thrice), "nobody") << "B has come off";
   EXPECT_EQ(felt(0.54, 0.005, 0, Hooked{"A", 0.54, 0.55, 1, "B"}), "nobody") << "once proves nothing";
   EXPECT_EQ(felt(0.54, 0.005, 0, Hooked{"A", 0.54, 0.55, 3, "D"}), "nobody") << "D is not there any more";
-  const Hooked again = hooked_again("A", 0.5, Beside{"B"}, thrice);
+  const Hooked again = hooked_again({.code = "A"}, 0.5, Beside{"B"}, thrice);
   EXPECT_EQ(again.times, 4);
   EXPECT_EQ(again.most_kg, 0.55);
   EXPECT_EQ(again.whose, "B");
-  EXPECT_EQ(hooked_again("A", 0.5, std::nullopt, std::nullopt).whose, "");
+  EXPECT_EQ(hooked_again({.code = "A"}, 0.5, std::nullopt, std::nullopt).whose, "");
 }
 
 // A box of 0.46 m, of which 6 cm at one end were hidden when it was measured.
@@ -116,9 +116,20 @@ TEST_F(FeltTest, WhatIsLighterThanWhenAnotherHungOnItIsUneven) {
 
 // Nobody has seen who of two was left.
 TEST(WhoHungTest, IsAsHeavyAsWhatWasFeltBesideIt) {
-  EXPECT_TRUE(may_be_who_hung(0.28, {"A", 0.28, 0.47, 2}));
-  EXPECT_FALSE(may_be_who_hung(0.19, {"A", 0.47, 0.47, 1})) << "both hung there the last time";
-  EXPECT_FALSE(may_be_who_hung(0.47, {"A", 0.47, 0.47, 2})) << "it is uneven by itself";
+  EXPECT_TRUE(may_be_who_hung(0.28, 0.1, {"A", 0.28, 0.47, 2}));
+  EXPECT_FALSE(may_be_who_hung(0.19, 0.1, {"A", 0.47, 0.47, 1})) << "both hung there the last time";
+  EXPECT_FALSE(may_be_who_hung(0.47, 0.1, {"A", 0.47, 0.47, 2})) << "it is uneven by itself";
+}
+
+TEST(WhoHungTest, StandsNoLowerThanItsLeastSide) {
+  const Company tall{{2, "B", {0.2, 0}, {0.18, 0.12, 0.3}}}, flat{{2, "B", {0.2, 0}, {0.18, 0.12, 0.03}}};
+  const auto once = [](const Company& company) { return hooked_again({.code = "A", .company = company}, 1, {}, {}); };
+  EXPECT_DOUBLE_EQ(once(tall).lowest_m, 0.12) << "on whichever face";
+  EXPECT_FALSE(may_be_who_hung(0.6, 0.07, hooked_again({.code = "A"}, 0.6, {}, once(tall))));
+  EXPECT_TRUE(may_be_who_hung(0.6, 0.13, hooked_again({.code = "A"}, 0.6, {}, once(tall))));
+  EXPECT_TRUE(may_be_who_hung(0.6, 0.07, hooked_again({.code = "A", .company = flat}, 0.6, {}, once(tall))));
+  EXPECT_TRUE(may_be_who_hung(0.6, 0.07, hooked_again({.code = "A"}, 0.6, {}, {{"A", 1, 1}})))
+      << "nobody has measured it";
 }
 
 }  // namespace

@@ -409,12 +409,12 @@ class Pick final : public ArmSkill {
     const bool alone = cell_.held->alone || hooked || mass > kTogether * limit;
     if (mass > limit && alone) return begin_put_back(now, beside ? 0 : kPutAside, overweight(mass));
     cell_.arm.expect_contact(0);
-    if (!beside && mass <= limit && hooked && unseen_ && may_be_who_hung(mass, *hooked))
+    if (!beside && mass <= limit && hooked && unseen_ && may_be_who_hung(mass, highest_top_m(cell_), *hooked))
       return begin_put_back(now, kPutAside, {Status::kException, "it may be what hung on it: nobody has seen it", {}});
     const bool hidden = target_.crowded && cell_.held->alone && !beside;  // an end, maybe, when it was measured
     if (hidden && weighed) cell_.held->load = reaching(cell_.held->load, *weighed);
     if (!beside && mass <= limit) return success(now);
-    cell_.hooked = hooked_again(code_, mass, beside, hooked);
+    cell_.hooked = hooked_again(*cell_.held, mass, beside, hooked);
     const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
                                    : fmt::format("{:.2f} kg: another may hang on it", mass);
     return begin_put_back(now, 0, {Status::kRetry, why, {}});

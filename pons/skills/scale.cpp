@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pons/core/gravity.hpp"
 #include "pons/skills/grasp.hpp"
@@ -25,6 +26,7 @@ constexpr double kFellOff = 1.5;                 // of the mass of the latest re
 constexpr double kTowards = 0.6;                 // cosine: a companion may reach around a corner
 constexpr double kMore = 0.06, kMore_kg = 0.02;  // between two weighings of one load,
 constexpr double kLess = 0.15;                   // and of two, one of which drags on the belt
+constexpr double kLower_m = 0.01;                // than measured: where it lies, and its sides
 
 Eigen::Matrix3d world_from_flange(Cell& cell) {
   const Pose tip = cell.model.world_from_tip(cell.arm.state().position);
@@ -58,8 +60,13 @@ constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
 
 }  // namespace
 
-bool may_be_who_hung(double mass_kg, const Hooked& before) {
-  return before.most_kg > kBoth * mass_kg && mass_kg > kSame * before.mass_kg;
+bool may_be_who_hung(double mass_kg, double top_m, const Hooked& before) {
+  return before.most_kg > kBoth * mass_kg && mass_kg > kSame * before.mass_kg && top_m > before.lowest_m;
+}
+
+double highest_top_m(const Cell& cell) {
+  if (!cell.held->from_m) return std::numeric_limits<double>::infinity();
+  return cell.held->from_m->z() + cell.world.robot.tool.stroke_m + kLower_m - cell.world.belt.surface_z_m;
 }
 
 std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const Company& company,
@@ -89,13 +96,16 @@ std::optional<Beside> hangs_beside(const Load& load, const Weight& weight, const
   return share > kNearEdge && moment_nm > kFelt_nm ? std::optional(Beside{}) : std::nullopt;
 }
 
-Hooked hooked_again(const std::string& code, double mass_kg, const std::optional<Beside>& beside,
+Hooked hooked_again(const Held& held, double mass_kg, const std::optional<Beside>& beside,
                     const std::optional<Hooked>& before) {
-  return {.code = code,
+  double lowest_m = before ? before->lowest_m : std::numeric_limits<double>::infinity();
+  for (const Companion& companion : held.company) lowest_m = std::min(lowest_m, companion.size_m.minCoeff());
+  return {.code = held.code,
           .mass_kg = mass_kg,
           .most_kg = std::max(mass_kg, before ? before->most_kg : 0),
           .times = before ? before->times + 1 : 1,
-          .whose = beside ? beside->whose : ""};
+          .whose = beside ? beside->whose : "",
+          .lowest_m = std::isfinite(lowest_m) ? lowest_m : 0};
 }
 
 // By so much more at one end as it weighs beside its middle, twice: farther beside, another bears it or hangs on it.

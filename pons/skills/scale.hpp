@@ -31,12 +31,15 @@ struct Beside {
                                                  const std::optional<Hooked>& before);
 
 // What is known of a load by that code that is put back, for another hangs on it or may.
-[[nodiscard]] Hooked hooked_again(const std::string& code, double mass_kg, const std::optional<Beside>& beside,
+[[nodiscard]] Hooked hooked_again(const Held& held, double mass_kg, const std::optional<Beside>& beside,
                                   const std::optional<Hooked>& before);
 
 // Whether a load that is felt to hang alone now may be the one that hung on it: it is as heavy as what was felt beside
-// its middle the last time, and once both were heavier. Only a camera tells who is left.
-[[nodiscard]] bool may_be_who_hung(double mass_kg, const Hooked& before);
+// its middle the last time, and once both were heavier. Where no camera tells who is left, how high the cups took hold
+// does, `top_m` above the belt at most: nothing stands lower than the least of its own sides.
+[[nodiscard]] bool may_be_who_hung(double mass_kg, double top_m, const Hooked& before);
+// That height of what hangs on the cups. Infinite: it is not known.
+[[nodiscard]] double highest_top_m(const Cell& cell);
 
 // That load as far as it reaches where a neighbour hid an end of it from the cameras: by itself it weighs at its
 // middle.
