@@ -226,17 +226,19 @@ class Judge {
   }
 
   void in_chute(const ParcelTruth& parcel, const Entry& entry) {
-    if ((!entry.succeeded || entry.astray) && parcel.place == entry.fell_into) {
+    const bool named = (!entry.succeeded || entry.astray) && parcel.place == entry.fell_into;
+    const bool own = parcel.place == parcel.destination;
+    if (own && (entry.succeeded || named)) {
+      ++verdict_.sorted;  // put there, or fallen: it lies where it was to go, and the journal says so
+    } else if (named) {
       astray(parcel, entry, "fell into another chute, which the journal names");
     } else if (is_given_up(entry) && was_told(parcel.place)) {
       astray(parcel, entry, "fell into another chute, of which the journal says that an unread one did");
-    } else if (parcel.place != parcel.destination) {
+    } else if (!own) {
       ++verdict_.missorted;
       find(parcel, entry, "missorted", kFirst);
-    } else if (!entry.succeeded) {
-      lost(parcel, entry, "in its chute, but the journal does not say so");
     } else {
-      ++verdict_.sorted;
+      lost(parcel, entry, "in its chute, but the journal does not say so");
     }
   }
 

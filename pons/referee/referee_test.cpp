@@ -193,6 +193,17 @@ TEST_F(RefereeTest, AnotherChuteIsMissortedUnlessTheJournalNamesIt) {
   EXPECT_EQ(verdict.reasons.at("fell into chute_#").undeserved, 1);
 }
 
+TEST_F(RefereeTest, WhatFellIntoItsOwnChuteIsSortedWhereTheJournalNamesThat) {
+  for (const char* const each : {"A", "B"}) accept(each, each);
+  fell("A", "chute_1");
+  end("B", Outcome::kFailed);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_1"), parcel("B", Whereabouts::kChute, "chute_1")});
+  EXPECT_EQ(verdict.sorted, 1);
+  EXPECT_EQ(verdict.undeserved, 0);
+  EXPECT_EQ(verdict.lost, 1) << "nobody says where B is";
+}
+
 TEST_F(RefereeTest, WhoCameAlongWithAnotherIsNamedAfterItsOwnTaskHasEnded) {
   accept("A", "A");
   end("A", Outcome::kFailed);
