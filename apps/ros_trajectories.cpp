@@ -28,6 +28,7 @@ using Point = wire::trajectory_msgs::msg::JointTrajectoryPoint;
 using Tolerance = wire::control_msgs::msg::JointTolerance;
 
 constexpr std::string_view kAction = "joint_trajectory_controller/follow_joint_trajectory";
+constexpr double kBeginsWithin_s = 1;                // of its coming: another goal comes to rest first
 constexpr std::chrono::milliseconds kLooksEach{50};  // ros2_control's action_monitor_rate
 // What is left of a value's digits: a task's JSON has room for as many points as the skill takes then. A speed that
 // ros2_control takes for none at all, as the last one has to be, is none.
@@ -222,11 +223,14 @@ void RosTrajectories::begin(const GoalId& id, const Goal& asked) {
     const bool other_joints = arguments.error().where == "joint_names";
     return refuse(id, other_joints ? Result::INVALID_JOINTS : Result::INVALID_GOAL, arguments.error().line());
   }
+  const auto& lasts = asked.trajectory.points.back().time_from_start;
+  const double due_s = now_s + lasts.sec + 1e-9 * lasts.nanosec + arguments->at(skills::kTimeTolerance).get<double>();
+  Going goal{.id = id, .joints = asked.trajectory.joint_names, .due_s = due_s};
   followed_.begin(id, task_of(id, *std::move(arguments)),
                   {.accepted =
-                       [this, id, joints = asked.trajectory.joint_names](const std::string&) {
-                         goals_->accept(id);
-                         taken(id, joints);
+                       [this, goal = std::move(goal)](const std::string&) {
+                         goals_->accept(goal.id);
+                         taken(goal);
                        },
                    .refused = [this, id](const std::string& why) { refuse(id, Result::INVALID_GOAL, why); },
                    .happened = [this, id](const Json& event) { happened(id, event); },
@@ -242,11 +246,16 @@ void RosTrajectories::happened(const GoalId& id, const Json& event) {
 void RosTrajectories::ended(const GoalId& id, const TaskEnd& end) {
   const auto going = std::ranges::find(going_, id, &Going::id);
   const double longer_s = going == going_.end() ? 0 : going->longer_s;
+  const double late_s = going == going_.end() ? 0 : 1e-9 * static_cast<double>(gate_.node().stamp_ns()) - going->due_s;
   std::erase_if(going_, [&](const Going& each) { return each.id == id; });
   const std::int8_t status = status_of(end, goals_->status(id));
   Result result{status == GoalStatus::STATUS_ABORTED ? code_of(end.reason) : Result::SUCCESSFUL, end.reason};
-  if (status == GoalStatus::STATUS_SUCCEEDED && longer_s > 0)
+  if (status == GoalStatus::STATUS_SUCCEEDED && late_s > kBeginsWithin_s) {
+    result.error_string =
+        fmt::format("ended {:.1f} s later than it may: it waited, or a stop or a person held it", late_s);
+  } else if (status == GoalStatus::STATUS_SUCCEEDED && longer_s > 0) {
     result.error_string = fmt::format("took {:.3f} s longer than asked, as the arm's limits are", longer_s);
+  }
   goals_->end(id, status, std::move(result));
 }
 
@@ -256,9 +265,9 @@ void RosTrajectories::refuse(const GoalId& id, std::int32_t code, const std::str
   goals_->end(id, GoalStatus::STATUS_ABORTED, {code, why});
 }
 
-void RosTrajectories::taken(const GoalId& id, const std::vector<std::string>& joints) {
+void RosTrajectories::taken(Going goal) {
   for (const Going& before : going_) (void)followed_.cancel(before.id, "another goal came");
-  going_.push_back({.id = id, .joints = joints});
+  going_.push_back(std::move(goal));
   if (!std::exchange(looks_, true)) look();
 }
 

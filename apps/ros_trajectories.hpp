@@ -30,21 +30,21 @@ class RosTrajectories {
 
  private:
   using GoalId = gate::ros::GoalId;
+  // One that became a task and has not ended, and the order in which it has the joints.
+  struct Going {
+    GoalId id{};
+    std::vector<std::string> joints;
+    double due_s = 0;     // the run's time at which it is to be at its end at the latest
+    double longer_s = 0;  // than it asks for
+  };
   void begin(const GoalId& id, const FollowJointTrajectory::Goal& asked);
-  void taken(const GoalId& id, const std::vector<std::string>& joints);
+  void taken(Going goal);
   void happened(const GoalId& id, const gate::Json& event);
   void ended(const GoalId& id, const TaskEnd& end);
   void refuse(const GoalId& id, std::int32_t code, const std::string& why);
   // Once in a while, as long as a goal goes on: tells its client how the arm follows.
   void look();
   void hear(const gate::Json& told);
-
-  // One that became a task and has not ended, and the order in which it has the joints.
-  struct Going {
-    GoalId id{};
-    std::vector<std::string> joints;
-    double longer_s = 0;  // than it asks for
-  };
 
   gate::ros::Gate& gate_;
   std::vector<std::string> joints_;

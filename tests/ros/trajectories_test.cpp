@@ -8,17 +8,20 @@
 #include <deque>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "pons/gate/ros/action.hpp"
 #include "pons/gate/ros/node.hpp"
+#include "pons/gate/ros/service.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
 #include "pons/motion/test_plans.hpp"
 #include "pons/wire/types/control_msgs/action/follow_joint_trajectory.hpp"
 #include "pons/wire/types/sensor_msgs/msg/joint_state.hpp"
 #include "pons/wire/types/std_msgs/msg/float64_multi_array.hpp"
+#include "pons/wire/types/std_srvs/srv/trigger.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::gate::ros {
@@ -30,6 +33,7 @@ using ::testing::HasSubstr;
 using wire::control_msgs::action::FollowJointTrajectory;
 using wire::sensor_msgs::msg::JointState;
 using wire::std_msgs::msg::Float64MultiArray;
+using wire::std_srvs::srv::Trigger;
 using Goal = FollowJointTrajectory::Goal;
 using Result = FollowJointTrajectory::Result;
 using Ended = ActionClient<FollowJointTrajectory>::Ended;
@@ -97,6 +101,17 @@ class RosArm : public ::testing::Test {
     for (const std::string& joint : state_.name) goal.path_tolerance.push_back({.name = joint, .position = 0.05});
     return goal;
   }
+  // Of what a person asks of the robot.
+  [[nodiscard]] Trigger::Response trigger(const std::string& verb) {
+    Client<Trigger>*& asks = triggers_[verb];
+    if (asks == nullptr) asks = client<Trigger>(*node_, "/pons/" + verb).value_or(nullptr);
+    std::optional<Expected<Trigger::Response>> got;
+    if (asks == nullptr || !spun([&] { return asks->available(); }) ||
+        !asks->call({}, 20s, [&](auto reply) { got = std::move(reply); }) || !spun([&] { return got.has_value(); }) ||
+        !*got)
+      return {.message = "no answer"};
+    return **got;
+  }
   // What becomes of the goals sent, in the order of sending.
   struct Sent {
     GoalId id{};
@@ -126,6 +141,7 @@ class RosArm : public ::testing::Test {
   JointState state_;
   std::vector<double> turned_;  // of the first joint, each time
   std::deque<Sent> sent_;
+  std::map<std::string, Client<Trigger>*> triggers_;
 };
 
 TEST_F(RosArm, FollowsWhatMoveItSends) {
@@ -263,6 +279,27 @@ TEST_F(RosArm, ACancelledGoalStopsTheArmAndANewOneReplacesTheOld) {
   EXPECT_GT(rests, before - 0.09) << "on its way";
   end_run();
   EXPECT_THAT(stories(), AllOf(HasSubstr("trajectory-"), HasSubstr("CANCELLED")));
+}
+
+TEST_F(RosArm, AStopHoldsAGoalUntilTheArmIsArmedAgain) {
+  const double before = turned_.back();
+  const Sent& sent = send(turn({{4.0, 0.4}}));
+  ASSERT_TRUE(spun([&] { return turned_.back() > before + 0.05; }));
+  ASSERT_TRUE(trigger("stop").success);
+  ASSERT_TRUE(spun([&] { return trigger("reset").success; })) << "it comes to stand";
+  const double rests = turned_.back();
+  turned_.clear();
+  ASSERT_TRUE(spun([&] { return turned_.size() > 300; }));
+  for (const double q : turned_) EXPECT_NEAR(q, rests, 0.005);
+  EXPECT_LT(rests, before + 0.35) << "on its way";
+  EXPECT_FALSE(sent.end);
+  const auto armed = trigger("arm");
+  ASSERT_TRUE(armed.success) << armed.message;
+  const Ended end = end_of(sent);
+  EXPECT_EQ(end.status, GoalStatus::STATUS_SUCCEEDED) << end.result.error_string;
+  ASSERT_TRUE(spun([&] { return std::abs(turned_.back() - before - 0.4) < 0.005; })) << turned_.back() - before;
+  EXPECT_THAT(end.result.error_string, testing::MatchesRegex("ended .* s later than it may: .* a stop .*"));
+  end_run();
 }
 
 TEST_F(RosArm, GoesAfterSetPointsAndShowsWhatItsJointsAreAskedFor) {
