@@ -222,6 +222,19 @@ TEST(KeptOff, ThreadsThatAreStartedMeanwhileKeepOffThatCpu) {
   EXPECT_TRUE(CPU_EQUAL(&before, &after));
 }
 
+TEST(ShortTurns, ThreadsThatAreStartedMeanwhileHaveThem) {
+  const std::uint64_t before = turn_ns();
+  std::uint64_t within = 0, started = 0;
+  {
+    const ShortTurns turns;
+    within = turn_ns();
+    std::thread([&] { started = turn_ns(); }).join();
+  }
+  EXPECT_EQ(turn_ns(), before);
+  EXPECT_EQ(within, started);
+  EXPECT_TRUE(before == 0 ? started == 0 : started < before) << started << " after " << before;
+}
+
 TEST(LoopCpu, IsOneThatTheThreadMayUse) {
   std::thread([] {
     cpu_set_t one;

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <iterator>
 
+#include "pons/rt/grant.hpp"
+
 namespace pons::gate::ros {
 namespace {
 
@@ -74,6 +76,7 @@ Gate::~Gate() { stop(); }
 
 void Gate::start() {
   node_->warn_of_idle_remaps();
+  const rt::ShortTurns turns;
   thread_ = std::thread([this] { run(); });
 }
 

@@ -3,11 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "pons/gate/ros/service.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
+#include "pons/rt/grant.hpp"
 #include "pons/wire/types/sensor_msgs/msg/image.hpp"
 #include "pons/wire/types/std_msgs/msg/string.hpp"
 #include "pons/wire/types/std_srvs/srv/set_bool.hpp"
@@ -185,6 +189,36 @@ TEST(RosGate, WhatFindsNoRoomIsCounted) {
   image.data.resize(4 << 20);
   for (int i = 0; i < 10; ++i) outlet->put(image);  // nothing is sent before start()
   EXPECT_EQ(gate->dropped(), 3U);
+}
+
+std::set<pid_t> own_threads() {
+  std::set<pid_t> numbers;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) {
+    numbers.insert(std::stoi(entry.path().filename()));
+  }
+  return numbers;
+}
+
+// Where other work wants the CPUs, pictures would else come late, and then too many at once.
+TEST(RosGate, ItsThreadsTakeShortTurns) {
+  std::uint64_t short_ns = 0;
+  {
+    const rt::ShortTurns turns;
+    short_ns = rt::turn_ns();
+  }
+  const std::set<pid_t> before = own_threads();
+  const auto gate = test_gate();
+  const auto topic = gate->add_topic("seen", Image::kName, Image::kHash,
+                                     {.depth = 5, .publish_mode = Qos::PublishMode::kFlowControlled});
+  ASSERT_TRUE(topic);
+  gate->start();
+  std::size_t started = 0;
+  for (const pid_t thread : own_threads()) {
+    if (before.contains(thread)) continue;
+    EXPECT_EQ(rt::turn_ns(thread), short_ns);
+    ++started;
+  }
+  EXPECT_GE(started, 4U) << "what listens, what looks for others, what sends pictures, the gate's own";
 }
 
 }  // namespace

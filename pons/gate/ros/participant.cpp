@@ -30,6 +30,7 @@
 #include <utility>
 
 #include "pons/gate/ros/same_computer.hpp"
+#include "pons/rt/grant.hpp"
 
 namespace pons::gate::ros {
 namespace {
@@ -46,10 +47,10 @@ constexpr std::uint32_t kParticipantsOnOneComputer =
 constexpr std::uint32_t kSocketBytes = 4U << 20;
 // What is lost is sent again after so long without a word of it; the library's 3 s are a long time for a task.
 constexpr std::uint32_t kRepeatAfterNs = 100'000'000;
-// Of what is large, of all such topics together: two pieces at a time, of which a socket's default room, 212,992 bytes,
+// Of what is large, of all such topics together: a piece at a time, of which a socket's default room, 212,992 bytes,
 // holds three.
 constexpr const char* kFlow = "large";
-constexpr std::int32_t kFlowBytes = 128 << 10;
+constexpr std::int32_t kFlowBytes = 64 << 10;
 constexpr std::uint64_t kFlowPeriod_ms = 1;
 constexpr std::uint32_t kTypicalBytes = 256;  // of a sample's first room, which grows
 
@@ -305,6 +306,7 @@ class FastParticipant final : public Participant, dds::DomainParticipantListener
   }
 
   [[nodiscard]] bool open(std::uint32_t domain, const dds::DomainParticipantQos& qos) {
+    const rt::ShortTurns turns;
     participant_ =
         dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos, this, dds::StatusMask::none());
     if (participant_ == nullptr) return false;
@@ -321,6 +323,7 @@ class FastParticipant final : public Participant, dds::DomainParticipantListener
     wanted.representation().m_value = {dds::XCDR_DATA_REPRESENTATION};
     wanted.writer_data_lifecycle().autodispose_unregistered_instances = false;
     wanted.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
+    const rt::ShortTurns turns;  // the first that is large has a thread started that sends it
     if (qos.publish_mode == Qos::PublishMode::kFlowControlled) {
       wanted.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
       wanted.publish_mode().flow_controller_name = kFlow;
