@@ -152,6 +152,10 @@ void Dispatcher::decide(const ObjectBelief& belief, const std::vector<ObjectBeli
     if (x_m < label_view_end_m_ || will_be_bare(belief, all, now, {})) return;
     return ride(belief, kRideCovered, decisions);
   }
+  if (belief.half_seen) {
+    if (!past_label_view(belief)) return;
+    return ride(belief, kRideHalfSeen, decisions);
+  }
   if (order->second.priority >= kExpressPriority && must_wait(belief, all)) return;
   decided_.insert(belief.track);
   if (known.tries > 0 || known.rode) --tally_.settled;
@@ -221,7 +225,7 @@ bool Dispatcher::will_be_bare(const ObjectBelief& belief, const std::vector<Obje
 bool Dispatcher::is_to_be_read(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                                const std::set<std::string>& set_aside) {
   const bool unread = belief.code.empty() && belief.disputed.empty() && belief.label_attempts < kLooks;
-  if (!unread || decided_.contains(belief.track)) return false;
+  if (!(unread || belief.half_seen) || decided_.contains(belief.track)) return false;
   if (will_be_bare(belief, all, now, set_aside)) to_be_read_.try_emplace(belief.track);
   const auto found = to_be_read_.find(belief.track);
   if (found == to_be_read_.end()) return false;

@@ -34,6 +34,7 @@ inline constexpr std::string_view kRideTwoCodes = "shows two codes";
 inline constexpr std::string_view kRideTwice = "code seen twice";
 inline constexpr std::string_view kRideLate = "identified out of reach";
 inline constexpr std::string_view kRideCovered = "covered by another";
+inline constexpr std::string_view kRideHalfSeen = "a part of it was never seen";
 
 // Parcels, as far as labels tell them apart.
 struct Tally {

@@ -381,6 +381,33 @@ TEST_F(DispatcherTest, TheBeltWaitsForWhatIsReadOnceTheUpperOneIsTaken) {
   EXPECT_FALSE(dispatcher_.observe({read}, at(2)).belt_waits);
 }
 
+// Its own label may lie where another covered it, and the code that shows be another's.
+TEST_F(DispatcherTest, WhatIsHalfSeenIsAskedForOnceAllOfItWasInSight) {
+  const auto half = [](double x_m) {
+    ObjectBelief belief = parcel(1, x_m, "P1");
+    belief.half_seen = true;
+    return belief;
+  };
+  const Decisions half_seen = dispatcher_.observe({half(0)}, at(0));
+  EXPECT_TRUE(half_seen.tasks.empty());
+  EXPECT_TRUE(half_seen.rides.empty());
+  EXPECT_EQ(dispatcher_.observe({parcel(1, 0.1, "P1")}, at(0.1)).tasks.size(), 1U);
+  Dispatcher another({{"P1", {"chute_3", 20}}}, world_);
+  EXPECT_EQ(only_reason(another.observe({half(0.76)}, at(0))), kRideHalfSeen) << "no camera looks there";
+}
+
+TEST_F(DispatcherTest, TheBeltWaitsForWhatIsHalfSeenOnceTheUpperOneIsTaken) {
+  ObjectBelief lower = parcel(1, 0.24, "P1"), upper = parcel(2, 0.1, "P2");
+  lower.half_seen = true;
+  lower.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  (void)dispatcher_.observe({upper}, at(0));
+  (void)dispatcher_.observe({lower, upper}, at(0.1));
+  EXPECT_TRUE(dispatcher_.observe({lower}, at(0.2)).belt_waits);
+  lower.half_seen = false;
+  EXPECT_FALSE(dispatcher_.observe({lower}, at(0.3)).belt_waits);
+}
+
 TEST_F(DispatcherTest, WhatLiesUnderOneThatIsGivenUpRides) {
   ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1");
   ObjectBelief upper = parcel(2, lower.world_from_top.translation().x() - 0.1, "P2");

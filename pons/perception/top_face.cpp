@@ -12,6 +12,7 @@ namespace pons::perception {
 namespace {
 
 constexpr double kOnPlane_m = 0.005;
+constexpr double kLevel_m = 0.01, kBeside_m = 0.012;  // of what is seen to lie on another
 constexpr double kUpright_rad = 3 * std::numbers::pi / 180;
 constexpr double kLeaning_rad = 3.5 * std::numbers::pi / 180;
 constexpr double kFullShape = 0.86;  // an ellipse fills π/4 of its rectangle
@@ -298,6 +299,19 @@ bool Sighting::covers(double x_m, double y_m, double margin_m) const {
   const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
   return std::abs(c * offset.x() + s * offset.y()) <= 0.5 * size_m.x() + margin_m &&
          std::abs(-s * offset.x() + c * offset.y()) <= 0.5 * size_m.y() + margin_m;
+}
+
+bool Sighting::holds(const Sighting& part) const {
+  const Vector3 middle = part.world_from_top.translation();
+  if (std::abs(middle.z() - world_from_top.translation().z()) > kLevel_m) return false;
+  const double c = std::cos(part.yaw_rad), s = std::sin(part.yaw_rad);
+  for (const double a : {-0.5, 0.5}) {
+    for (const double b : {-0.5, 0.5}) {
+      const double along = a * part.size_m.x(), across = b * part.size_m.y();
+      if (!covers(middle.x() + c * along - s * across, middle.y() + s * along + c * across, kBeside_m)) return false;
+    }
+  }
+  return true;
 }
 
 namespace {

@@ -36,6 +36,8 @@ struct Sighting {
   bool sliver = false;  // too narrow for an object: a piece of one
   // Where its top is, on the ground plan: middle and half sides along x and y of `top`.
   [[nodiscard]] bool covers(double x_m, double y_m, double margin_m) const;
+  // Whether all corners of `part` lie on it, and about as high.
+  [[nodiscard]] bool holds(const Sighting& part) const;
 };
 
 // One sighting a region, in their order; `both` measures some of them beside the others.

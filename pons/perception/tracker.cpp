@@ -32,20 +32,6 @@ bool usable(const Sighting& s) { return !s.near_robot && !s.at_border && !s.sliv
 
 double size_difference(const Vector3& a, const Vector3& b) { return (a - b).cwiseAbs().maxCoeff(); }
 
-// Whether all corners of `part` lie on `whole`, and as high.
-bool within(const Sighting& whole, const Sighting& part) {
-  const Vector3 middle = part.world_from_top.translation();
-  if (std::abs(middle.z() - whole.world_from_top.translation().z()) > 0.01) return false;
-  const double c = std::cos(part.yaw_rad), s = std::sin(part.yaw_rad);
-  for (const double a : {-0.5, 0.5}) {
-    for (const double b : {-0.5, 0.5}) {
-      const double along = a * part.size_m.x(), across = b * part.size_m.y();
-      if (!whole.covers(middle.x() + c * along - s * across, middle.y() + s * along + c * across, 0.012)) return false;
-    }
-  }
-  return true;
-}
-
 template <typename Tracks>
 auto live(Tracks& tracks, std::uint32_t id) -> decltype(tracks.data()) {
   const auto found = std::ranges::find_if(tracks, [id](const auto& track) { return track.id == id; });
@@ -264,7 +250,7 @@ bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, doubl
   const bool was_doubtful = track.observations.back().doubtful;
   // A good look outlives glimpses of a part, unless the part lies where the whole cannot.
   if (o.doubtful && !was_doubtful) {
-    track.doubts = within(expected(track, stamp, travel_m), sighting) ? 0 : track.doubts + 1;
+    track.doubts = expected(track, stamp, travel_m).holds(sighting) ? 0 : track.doubts + 1;
     if (track.doubts < kDoubts) return true;
   }
   track.doubts = 0;
@@ -274,7 +260,7 @@ bool Tracker::observed(Track& track, const Sighting& sighting, Time stamp, doubl
   const bool resized = size_difference(o.size_m, track.estimate.size_m) > 0.02;
   const bool now_whole = was_doubtful && !o.doubtful;
   // Once may be a bad cut between neighbours; a shorter one in the same place, something that hangs over it.
-  const bool hidden = track.parted == 0 && within(expected(track, stamp, travel_m), sighting);
+  const bool hidden = track.parted == 0 && expected(track, stamp, travel_m).holds(sighting);
   const int enough = hidden ? kDoubts : (track.parted > 0 && track.well_known() ? kPieces : 2);
   if (hidden != track.odd_hidden) track.odd_sizes = 0;
   track.odd_hidden = hidden;
@@ -483,6 +469,7 @@ ObjectBelief Tracker::belief(const Track& track, Time now, double travel_m, doub
   belief.code = track.label.code();
   belief.disputed = track.label.disputed();
   belief.label_attempts = track.label.attempts();
+  belief.half_seen = !belief.code.empty() && belief.label_attempts == 0;
   return belief;
 }
 

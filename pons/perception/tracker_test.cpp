@@ -216,6 +216,18 @@ TEST(TrackerTest, OneThatStaysShorterIsAnotherAndABadCutInBetweenIsNot) {
   EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.14, 1e-9);
 }
 
+// A second label may lie in what another covers.
+TEST(TrackerTest, WhatWasReadOnAPartIsHalfSeenUntilAllOfItWasInSight) {
+  Bench bench;
+  const std::uint32_t id = bench.update({Bench::sighting(-0.5, 0)}).at(0);
+  const auto half_seen = [&] { return bench.tracker.beliefs(bench.now, 0).at(0).half_seen; };
+  EXPECT_FALSE(half_seen()) << "it has no code";
+  bench.read(id, "A");
+  EXPECT_TRUE(half_seen());
+  bench.tracker.label_shown(id, true);
+  EXPECT_FALSE(half_seen());
+}
+
 TEST(TrackerTest, ASecondCodeNeedsTwoReadsAndStaysUnique) {
   Bench bench;
   const auto ids = bench.update({Bench::sighting(-0.8, 0), Bench::sighting(-0.4, 0)});

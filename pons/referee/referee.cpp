@@ -175,11 +175,14 @@ class Judge {
   }
 
  private:
-  // What bears a code that nobody knows is told of by that one.
+  // What bears a code that nobody knows is told of by that one; what bears another's too, as far as that is told to
+  // have fallen where it lies.
   [[nodiscard]] Entry entry_of(const ParcelTruth& parcel) const {
     const auto own = story_.entries.find(parcel.parcel_id), shown = story_.entries.find(parcel.shows);
     const bool told = own != story_.entries.end() && !own->second.unseen;
-    if (!told && shown != story_.entries.end()) return shown->second;
+    const bool names_it = shown != story_.entries.end() &&
+                          (parcel.label == LabelTruth::kUnknownCode || shown->second.fell_into == parcel.place);
+    if (!told && names_it) return shown->second;
     return own == story_.entries.end() ? Entry{} : own->second;
   }
 

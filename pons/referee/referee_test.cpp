@@ -354,6 +354,21 @@ TEST_F(RefereeTest, WhatBearsAnUnknownCodeIsToldOfByThat) {
   EXPECT_EQ(verdict.lost, 1) << "of X3 nobody said anything";
 }
 
+// Its own label lay below another parcel, and was never read.
+TEST_F(RefereeTest, WhatBearsAnothersCodeIsToldOfByThatWhereItLies) {
+  for (const char* const code : {"A", "B", "C"}) unseen(code);
+  stray("D", "chute_3");
+  ride("D");
+  std::vector<ParcelTruth> parcels{parcel("A", Whereabouts::kChute, "chute_3"),
+                                   parcel("B", Whereabouts::kChute, "chute_4"),
+                                   parcel("C", Whereabouts::kException, "exception")};
+  for (ParcelTruth& each : parcels) each.label = sim::LabelTruth::kTwoCodes, each.shows = "D";
+  const Verdict verdict = judge(parcels);
+  EXPECT_EQ(verdict.astray, 1);
+  EXPECT_EQ(verdict.missorted, 1) << "of D nobody said that it fell there";
+  EXPECT_EQ(verdict.deserved, 1) << "C, of which the same is said as before";
+}
+
 // The tray is emptied: what it shows later is another.
 TEST_F(RefereeTest, OfTheUnreadBelowEachIsAccountedForByWhatACameraSawThen) {
   for (const char* const code : {"A", "B"}) unseen(code);

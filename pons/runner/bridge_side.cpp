@@ -106,7 +106,8 @@ Expected<void> BridgeSide::tick(Time now, Observer& observer) {
   if (bridge_.fault()) return std::unexpected(*bridge_.fault());
   for (const auto& robot : robots_) {
     if (!bridge_.uses_resources(robot->skills.robot) && !robot->arming.settles()) {
-      const bool parks = (vitals_.belt_unseen() || falls_back_) && robot->skills.park;
+      // It would hide what the belt waits for to be seen.
+      const bool parks = (vitals_.belt_unseen() || falls_back_ || belt_waits) && robot->skills.park;
       parks ? robot->skills.park(now) : robot->skills.rest(now);
     }
     if (auto noted = note_carried(*robot, now); !noted) return noted;

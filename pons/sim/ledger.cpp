@@ -111,8 +111,10 @@ Ledger::Ledger(const world::World& world, const world::Manifest& manifest, const
     parcel.destination = manifest[i].destination;
     parcel.label = static_cast<LabelTruth>(arrivals[i].label);
     parcel.shows = arrivals[i].label_text;
-    if (!arrivals[i].second_text.empty() && arrivals[i].second_text != arrivals[i].label_text)
+    if (!arrivals[i].second_text.empty() && arrivals[i].second_text != arrivals[i].label_text) {
       parcel.label = LabelTruth::kTwoCodes;
+      parcel.shows = arrivals[i].second_text;
+    }
     parcel.touching = arrivals[i].touching;
     parcel.mass_kg = arrivals[i].mass_kg;
     parcel.size_m = manifest[i].size_m;

@@ -29,7 +29,7 @@ struct ParcelTruth {
   std::string parcel_id;
   std::string destination;  // as ordered
   LabelTruth label = LabelTruth::kReadable;
-  std::string shows;                 // the code on its label: its own, but of kUnknownCode
+  std::string shows;                 // the code on its label, its own but of kUnknownCode; of kTwoCodes, the other's
   bool touching = false;             // was put down touching, overlapping or leaning on a neighbour
   bool overweight = false;           // really heavier than rules.max_mass_kg
   bool oversize = false;             // really longer than rules.max_size_m, or too large for its chute

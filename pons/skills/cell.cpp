@@ -236,7 +236,10 @@ void Cell::recognise(double rode_m) {
 void Cell::label(std::vector<ObjectBelief>& objects) const {
   for (ObjectBelief& object : objects) {
     const auto label = labelled_.find(object.track);
-    if (label != labelled_.end() && object.code.empty() && object.disputed.empty()) object.code = label->second;
+    if (label == labelled_.end() || !object.disputed.empty()) continue;
+    if (object.code.empty()) object.code = label->second;
+    // Who has had it in hand knows it, whatever of it shows since.
+    if (object.code == label->second) object.half_seen = false;
   }
 }
 

@@ -208,6 +208,9 @@ TEST_F(DroppedTest, OverTheBeltItIsAwaitedAndKnownByPlaceAndSize) {
   std::vector<ObjectBelief> others{seen()};
   cell_.label(others);
   EXPECT_EQ(others[0].code, "P1") << "for the brain, too";
+  others[0].half_seen = true;
+  cell_.label(others);
+  EXPECT_FALSE(others[0].half_seen) << "the hand knows it";
 }
 
 // Then it lies anywhere again.

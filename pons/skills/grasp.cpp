@@ -205,6 +205,7 @@ task::Progress not_there(const Cell& cell, const std::string& code) {
 }
 
 std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object) {
+  if (object.half_seen) return "a part of it was never seen";
   for (const ObjectBelief& other : cell.objects()) {
     if (other.track == 0) continue;  // only an obstacle
     if (lies_on(other, object)) return "covered by " + name_of(other);

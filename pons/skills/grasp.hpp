@@ -68,7 +68,7 @@ struct GraspSearch {
 
 // How a pick ends whose parcel is not where it should be, or nowhere.
 [[nodiscard]] task::Progress not_there(const Cell& cell, const std::string& code);
-// What would come along with that object, and why; nothing if it lies by itself.
+// What would come along with that object, or that it may be another, and why; nothing if it lies by itself.
 [[nodiscard]] std::optional<std::string> tied_to(const Cell& cell, const ObjectBelief& object);
 
 // As seen from the belt: high enough that its underside clears whatever stands close to it, and a little away from

@@ -28,8 +28,10 @@ void recognise_left(std::vector<ObjectBelief>& left, const std::vector<ObjectBel
       if (one.code.empty()) return false;
       const Vector3 off = object.world_from_top.translation() - one.world_from_top.translation();
       const bool lies_there = object.code.empty() && object.last_seen > one.last_seen && off.norm() < kSlides_m;
-      if (lies_there) labelled[object.track] = one.code;
-      return lies_there || object.code == one.code;
+      const bool reads_so = object.code == one.code;
+      // Its code is known, and shows again on a part of it.
+      if (lies_there || (reads_so && object.half_seen)) labelled[object.track] = one.code;
+      return lies_there || reads_so;
     });
   }
   std::erase_if(left, [&](const ObjectBelief& one) {

@@ -148,6 +148,9 @@ class Pick final : public ArmSkill {
       if (!untangles(now)) return {Status::kFailed, *other, {}};
       return step_aside(now), Progress{};
     }
+    // It comes no nearer, and the arm may hide what the belt waits for.
+    if (cell_.belt_stands() && object->world_from_top.translation().x() < belt.pick_x_min_m)
+      return step_aside(now), Progress{};
     if (tried_ && now - *tried_ < kTryEvery) return {};
     tried_ = now;
     const Time from = cell_.arm.splice_time(now);
@@ -177,8 +180,7 @@ class Pick final : public ArmSkill {
     return start(*grasp, *object, now);
   }
 
-  // The brain has the belt wait for what it sees; what was put back, nobody may see. With another on it, it is taken
-  // again from where it lies.
+  // The brain has the belt wait for what it sees; what was put back, nobody may see.
   void keep_in_reach(const ObjectBelief& object, Time now) {
     const double x_m = object.world_from_top.translation().x();
     if (cell_.was_hooked(code_) || cell_.world.belt.must_wait_for(x_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
@@ -189,8 +191,7 @@ class Pick final : public ArmSkill {
     return x_m > cell_.world.belt.waits_at_m() - kStops_m && cell_.belt_speed_m_s() > kStands_m_s;
   }
 
-  // After a miss the parcel may have been pushed, and the arm hides it: until a camera has seen it again, its place is
-  // a memory.
+  // After a miss it may have been pushed, and the arm hides it: its place is a memory until a camera has seen it again.
   bool must_look_again(const ObjectBelief& object, Time now) {
     if (!cell_.missed || cell_.missed->code != code_) return false;
     const bool seen = object.last_seen > cell_.missed->time + kLookAgain / 3;
@@ -208,8 +209,7 @@ class Pick final : public ArmSkill {
 
   void step_aside(Time now) { aside_ = aside_ || cell_.step_aside(now); }
   // To where it was lifted from, which has moved on with the belt: what cannot be sorted so much farther from its
-  // neighbours than it was lifted, and rides on into the exception chute; what has another with it to the very place,
-  // on what it lay on.
+  // neighbours, and rides into the exception chute; what has another with it to the very place, on what it lay on.
   Progress begin_put_back(Time now, double aside, Progress verdict) {
     const Time from = cell_.arm.splice_time(now);
     if (from > rides_until_) return begin_set_down(now, std::move(verdict));  // another may be below by now

@@ -232,6 +232,28 @@ TEST_F(PickTest, WhatTurnsOutToShowTwoCodesIsLeftToTheBrain) {
   EXPECT_THAT(progress.reason, HasSubstr("two codes"));
 }
 
+// The belt waits for something to be seen that the arm may hide.
+TEST_F(PickTest, WhileTheBeltStandsTheArmWaitsOutOfTheView) {
+  const auto coming = [&] { return parcel(1, world_.belt.pick_x_min_m - 0.1, 0, {0.2, 0.11, 0.11}); };
+  tick_with({coming()});
+  const auto skill = start("P1");
+  for (int i = 0; i < 400; ++i) {
+    tick_with({coming()});
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning) << i;
+  }
+  EXPECT_NEAR(tip().x(), world_.belt.pick_x_max_m, 0.01);
+}
+
+// The label that shows may be another's, and its own be hidden.
+TEST_F(PickTest, WhatIsHalfSeenIsNotTaken) {
+  ObjectBelief object = parcel(1, 0.1, 0, {0.2, 0.11, 0.11});
+  object.half_seen = true;
+  tick_with({object});
+  const Progress progress = start("P1")->tick(now_);
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, HasSubstr("never seen"));
+}
+
 // Known to lie elsewhere only when it is too late for another way there.
 TEST_F(PickTest, WhatLiesElsewhereAtTheLastMomentIsNotGripped) {
   tick_with({parcel(1, 0.1, 0, {0.2, 0.11, 0.11})});

@@ -3,7 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
 
+#include "pons/skills/left.hpp"
 #include "pons/skills/pick_kit.hpp"
 #include "pons/skills/rest.hpp"
 #include "pons/skills/set_down.hpp"
@@ -65,6 +70,18 @@ TEST_F(PickTest, WhatHangsBesideItsMiddleGoesBack) {
     grips_kg_.reset();
     cell_.held.reset();
   }
+}
+
+// Whose code is known it stays, though a camera reads that on a part of it only.
+TEST_F(PickTest, WhatWasPutBackIsKnownHoweverLittleOfItShows) {
+  ObjectBelief left = parcel(1, 0.1, 0, {0.2, 0.15, 0.1}), seen = parcel(2, 0.1, 0, {0.2, 0.15, 0.1});
+  left.track = 0x80000001;
+  seen.code = left.code, seen.half_seen = true, seen.last_seen = left.last_seen + from_s(1);
+  std::vector<ObjectBelief> lie{left};
+  std::map<std::uint32_t, std::string> labelled;
+  recognise_left(lie, {seen}, labelled);
+  EXPECT_TRUE(lie.empty());
+  EXPECT_EQ(labelled[2], "P1");
 }
 
 // A neighbour that lies against its end hid a part of it when it was measured.

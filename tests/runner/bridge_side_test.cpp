@@ -5,6 +5,10 @@
 
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "pons/brain/dispatcher.hpp"
 #include "pons/bridge/test_kit.hpp"
@@ -114,6 +118,39 @@ TEST_F(TakeOverTest, NorDoesABridgeThatIsToldToStopLetItRun) {
   settled_ = true;
   tick();
   EXPECT_EQ(belt_, link::Belt::kRuns);
+}
+
+// Has the belt wait, for something to be seen.
+class Looking final : public brain::Brain {
+ public:
+  brain::Decisions observe(const std::vector<ObjectBelief>&, Time, const std::set<std::string>&) override {
+    return {.belt_waits = waits_for_it};
+  }
+  bool heard(std::string_view, task::Outcome) override { return false; }
+  void recall(const task::Task&, std::optional<task::Outcome>) override {}
+  void recall_ride(std::string_view) override {}
+  [[nodiscard]] std::vector<std::string> unseen() const override { return {}; }
+  bool waits_for_it = false;
+};
+
+// An arm with nothing to do would stand above what is to be seen.
+TEST_F(TakeOverTest, TheArmLeavesTheViewOfWhatTheBeltWaitsFor) {
+  Looking looks;
+  int parks = 0;
+  SkillPort arm = port();
+  arm.park = [&parks](Time) { ++parks; };
+  BridgeSide side(bridge_, looks, {arm}, world_, Recovery::kRefused, {});
+  state_.safety = link::SafetyState::kOperational;
+  const auto tick_it = [&] {
+    now_ += kBridgePeriod;
+    ASSERT_TRUE(side.tick(now_, observer_));
+  };
+  tick_it();
+  EXPECT_EQ(parks, 0);
+  looks.waits_for_it = true;
+  tick_it();
+  EXPECT_EQ(belt_, link::Belt::kWaits);
+  EXPECT_EQ(parks, 1);
 }
 
 TEST_F(TakeOverTest, WithoutAPredecessorTheBeltRuns) {
