@@ -21,8 +21,7 @@ class CarryTest : public ::testing::Test {
     ASSERT_TRUE(from) << from.error().line();
     const AxisVector still = AxisVector::Zero(from->size());
     link::State state;
-    state.safety = link::SafetyState::kOperational;
-    state.epoch = 1;
+    state.safety = link::SafetyState::kOperational, state.epoch = 1;
     state.commanded = {*from, still, still};
     state.position = *from, state.speed = still;
     cerebellum_.publish(state);
@@ -206,10 +205,9 @@ TEST_F(DroppedTest, OverTheBeltItIsAwaitedAndKnownByPlaceAndSize) {
   EXPECT_EQ(cell_.find("P1")->track, 3U);
   EXPECT_FALSE(cell_.awaits("P1"));
   std::vector<ObjectBelief> others{seen()};
-  cell_.label(others);
-  EXPECT_EQ(others[0].code, "P1") << "for the brain, too";
   others[0].half_seen = true;
   cell_.label(others);
+  EXPECT_EQ(others[0].code, "P1") << "for the brain, too";
   EXPECT_FALSE(others[0].half_seen) << "the hand knows it";
 }
 
@@ -301,8 +299,7 @@ TEST_F(LeftOnBeltTest, WhatIsStruckIsOnlyAnObstacle) {
   EXPECT_GT(cell_.objects()[1].world_from_top.translation().z(), world_.belt.surface_z_m + 0.19);
 }
 
-// With a label of its own, and no higher. Its neighbour overlaps it a little at most, and what hooked may have come to
-// lie on it.
+// With a label of its own, and no higher. Its neighbour overlaps it little, and what hooked may have come to lie on it.
 TEST_F(LeftOnBeltTest, WhereAnotherIsSeenItLiesNoMore) {
   const auto is_left = [&](double x_m, double higher_m, const char* code, bool whole = true) {
     ObjectBelief other = seen(x_m, 0.05);
