@@ -175,15 +175,16 @@ class Judge {
   }
 
  private:
-  // What bears a code that nobody knows is told of by that one; what bears another's too, as far as that is told to
-  // have fallen where it lies.
+  // What bears a code that nobody knows is told of by that one. What bears another's too may have been told of as that
+  // other, by an entry that names the place where it lies: what else is said of the other is not said of it.
   [[nodiscard]] Entry entry_of(const ParcelTruth& parcel) const {
     const auto own = story_.entries.find(parcel.parcel_id), shown = story_.entries.find(parcel.shows);
-    const bool told = own != story_.entries.end() && !own->second.unseen;
-    const bool names_it = shown != story_.entries.end() &&
-                          (parcel.label == LabelTruth::kUnknownCode || shown->second.fell_into == parcel.place);
-    if (!told && names_it) return shown->second;
-    return own == story_.entries.end() ? Entry{} : own->second;
+    Entry entry = own == story_.entries.end() ? Entry{} : own->second;
+    const bool told = own != story_.entries.end() && !entry.unseen;
+    if (told || shown == story_.entries.end()) return entry;
+    if (parcel.label == LabelTruth::kUnknownCode) return shown->second;
+    if (shown->second.fell_into == parcel.place) entry.fell_into = parcel.place;
+    return entry;
   }
 
   struct Unread {

@@ -20,7 +20,7 @@ TEST(Sorting, ThirtyParcelsAreSortedOrExceptedAndAccountedFor) {
   expect_accounted_for(report);
   EXPECT_EQ(report["parcels"]["offered"], 30);
   EXPECT_GE(report["parcels"]["sorted"], 27) << run.out;
-  EXPECT_LT(report["throughput"]["seconds_per_parcel"], 2.8);  // so few, and the first ones far between
+  EXPECT_LT(report["throughput"]["seconds_per_parcel"], 2.95);  // so few, and the first ones far between
   EXPECT_GT(std::filesystem::file_size(folder / "cell.png"), 50'000U);
   for (const auto& [id, outcome] : outcomes(folder / "j.db")) EXPECT_NE(outcome, "none") << id;
 }
