@@ -186,6 +186,18 @@ TEST_F(OnPostgres, AServerThatSaysNothingIsGoneToo) {
   ::kill(backend, SIGCONT);
 }
 
+TEST_F(OnPostgres, WhatItTookBackWhenAReadFoundItGoneIsNotCommitted) {
+  const auto journal = open();
+  ASSERT_TRUE(journal->accept(sample("pending"), at(1)));
+  server_.stop();
+  ASSERT_FALSE(journal->history("pending"));
+  const auto kept = journal->commit();
+  ASSERT_FALSE(kept);
+  EXPECT_NE(kept.error().line().find("the database is gone"), std::string::npos) << kept.error().line();
+  server_.start();
+  EXPECT_FALSE(journal->commit());
+}
+
 // After any failure in it PostgreSQL takes a transaction back, and tells who commits it so in its answer only.
 TEST_F(OnPostgres, ACommitThatTookEverythingBackIsAFailure) {
   const auto database = open_postgres(place(), "pons_cell", Mode::kOwn);

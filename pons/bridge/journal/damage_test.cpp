@@ -188,6 +188,30 @@ TEST_F(JournalTest, CutOffAnywhereItHoldsABeginningOfWhatWasCommitted) {
     EXPECT_NE(open_cut(other, "").error().line().find("this file is not a journal"), std::string::npos);
 }
 
+// SQLite takes back a whole transaction for want of memory, in a read as well.
+TEST_F(JournalTest, WhatAReadThatFailedTookBackIsNotCommitted) {
+  for (const bool writes_again : {false, true}) {
+    const auto journal = open();
+    ASSERT_TRUE(journal->accept(sample("kept"), at(1)));
+    ASSERT_TRUE(journal->note(at(1), "large", {{"text", std::string(1'000'000, 'x')}}, "P1"));
+    ASSERT_TRUE(journal->commit());
+    ASSERT_TRUE(journal->accept(sample("pending"), at(1)));
+    sqlite3_hard_heap_limit64(sqlite3_memory_used() + 100'000);
+    const auto read = journal->history("P1");
+    sqlite3_hard_heap_limit64(0);
+    ASSERT_FALSE(read);
+    if (writes_again) {
+      EXPECT_FALSE(journal->accept(sample("next"), at(1)));
+    }
+    const auto kept = journal->commit();
+    ASSERT_FALSE(kept);
+    EXPECT_NE(kept.error().line().find("took back"), std::string::npos) << kept.error().line();
+    const auto tasks = journal->tasks().value();
+    ASSERT_EQ(tasks.size(), 1u);
+    EXPECT_EQ(tasks[0].task.id, "kept");
+  }
+}
+
 TEST_F(JournalTest, AFileThatIsGoneTakesNothingMore) {
   const auto journal = open();
   ASSERT_TRUE(journal->accept(sample("a"), at(1)));

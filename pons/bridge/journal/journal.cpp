@@ -197,10 +197,20 @@ void Journal::abandon() {
 Expected<void> Journal::Impl::ensure_transaction() {
   if (run == 0) return fail("the journal is open for reading only", file, "");
   if (failed) return std::unexpected(*failed);
-  if (database->in_transaction()) return {};
+  if (pending) return still_pending();
   auto begun = begin.run();
   if (!begun) give_up(begun.error());
+  pending = begun.has_value();
   return begun;
+}
+
+Expected<void> Journal::Impl::still_pending() {
+  if (database->in_transaction()) return {};
+  const auto there = database->still_there();
+  give_up(there
+              ? Error{"the database took back what was not committed yet", file, "start again: what was told is there"}
+              : there.error());
+  return std::unexpected(*failed);
 }
 
 void Journal::Impl::give_up(const Error& error) {
@@ -220,7 +230,8 @@ Expected<std::int64_t> Journal::Impl::write(Statement& statement) {
 
 Expected<void> Journal::Impl::make_durable() {
   if (failed) return std::unexpected(*failed);
-  if (!database->in_transaction()) return {};
+  if (!pending) return {};
+  if (auto whole = still_pending(); !whole) return whole;
   if (auto there = database->still_there(); !there) {
     give_up(there.error());
     return there;
@@ -229,6 +240,7 @@ Expected<void> Journal::Impl::make_durable() {
   const auto done = write(commit);
   if (clock) longest_commit = std::max(longest_commit, clock() - began);
   if (!done) return std::unexpected(done.error());
+  pending = false;
   durable = std::max(durable, last_written);
   return {};
 }

@@ -26,6 +26,7 @@ struct Journal::Impl {
   // Nothing is written any more. Whether SQLite took back what came before a failed write depends on why it failed, and
   // what was to become durable together must not become so in part.
   std::optional<Error> failed;
+  bool pending = false;  // a transaction was begun and is not committed
   // Only open_to_read() leaves those that write unprepared.
   mutable Statement find_task, tasks_after, one_task, open_tasks, ended_tasks, events_of_task, outline, notes_after,
       events_of_order, events_since, every_event, count, count_ended, endings, newest;
@@ -39,6 +40,8 @@ struct Journal::Impl {
   [[nodiscard]] Expected<std::int64_t> drop(std::int64_t keep, std::int64_t still_true);
   [[nodiscard]] Expected<void> prepare(Mode mode);
   [[nodiscard]] Expected<void> ensure_transaction();
+  // Error, for good: a read that failed, as for want of memory or of its server, may have ended the transaction.
+  [[nodiscard]] Expected<void> still_pending();
   [[nodiscard]] Expected<void> make_durable();
   [[nodiscard]] Expected<void> look_up_what_is_there();
   // The sequence of what was inserted; 0 when nothing was.

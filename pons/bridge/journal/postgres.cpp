@@ -250,7 +250,9 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] std::int64_t inserted() const override { return connection_.inserted; }
 
   Expected<void> promise_durability() override { return {}; }  // it would not be open
-  Expected<void> still_there() override { return {}; }         // it answers, or it does not
+  Expected<void> still_there() override {
+    return connection_.lost() ? std::unexpected(*connection_.lost()) : Expected<void>{};
+  }
 
  private:
   Expected<void> check_server() {
