@@ -43,6 +43,7 @@ class BoundedTree : public TreeTest {
   BoundedTree() {
     task::SkillType type = looks_.type();
     type.resources.clear();  // any number of them at once
+    for (int i = 0; i < 100; ++i) type.schema["properties"][fmt::format("a{}", i)] = Json::object();
     skills_.add(type);
     for (int i = 0; i < 400; ++i) list_ += std::string(36, 'l') + ";";
   }
@@ -84,9 +85,14 @@ TEST_F(BoundedTree, IsBrokenByNameWhereOneTickHandlesMore) {
   EXPECT_EQ(comes_to("<Script code='" + times(100, "s == s;") + "0'/>"), "succeeds");
   EXPECT_EQ(comes_to("<Script code='" + times(200, "s == s;") + "0'/>"), kTooMuch);
   EXPECT_EQ(comes_to(times(400, "<SetBlackboard value='{s}' output_key='a'/>")), kTooMuch);
-  EXPECT_EQ(comes_to("<Parallel>" + times(600, "<ForceSuccess><looks object='{l}'/></ForceSuccess>") + "</Parallel>"),
-            kTooMuch)
-      << "what leaves read";
+  const std::string looks = "<ForceSuccess><looks " + times(100, "a#='{l}' ") + "/></ForceSuccess>";
+  EXPECT_EQ(comes_to(looks), "succeeds");
+  EXPECT_EQ(comes_to("<Parallel>" + times(4, looks) + "</Parallel>"), kTooMuch) << "what leaves read";
+  const std::string compares =
+      "<Switch2 variable='{l}' case_1='{s}' case_2='x'><AlwaysFailure/><AlwaysFailure/>"
+      "<AlwaysSuccess/></Switch2>";
+  EXPECT_EQ(comes_to(times(100, compares)), "succeeds");
+  EXPECT_EQ(comes_to(times(200, compares)), kTooMuch);
 }
 
 // What takes a tenth of the time of a text is done ten times as often.

@@ -2,7 +2,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "pons/bridge/tree/tree.hpp"
 
@@ -14,12 +16,25 @@ std::int64_t threshold(std::int64_t given, std::int64_t children) {
   return given >= 0 ? given : std::max<std::int64_t>(children + given + 1, 0);
 }
 
+// As a Switch compares it.
+struct Compared {
+  std::string text;
+  Value literal;
+};
+
 // As text, as integers, as numbers: whatever fits first.
-bool same(const Value& left, const Value& right) {
-  const std::string a = to_text(left), b = to_text(right);
-  if (a == b) return true;
-  const Value x = value_of_literal(a), y = value_of_literal(b);
-  return is_number(x) && is_number(y) && same_number(number_of(x), number_of(y));
+bool same(const Compared& a, const Compared& b) {
+  if (a.text == b.text) return true;
+  return is_number(a.literal) && is_number(b.literal) && same_number(number_of(a.literal), number_of(b.literal));
+}
+
+// Nothing is read of what does not exist. Error: as of Blackboard::handle().
+Expected<std::optional<Compared>> compared(const Value* value, Blackboard& board) {
+  if (value == nullptr || is_empty(*value)) return std::nullopt;
+  if (auto read = board.handle(bytes_of(*value)); !read) return std::unexpected(read.error());
+  std::string text = to_text(*value);
+  Value literal = value_of_literal(text);
+  return Compared{std::move(text), std::move(literal)};
 }
 
 }  // namespace
@@ -238,10 +253,12 @@ NodeStatus Tree::switch_of(std::int32_t index) {
   const Node& node = this->node(index);
   State& state = this->state(index);
   std::int32_t chosen = index + 1;
-  const Value* const variable = value(port(node, 0));
+  const auto variable = compared(value(port(node, 0)), board_);
+  if (!variable) return broken(variable.error());
   for (std::int32_t i = 1; i < node.children; ++i) {
-    const Value* const given = variable != nullptr ? value(port(node, i)) : nullptr;
-    if (given != nullptr && !is_empty(*given) && same(*variable, *given)) break;
+    const auto given = *variable ? compared(value(port(node, i)), board_) : std::nullopt;
+    if (!given) return broken(given.error());
+    if (*given && same(**variable, **given)) break;
     chosen = this->node(chosen).end;
   }
   if (state.child >= 0 && state.child != chosen) halt_child(state.child);

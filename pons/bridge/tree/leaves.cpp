@@ -12,6 +12,7 @@ namespace {
 
 // From one use of a leaf to its next: each start waits for the disk, and a skill may end as soon as it has begun.
 constexpr Duration kBetweenUses = std::chrono::milliseconds(100);
+constexpr int kStartsATick = 4;  // likewise, of all leaves: the others start in the next tick
 
 }  // namespace
 
@@ -113,7 +114,8 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   }
   if (broken_) return NodeStatus::kBroken;
   if (!resources_free(step)) return NodeStatus::kRunning;
-  if (leaf.tries == 0 && leaf.began && clock_ - *leaf.began < kBetweenUses) {
+  const bool soon = leaf.tries == 0 && leaf.began && clock_ - *leaf.began < kBetweenUses;
+  if (soon || starts_ == kStartsATick) {
     waits_ = true;
     return NodeStatus::kRunning;
   }
@@ -125,6 +127,7 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
   if (permit_) {
     if (const auto may = permit_(*what, now_); !may) return refused(step, may.error());
   }
+  ++starts_;
   if (leaf.tries++ == 0) leaf.began = clock_;
   if (auto told = observer_({step, use.type->name, leaf.tries, &what->arguments}, now_); !told)
     return broken(told.error());

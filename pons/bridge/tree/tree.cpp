@@ -62,6 +62,7 @@ Status Tree::tick(Time now) {
   ticked_ = true;
   clock_ += passed;
   work_ = 0;
+  starts_ = 0;
   board_.begin_tick();
   run_skills(passed);
   if (end_) return active_.empty() ? ended(*end_) : Status::kRunning;

@@ -218,6 +218,7 @@ class Tree {
   Duration clock_{0};
   Time now_;              // of the last tick
   std::size_t work_ = 0;  // of this tick, in nodes and operators alone
+  int starts_ = 0;        // likewise, of skills
   bool ticked_ = false;
   bool wakes_ = false;   // a node wants another round in this tick
   bool waits_ = false;   // a leaf is to start a skill as soon as it can

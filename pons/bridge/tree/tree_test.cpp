@@ -189,6 +189,26 @@ TEST_F(SkillsInATree, LeavesThatNeedDifferentThingsRunTogether) {
   EXPECT_EQ(now_, at(0.03));
 }
 
+// Each start waits for the disk.
+TEST_F(SkillsInATree, OfManyThatNeedNothingAFewStartInATick) {
+  Actor looks("look", {{}});
+  task::SkillType look = looks.type();
+  look.resources.clear();
+  skills_.add(look);
+  for (const std::string node : {"Parallel", "Sequence"}) {
+    looks.log.started.clear();
+    std::string nodes;
+    for (int i = 0; i < 10; ++i) nodes += "<look/>";
+    const auto tree = tree_of(fmt::format("<{}>{}</{}>", node, nodes, node));
+    EXPECT_EQ(tick(*tree), Status::kRunning);
+    EXPECT_EQ(looks.log.started.size(), 4u) << node;
+    EXPECT_EQ(tick(*tree), Status::kRunning);
+    EXPECT_EQ(looks.log.started.size(), 8u) << node;
+    EXPECT_EQ(tick(*tree), Status::kSucceeded);
+    EXPECT_EQ(looks.log.started.size(), 10u) << node;
+  }
+}
+
 TEST_F(SkillsInATree, WhatANodeAboveHaltsLeavesTheWorldSafeBeforeTheNextMoves) {
   // Once the flag is set, `slow` is halted, and `good`, which needs the arm as well, waits for it.
   const auto tree = tree_of(R"(<Sequence><Script code="n := 0"/>
