@@ -8,6 +8,8 @@
 #include <array>
 #include <cerrno>
 
+#include "pons/gate/request.hpp"
+
 namespace pons::gate {
 namespace {
 
@@ -21,13 +23,21 @@ bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK || 
 }  // namespace
 
 void Mailbox::deliver(Line line) {
+  const bool stops = !line.refused && asks_to_stop(line.text);
   const std::scoped_lock lock(mutex_);
-  lines_.push_back(std::move(line));
+  if (stops) {
+    stops_.push_back(std::move(line));
+  } else {
+    lines_.push_back(std::move(line));
+  }
 }
 
 std::vector<Line> Mailbox::take_lines() {
   const std::scoped_lock lock(mutex_);
-  return std::exchange(lines_, {});
+  std::vector<Line> taken = std::exchange(stops_, {});
+  for (Portion portion; !lines_.empty() && portion.takes(lines_.front().text.size()); lines_.pop_front())
+    taken.push_back(std::move(lines_.front()));
+  return taken;
 }
 
 void Mailbox::answer(LineName name, std::string text) {
@@ -81,7 +91,7 @@ void LineServer::wait(Clock::time_point now) {
     short wanted = 0;
     if (!client.out.empty()) wanted = POLLOUT;
     if (client.out.empty() && !client.waiting && !client.ended) wanted = POLLIN;
-    polled.push_back({client.socket.get(), wanted, 0});
+    polled.push_back({client.gone ? -1 : client.socket.get(), wanted, 0});
     ids.push_back(id);
     if (client.since)
       until = std::min(until.value_or(*client.since + limits_.patience), *client.since + limits_.patience);
@@ -138,9 +148,9 @@ void LineServer::take_answers() {
 }
 
 bool LineServer::serve(std::uint64_t id, Client& client, short events, Clock::time_point now) {
-  if ((events & (POLLERR | POLLNVAL)) != 0) return false;
-  // Gone altogether, with nothing left to read: nobody will take an answer.
-  if ((events & POLLHUP) != 0 && (events & POLLIN) == 0) return false;
+  // Altogether, with nothing left to read: nobody will take an answer.
+  client.gone |= (events & (POLLERR | POLLNVAL)) != 0 || ((events & POLLHUP) != 0 && (events & POLLIN) == 0);
+  if (client.gone) return client.waiting;
   const std::size_t before = client.in.size() + client.out.size();
   if ((events & POLLIN) != 0 && !read(client)) return false;
   if (!client.out.empty() && !write(client)) return false;

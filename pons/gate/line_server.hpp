@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -35,7 +36,7 @@ class Mailbox {
   explicit Mailbox(Descriptor wake) : wake_(std::move(wake)) {}
 
   void deliver(Line line);
-  [[nodiscard]] std::vector<Line> take_lines();
+  [[nodiscard]] std::vector<Line> take_lines();  // as Visitors::poll() says
   void answer(LineName name, std::string text);
   [[nodiscard]] std::vector<std::pair<LineName, std::string>> take_answers();
 
@@ -46,7 +47,8 @@ class Mailbox {
  private:
   Descriptor wake_;
   std::mutex mutex_;
-  std::vector<Line> lines_;                                // under mutex_
+  std::vector<Line> stops_;                                // under mutex_
+  std::deque<Line> lines_;                                 // likewise
   std::vector<std::pair<LineName, std::string>> answers_;  // likewise
 };
 
@@ -69,6 +71,7 @@ class LineServer {
     bool waiting = false;                    // for its answer
     bool ended = false;                      // it will send no more
     bool closing = false;                    // once `out` is written
+    bool gone = false;                       // but its line waits to be answered: nobody takes its place meanwhile
     std::optional<Clock::time_point> since;  // it owes us the rest of a line, or the reading of `out`
   };
 

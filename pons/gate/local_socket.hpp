@@ -4,6 +4,7 @@
 // nothing but its buffers. The runner fetches what came with poll() and answers when it likes.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
@@ -29,17 +30,36 @@ struct Request {
 };
 
 struct SocketLimits {
-  std::size_t line_bytes = 64UL * 1024;          // a longer line is refused, and its answer ends the connection
-  std::size_t clients = 32;                      // one more is told so and closed
+  std::size_t line_bytes = 64UL * 1024;  // a longer line is refused, and its answer ends the connection
+  // One more is told so and closed. Who leaves without waiting for the answer is one until it is there.
+  std::size_t clients = 32;
   std::size_t reply_bytes = 16UL * 1024 * 1024;  // waiting for one client; more ends the connection
   std::chrono::milliseconds patience{10'000};    // for half a line, and for a client to read what waits for it
+};
+
+// How much is polled at once: a period of the bridge is short, and reading what somebody sent takes its time.
+class Portion {
+ public:
+  static constexpr std::size_t kRequests = 32, kBytes = 64UL * 1024;
+  // Whether there is room for one more, of so many bytes. For the first there is.
+  [[nodiscard]] bool takes(std::size_t bytes) {
+    const bool room = requests_ == 0 || (requests_ < kRequests && bytes <= kBytes - std::min(bytes_, kBytes));
+    if (!room) return false;
+    ++requests_;
+    bytes_ += bytes;
+    return true;
+  }
+
+ private:
+  std::size_t requests_ = 0, bytes_ = 0;
 };
 
 // Where requests come from. Whoever answers them need not know what brought them.
 class Visitors {
  public:
   virtual ~Visitors() = default;
-  // What came since the last call, in the order of arrival; does not wait. At most one a client.
+  // What asks for a stop, then a Portion of what came otherwise and was not polled yet, in the order of arrival; does
+  // not wait. At most one a client.
   [[nodiscard]] virtual std::vector<Request> poll() = 0;
 };
 

@@ -3,14 +3,18 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/eventfd.h>
 #include <sys/stat.h>
 #include <cstdlib>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <thread>
 
+#include "pons/gate/line_server.hpp"
 #include "pons/gate/unix_address.hpp"
 
 namespace pons::gate {
@@ -196,6 +200,43 @@ TEST_F(LocalSocketTest, RefusesOneClientTooManyUntilOneLeaves) {
   client.join();
   ASSERT_TRUE(answer) << answer.error().line();
   EXPECT_EQ(*answer, "hello");
+}
+
+// Else one who sends and leaves, again and again, could have more waiting than anybody answers.
+TEST_F(LocalSocketTest, WhoLeavesTakesTheirPlaceUntilTheyAreAnswered) {
+  const auto socket = listen({.clients = 2});
+  std::vector<Request> requests;
+  for (int i = 0; i < 2; ++i) {
+    RawClient(path_).send("a\n");
+    std::ranges::move(wait_for_requests(*socket), std::back_inserter(requests));
+  }
+  EXPECT_EQ(RawClient(path_).line(), R"({"error":"2 clients are connected already","ok":false})");
+  requests.at(0).reply("late");
+  std::vector<Request> next;
+  while (next.empty()) {
+    RawClient(path_).send("b\n");  // refused until the server has seen the answer
+    next = socket->poll();
+  }
+  EXPECT_EQ(next.at(0).text, "b");
+}
+
+TEST_F(LocalSocketTest, OfWhatWaitsStopsComeFirstAndTheRestInPortions) {
+  Mailbox mailbox(Descriptor(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)));
+  const auto texts = [&mailbox] {
+    std::vector<std::string> taken;
+    for (const Line& line : mailbox.take_lines()) taken.push_back(line.text.substr(0, 20));
+    return taken;
+  };
+  const std::string half(Portion::kBytes / 2, 'x'), more(2 * Portion::kBytes, 'y'), stop = R"({"op":"stop"})";
+  for (const std::string& text : {half, half, std::string("z"), more, stop}) mailbox.deliver({{}, text});
+  const std::string x(20, 'x'), y(20, 'y');
+  EXPECT_EQ(texts(), (std::vector{stop, x, x}));
+  EXPECT_EQ(texts(), std::vector<std::string>{"z"});
+  EXPECT_EQ(texts(), std::vector{y}) << "alone, however large";
+  EXPECT_EQ(texts(), std::vector<std::string>{});
+  for (std::size_t i = 0; i <= Portion::kRequests; ++i) mailbox.deliver({{}, "s"});
+  EXPECT_EQ(texts().size(), Portion::kRequests);
+  EXPECT_EQ(texts().size(), 1u);
 }
 
 TEST_F(LocalSocketTest, DropsAClientThatSendsHalfALine) {

@@ -37,10 +37,8 @@ std::vector<Request> Questions::poll() {
   {
     const std::scoped_lock lock(mutex_);
     asked.swap(urgent_);
-    for (std::size_t i = 0; i < kPolledAtOnce && !asked_.empty(); ++i) {
+    for (Portion portion; !asked_.empty() && portion.takes(asked_.front().text.size()); asked_.pop_front())
       asked.push_back(std::move(asked_.front()));
-      asked_.pop_front();
-    }
   }
   std::vector<Request> requests;
   for (Asked& each : asked) {

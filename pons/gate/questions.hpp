@@ -22,8 +22,7 @@ enum class Urgency : std::uint8_t { kAny, kUrgent };
 
 class Questions {
  public:
-  static constexpr std::size_t kUrgentMost = 16;    // besides
-  static constexpr std::size_t kPolledAtOnce = 32;  // besides: a period of the bridge is short
+  static constexpr std::size_t kUrgentMost = 16;  // besides
   using Answered = std::function<void(const Json&)>;
 
   // At most `most` wait to be polled; more are refused at once, in the name of `where`. `wake` is called, by any
@@ -49,7 +48,7 @@ class Questions {
 
   // ---- on the thread of whoever answers ----
 
-  // What is urgent, and of the others those that wait longest; answers may come from any thread.
+  // What is urgent, and a Portion of the others; answers may come from any thread.
   [[nodiscard]] std::vector<Request> poll();
 
  private:

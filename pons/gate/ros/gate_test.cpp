@@ -132,7 +132,7 @@ TEST(RosGate, OfManyRequestsSomeArePolledAtOnceTheUrgentFirst) {
     most = std::max(most, requests.size());
     for (const Request& request : requests) texts.push_back(request.text);
   }
-  EXPECT_EQ(most, Questions::kPolledAtOnce + 1);
+  EXPECT_EQ(most, Portion::kRequests + 1);
   ASSERT_EQ(texts.size(), 101U);
   EXPECT_EQ(texts[0], R"({"op":"stop"})"
                       "\n");
@@ -168,16 +168,17 @@ TEST(RosGate, KnowsWhetherAnybodyHears) {
   EXPECT_TRUE(spin_until({other.get()}, [&] { return !gate->wanted(*topic); }));
 }
 
-// As /rosout and /parameter_events have it: more than the library keeps of itself.
+// As many as /rosout and /parameter_events keep: more than the library does of itself.
 TEST(RosGate, ATopicKeepsAThousandForWhoComesLater) {
+  constexpr Qos kMany{.durability = Qos::Durability::kTransientLocal, .depth = kRosoutQos.depth};
   const auto gate = test_gate();
-  auto outlet = gate->outlet<String>("said", kRosoutQos);
+  auto outlet = gate->outlet<String>("said", kMany);
   ASSERT_TRUE(outlet);
   gate->start();
   for (int i = 0; i < 1200; ++i) outlet->put({std::to_string(i)});
   const auto node = test_node("listener");
   std::vector<std::string> heard;
-  ASSERT_TRUE(node->subscribe<String>("said", kRosoutQos, [&](const String& text) { heard.push_back(text.data); }));
+  ASSERT_TRUE(node->subscribe<String>("said", kMany, [&](const String& text) { heard.push_back(text.data); }));
   EXPECT_TRUE(spin_until({node.get()}, [&] { return !heard.empty() && heard.back() == "1199"; }));
   EXPECT_GE(heard.size(), 1000U);
 }
