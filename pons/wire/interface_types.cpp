@@ -7,6 +7,7 @@
 #include <boost/hash2/sha2.hpp>
 #include <utility>
 
+#include "pons/wire/dynamic.hpp"
 #include "pons/wire/from_json.hpp"
 
 namespace pons::wire {

@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "pons/core/error.hpp"
-#include "pons/wire/dynamic.hpp"
 #include "pons/wire/interface_file.hpp"
 #include "pons/wire/known_types.hpp"
 
 namespace pons::wire {
+
+struct DynamicMessage;
 
 // One thread; the types that it makes need it no longer, and are anybody's.
 class InterfaceTypes {

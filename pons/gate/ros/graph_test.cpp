@@ -64,7 +64,7 @@ TEST(Graph, SpeaksTheFormOfItsPeersAndHumblesBeforeThereAreAny) {
   EXPECT_TRUE(graph.take_changed());
   EXPECT_FALSE(graph.take_changed());
   HumbleInfo humble;
-  ASSERT_TRUE(wire::decode(graph.announcement(), humble));
+  ASSERT_TRUE(wire::decode(graph.announcement().value(), humble));
   EXPECT_TRUE(std::ranges::equal(std::span(humble.gid.data).first(16), kOurs));
   EXPECT_EQ(humble.node_entities_info_seq.at(0).node_name, "pons");
 
@@ -73,7 +73,7 @@ TEST(Graph, SpeaksTheFormOfItsPeersAndHumblesBeforeThereAreAny) {
   EXPECT_EQ(graph.form(), Form::kJazzy);
   EXPECT_TRUE(graph.take_changed());
   ParticipantEntitiesInfo jazzy;
-  ASSERT_TRUE(wire::decode(graph.announcement(), jazzy));
+  ASSERT_TRUE(wire::decode(graph.announcement().value(), jazzy));
   EXPECT_EQ(jazzy.node_entities_info_seq.at(0).node_name, "pons");
   EXPECT_EQ(jazzy.node_entities_info_seq.at(0).writer_gid_seq.at(0).data, kWriter.guid);
   EXPECT_THAT(graph.nodes(), ElementsAre("/talker"));
@@ -95,9 +95,40 @@ TEST(Graph, SpeaksTheFormOfItsPeersAndHumblesBeforeThereAreAny) {
 TEST(Graph, JazzysReadersFindNoNodesInHumblesForm) {
   Graph graph(kNode, kOurs);
   graph.add_own(kWriter);
-  auto bytes = graph.announcement();
+  auto bytes = graph.announcement().value();
   const auto count = std::span(bytes).subspan(wire::kEncapsulation + 16, 4);  // after an identifier of theirs
   EXPECT_THAT(count, testing::Each(std::byte{0}));
+}
+
+// Who tells of hashes will read that form; he need not have said a word yet.
+TEST(Graph, KnowsTheFormOfItsPeersByWhatTheirEndpointsTell) {
+  Graph graph(kNode, kOurs);
+  EXPECT_TRUE(graph.take_changed());
+  Heard about{.kind = Heard::Kind::kWriter, .guid = guid(2, 9), .topic = std::string(kDiscoveryTopic)};
+  graph.heard(about);
+  EXPECT_EQ(graph.form(), Form::kHumble);
+  EXPECT_FALSE(graph.take_changed());
+  about.user_data = "typehash=RIHS01_aa;";
+  graph.heard(about);
+  EXPECT_EQ(graph.form(), Form::kJazzy);
+  EXPECT_TRUE(graph.take_changed());
+  EXPECT_THAT(graph.nodes(), IsEmpty());
+  // What he says himself counts more, and another node of Pons tells nothing of it.
+  ASSERT_TRUE(graph.told(info_of<HumbleInfo>(kTheirs, "listener", {}), {guid(2, 9), 1}));
+  graph.heard(about);
+  EXPECT_EQ(graph.form(), Form::kHumble);
+  graph.heard({.kind = Heard::Kind::kGone, .guid = kTheirs});
+  graph.heard({.kind = Heard::Kind::kParticipant, .guid = kOthers, .user_data = "enclave=/;pons=1;"});
+  about.guid = guid(3, 9);
+  graph.heard(about);
+  EXPECT_EQ(graph.form(), Form::kHumble);
+  EXPECT_THAT(graph.take_warnings(), IsEmpty());
+}
+
+// Nothing that is cut short: what stands in place of it would be empty.
+TEST(Graph, WhatCannotBeToldIsAnError) {
+  const Graph graph({"/", std::string(300, 'n')}, kOurs);
+  EXPECT_FALSE(graph.announcement());
 }
 
 // They would mirror each other, and each what the other has just left.
@@ -162,7 +193,7 @@ TEST(Graph, WhoServesTheSameOrTellsTheTimeTooIsToldOnce) {
   EXPECT_THAT(graph.take_warnings(),
               ElementsAre(HasSubstr("/go: somebody serves it, too"), HasSubstr("/clock: somebody")));
   // Once he says who he is, he is named.
-  const auto says = [&](std::vector<Guid> endpoints) {
+  const auto says = [&](const std::vector<Guid>& endpoints) {
     return graph.told(info_of<ParticipantEntitiesInfo>(kTheirs, "rogue", endpoints), {guid(2, 9), 1}).has_value();
   };
   ASSERT_TRUE(says({guid(2, 1)}));
