@@ -166,7 +166,7 @@ Json Desk::answer(const gate::Asked& asked, Time now) {
     case gate::Operation::kReset:
     case gate::Operation::kArm:
       if (auto told = tell_arm(asked.operation, now); !told) return gate::refusal(told.error());
-      return {{"ok", true}, {"robot", describe()}};
+      return {{"ok", true}, {"robot", describe()}, {"rests", run_ != nullptr && run_->rests()}};
     case gate::Operation::kRest:
     case gate::Operation::kGoOn:
     case gate::Operation::kEnd:

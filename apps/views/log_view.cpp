@@ -72,6 +72,7 @@ Line stray(const bridge::Event& event) {
 }
 
 Line rest(const bridge::Event& event) {
+  if (event.detail.contains("task")) return {};  // of which its own pause tells
   return {Log::INFO, event.detail.value("rests", false) ? "told to rest" : "told to go on"};
 }
 

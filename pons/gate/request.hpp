@@ -37,7 +37,8 @@
 //   {"op":"drive","ahead_m_s":0.2,"turn_rad_s":-0.1}
 //                                → {"ok":true,"id":…}: the base is steered so for half a second, by a task of that id,
 //                                   unless another one has the base or waits for it
-//   {"op":"robot"}               → {"ok":true,"robot":{"state":…,"cause":…,"standstill":…,"epoch":…,"needs":…}}
+//   {"op":"robot"}               → {"ok":true,"robot":{"state":…,"cause":…,"standstill":…,"epoch":…,"needs":…},
+//                                   "rests":false}
 //   {"op":"stop"} and emergency_stop, reset, arm, a person's words to the arm, are answered like robot
 //   {"op":"rest"}                → {"ok":true,"rests":false}: nothing new is taken or begun, the belt waits, what runs
 //                                   stands at its next safe point; asked again, whether all does by now

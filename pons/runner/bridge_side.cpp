@@ -69,6 +69,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
 
 void BridgeSide::recall(const bridge::Event& note) {
   if (note.kind == "ride") brain_.recall_ride(task::text_of(note.detail, "code"));
+  if (note.kind == "rest") recall_rest(note.detail);
   const std::string of = task::text_of(note.detail, "robot");
   for (const auto& robot : robots_) {
     if (!of.empty() && of != robot->skills.name) continue;
@@ -76,6 +77,13 @@ void BridgeSide::recall(const bridge::Event& note) {
     if (note.kind == "person") robot->arming.recall(task::text_of(note.detail, "asks"));
     if (note.kind == bridge::kCarriesEvent) robot->carried = note.detail.value("load", Json{});
   }
+}
+
+void BridgeSide::recall_rest(const Json& noted) {
+  resting_ = noted.value("rests", false);
+  const std::string task = task::text_of(noted, "task");
+  if (!resting_) set_to_rest_.clear();
+  if (resting_ && !task.empty()) set_to_rest_.insert(task);
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {
@@ -370,12 +378,18 @@ void BridgeSide::stop(Time now, const std::string& reason) {
   bridge_.stop(now, reason);
 }
 
+// Durable at once, as go_on() is: a bridge that comes after this one keeps to it. What cannot be written shows in the
+// bridge's next tick.
 void BridgeSide::rest(Time now) {
-  if (!std::exchange(resting_, true)) bridge_.note("rest", {{"rests", true}}, now);
+  bool is_news = !std::exchange(resting_, true);
+  if (is_news) bridge_.note("rest", {{"rests", true}}, now);
   for (const std::string& id : bridge_.running()) {
-    const std::string_view state = bridge_.state(id);
-    if (state == "running" && bridge_.pause(id, now, "the robot is to rest")) set_to_rest_.insert(id);
+    if (bridge_.state(id) != "running" || !bridge_.pause(id, now, "the robot is to rest")) continue;
+    set_to_rest_.insert(id);
+    bridge_.note("rest", {{"rests", true}, {"task", id}}, now);
+    is_news = true;
   }
+  if (is_news) (void)bridge_.commit(now);
 }
 
 void BridgeSide::go_on(Time now) {
@@ -383,6 +397,7 @@ void BridgeSide::go_on(Time now) {
   bridge_.note("rest", {{"rests", false}}, now);
   // One that has ended meanwhile, or that somebody has resumed before, is not paused any more.
   for (const std::string& id : std::exchange(set_to_rest_, {})) (void)bridge_.resume(id, now);
+  (void)bridge_.commit(now);
 }
 
 bool BridgeSide::rests() const {

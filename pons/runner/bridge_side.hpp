@@ -80,6 +80,7 @@ class BridgeSide {
 
  private:
   void recall(const bridge::Event& note);
+  void recall_rest(const bridge::Json& noted);
   void take_in(const Snapshot& snapshot, Time now);
   void look_after_parts(Time now);
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,

@@ -62,7 +62,7 @@ class TakeOverTest : public testing::Test {
             .carries = [] { return bridge::Json{}; },
             .takes_until_m = world_.belt.pick_x_max_m,
             .restore = [this](const bridge::Json&) { ++restores_; },
-            .resume = {},
+            .resume = [](const task::Task&, std::size_t done) { return bridge::Resumption{.done = done}; },
             .settle = [this](Time) { return settled_; }};
   }
   void SetUp() override {
@@ -226,6 +226,41 @@ TEST_F(TakeOverTest, AtRestNothingBeginsWhatRunsStandsAndTheBeltWaits) {
   EXPECT_EQ(bridge_.state("a"), "running");
   EXPECT_EQ(belt_, link::Belt::kRuns);
   EXPECT_TRUE(bridge_.submit(R"({"id":"c","steps":[{"skill":"pick"}]})", now_));
+}
+
+// As a bridge does that finds one killed.
+TEST_F(TakeOverTest, WhoTakesOverKeepsToTheRestThatWasAskedForAndEndsItWhenTold) {
+  state_.safety = link::SafetyState::kOperational;
+  ASSERT_TRUE(bridge_.submit(R"({"id":"a","steps":[{"skill":"pick"}]})", now_));
+  ASSERT_TRUE(bridge_.submit(R"({"id":"b","steps":[{"skill":"pick"}]})", now_));
+  for (int i = 0; i < 3; ++i) tick();
+  ASSERT_TRUE(bridge_.pause("b", now_, "somebody wants to look"));
+  side_.rest(now_);
+
+  settled_ = true;
+  bridge::Bridge bridge(*journal_, registry_, world_);
+  BridgeSide side(bridge, dispatcher_, {port()}, world_, Recovery::kRefused, {});
+  ASSERT_TRUE(side.take_over(*journal_, now_));
+  const auto tick_next = [&](int times) {
+    for (int i = 0; i < times; ++i) {
+      now_ += kBridgePeriod;
+      ASSERT_TRUE(side.tick(now_, observer_));
+    }
+  };
+  state_.safety = link::SafetyState::kDisarmed;
+  tick_next(1);
+  state_.safety = link::SafetyState::kOperational;
+  tick_next(20);
+  EXPECT_TRUE(side.rests());
+  EXPECT_EQ(bridge.state("a"), "paused") << "holding what it holds";
+  EXPECT_EQ(belt_, link::Belt::kWaits);
+  EXPECT_FALSE(bridge.submit(R"({"id":"c","steps":[{"skill":"pick"}]})", now_));
+  side.go_on(now_);
+  tick_next(2);
+  EXPECT_FALSE(side.rests());
+  EXPECT_EQ(bridge.state("a"), "running");
+  EXPECT_EQ(bridge.state("b"), "paused") << "that was somebody's";
+  EXPECT_EQ(belt_, link::Belt::kRuns);
 }
 
 }  // namespace

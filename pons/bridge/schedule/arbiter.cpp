@@ -186,15 +186,17 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
   age();
   std::vector<std::string> granted;
   if (!changed_ && !fits) return granted;
-  Mask taken = held_ | withheld_;
+  Mask taken = held_;
   std::set<Ways> passed;
   std::map<Ways, Looked> looked;
   while (const Entry* const entry = next(passed, looked)) {
     const Ways ways = entry->ways;  // the entry may be elsewhere soon
     Looked& there = looked[ways];
     there.id = entry->claim.id, there.rank = entry->rank;
+    const Mask barred = entry->claim.priority == kFirst ? 0 : withheld_;
+    const auto is_free_now = [&](Mask needs) { return is_free(needs, taken | barred); };
     const std::vector<std::size_t> fit = fitting(*entry, fits);
-    const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free(ways[way], taken); });
+    const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free_now(ways[way]); });
     if (free != fit.end()) {
       taken |= ways[*free];
       give(*entry, *free, granted);
@@ -202,7 +204,7 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
       // It has to wait: nobody behind it may take what it waits for.
       for (const std::size_t way : fit) taken |= ways[way];
     }
-    const bool all_taken = std::ranges::none_of(ways, [&](Mask needs) { return is_free(needs, taken); });
+    const bool all_taken = std::ranges::none_of(ways, is_free_now);
     if (all_taken || (fits && !look_on(ways, there))) passed.insert(ways);
   }
   changed_ = false;

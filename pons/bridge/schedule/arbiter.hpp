@@ -66,7 +66,8 @@ class Arbiter {
   // A task that was granted waits again, for the same way, at the place in the queue that the age gives it with which
   // it was granted; its deadline was met.
   void hand_over(std::string_view id);
-  // Withheld, no resource is given to anybody from the next grant() on; seats are.
+  // Withheld, no resource is given from the next grant() on, but to those of kFirst, which may hold something; seats
+  // are.
   enum class Withheld : std::uint8_t { kNothing, kResources };
   void withhold(Withheld what);
   // A task in the queue leaves it, and comes back at the age that it had; whether it is granted, and its deadline, are

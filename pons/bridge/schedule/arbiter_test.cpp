@@ -64,6 +64,10 @@ TEST(Arbiter, GivesNoResourceWhileTheyAreWithheld) {
   EXPECT_TRUE(arbiter.preemptions().empty()) << "nobody makes way for one that gets nothing";
   arbiter.release("runs");
   EXPECT_EQ(arbiter.grant(at(1)), Ids{});
+  arbiter.add(claim("holds something", Arbiter::kFirst, {"arm"}));
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{"holds something"});
+  arbiter.release("holds something");
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{});
   arbiter.withhold(Arbiter::Withheld::kNothing);
   EXPECT_EQ(arbiter.grant(at(2)), Ids{"urgent"});
 }
