@@ -46,7 +46,7 @@ constexpr std::array kWays{Way{Transition::TRANSITION_ACTIVATE, "activate", Stat
                            Way{Transition::TRANSITION_ACTIVE_SHUTDOWN, "shutdown", State::PRIMARY_STATE_ACTIVE,
                                State::TRANSITION_STATE_SHUTTINGDOWN, State::PRIMARY_STATE_FINALIZED, "end"}};
 
-constexpr std::chrono::milliseconds kLooksAgain{100};
+constexpr std::chrono::milliseconds kAtOnce{0}, kLooksAgain{100};
 
 State state_message(std::uint8_t id) {
   const auto* const known = std::ranges::find(kStates, id, &decltype(kStates)::value_type::first);
@@ -78,6 +78,7 @@ Expected<void> RosLifecycle::serve() {
   auto later = std::make_unique<Later>();
   later_ = later.get();
   gate_.node().add_part(std::move(later));
+  later_->put(kAtOnce, [this] { recall(); });
   auto events = gate_.node().advertise<Event>("~/transition_event");
   if (!events) return std::unexpected(events.error());
   events_.emplace(*std::move(events));
@@ -115,6 +116,14 @@ Expected<void> RosLifecycle::serve_looks() {
   });
 }
 
+// Nobody has changed anything then: it is no transition, and no event.
+void RosLifecycle::recall() {
+  gate_.ask(Json{{"op", "robot"}}, [this](const Json& told) {
+    const bool untouched = !changing_ && state_ == State::PRIMARY_STATE_ACTIVE;
+    if (untouched && told.value("rests", false)) state_ = State::PRIMARY_STATE_INACTIVE;
+  });
+}
+
 // What does not lead on from here, or while another one is under way, is refused.
 void RosLifecycle::change(const ChangeState::Request& request, const Answer<ChangeState>& answer) {
   const Way* const way = changing_ ? nullptr : asked_for(request.transition, state_);
@@ -132,9 +141,7 @@ void RosLifecycle::ask(const char* operation) {
       return end(false, changing_->from);
     }
     if (changing_->transition == Transition::TRANSITION_DEACTIVATE && !told.value("rests", false)) return deactivate();
-    // The run's end is the node's: nobody will ask a node that is finalized.
-    const bool ends = changing_->to == State::PRIMARY_STATE_FINALIZED;
-    end(true, ends ? State::TRANSITION_STATE_SHUTTINGDOWN : changing_->to);
+    end(true, changing_->to);
   });
 }
 

@@ -3,7 +3,9 @@
 //
 //   active     tasks are taken and begun
 //   inactive   none is, the belt waits, and what ran stands at a safe point (pons/gate/request.hpp: rest)
-//   shut down  the run ends as with Ctrl-C
+//   finalized  the run ends as with Ctrl-C
+//
+// A bridge that follows another on the same run finds out what that one was told: of a run that rests it is inactive.
 //
 // Whether the robot itself is armed is another matter, which ~/arm and /diagnostics are for. A run was configured
 // before its node was there, and cannot be without: there is no cleaning up.
@@ -49,6 +51,7 @@ class RosLifecycle {
   [[nodiscard]] Expected<void> serve_looks();
   void change(const ChangeState::Request& request, const gate::ros::Answer<ChangeState>& answer);
   void deactivate();
+  void recall();
   void ask(const char* operation);
   void become(std::uint8_t state, std::uint8_t transition);
   void end(bool success, std::uint8_t state);

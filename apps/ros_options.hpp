@@ -13,13 +13,15 @@ namespace pons::apps {
 
 struct RosOptions {
   bool on = false;
-  std::string domain, interface = "lo", space = "/", name = "pons";
+  std::string domain, space = "/", name = "pons";
+  std::optional<std::string> interface;  // none is named: loopback
   std::vector<std::string> remaps;
 };
 void add_ros_options(CLI::App& command, RosOptions& options);
 
-// Nothing: not asked for. Errors: no domain (of the option or, without, of ROS_DOMAIN_ID), no name, no remapping;
-// a discovery server is named.
+// Nothing: not asked for. A variable by which nodes of ROS 2 are met from other computers, where no interface is named,
+// becomes a note for people. Errors: no domain (of the option or, without, of ROS_DOMAIN_ID), no name, no remapping; a
+// discovery server is named.
 [[nodiscard]] Expected<std::optional<gate::ros::NodeSettings>> ros_settings(const RosOptions& options);
 
 // For people, at once, --quiet or not.

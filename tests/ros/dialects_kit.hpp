@@ -16,7 +16,10 @@
 #include "apps/ros_node.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/gate/ros/test_nodes.hpp"
+#include "pons/link/message.hpp"
+#include "pons/runner/arming.hpp"
 #include "pons/runner/health.hpp"
+#include "pons/runner/skill_port.hpp"
 #include "pons/world/test_folder.hpp"
 #include "pons/world/world.hpp"
 
@@ -143,8 +146,9 @@ class Dialects : public ::testing::Test {
     const auto speaks = ros_->speak(world_.dialects, skills_);
     ASSERT_TRUE(speaks) << speaks.error().line();
     ros_->start();
-    desk_ = std::make_unique<Desk>(ros_->visitors(nullptr), *bridge_, *journal_, std::vector<runner::Arming*>{},
-                                   health_, [] { return nullptr; });
+    arming_ = std::make_unique<runner::Arming>(*bridge_, port_, world_.zones, runner::Recovery::kRefused);
+    desk_ = std::make_unique<Desk>(ros_->visitors(nullptr), *bridge_, *journal_, std::vector{arming_.get()}, health_,
+                                   [] { return nullptr; });
   }
   // As if it were killed.
   void close() {
@@ -191,6 +195,10 @@ class Dialects : public ::testing::Test {
   std::unique_ptr<bridge::Journal> journal_;
   std::unique_ptr<bridge::Bridge> bridge_;
   std::unique_ptr<RosNode> ros_;
+  // Of a robot of which nothing but its state is known.
+  const link::State state_;
+  const runner::SkillPort port_{.state = [this]() -> const link::State& { return state_; }};
+  std::unique_ptr<runner::Arming> arming_;
   std::unique_ptr<Desk> desk_;
   std::unique_ptr<Node> node_ = gate::ros::test_node("others");
 };

@@ -287,6 +287,8 @@ TEST(RosOptions, WhatCannotBeIsRefused) {
   EXPECT_THAT(refused({"--ros", "--ros-domain", "233"}), HasSubstr("--ros-domain: '233' is no domain"));
   EXPECT_THAT(refused({"--ros", "--ros-interface", "no_such0"}), HasSubstr("'no_such0' is no network interface"));
   EXPECT_THAT(refused({"--ros", "--ros-node", "my-node"}), HasSubstr("'my-node' is no name"));
+  EXPECT_THAT(refused({"--ros", "--ros-remap=__name:=" + std::string(256, 'n')}), HasSubstr("has 256 characters"));
+  EXPECT_THAT(refused({"--ros", "--ros-node", std::string(240, 'n')}), HasSubstr("/submit_task' has 253 characters"));
   EXPECT_THAT(refused({"--ros", "--ros-remap", "a"}), HasSubstr("'a' is no remapping"));
   EXPECT_THAT(refused({"--ros"}, {"ROS_DISCOVERY_SERVER=127.0.0.1:11811"}),
               AllOf(HasSubstr("ROS_DISCOVERY_SERVER"), HasSubstr("'127.0.0.1:11811'"), HasSubstr("unset it")));

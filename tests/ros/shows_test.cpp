@@ -113,7 +113,7 @@ TEST_F(RosRun, TellsHowItsPartsFareAndWhatPeopleShouldKnow) {
   };
   ASSERT_TRUE(asked<SubmitTask>("/pons/submit_task", {.task = kWaits}));
   ASSERT_TRUE(asked<CommandTask>("/pons/command_task", {.id = "watch", .verb = CommandTask::Request::CANCEL}));
-  // What was said before this node was there is told, too.
+  // What was said in the ten seconds before this node was there is told, too.
   EXPECT_TRUE(spun([&] { return said("armed") && said("task watch: CANCELLED") && parts.contains("pons: bridge"); }));
   for (const Log& line : lines) EXPECT_EQ(line.name, "pons");
   EXPECT_EQ(parts["pons: bridge"].hardware_id, "small_cell");
@@ -333,9 +333,10 @@ TEST_F(RosRun, IsDeactivatedActivatedAndShutDown) {
   ASSERT_TRUE(taken);
   EXPECT_TRUE(taken->ok) << taken->error;
   EXPECT_TRUE(change(Transition::TRANSITION_ACTIVE_SHUTDOWN));
+  EXPECT_TRUE(spun([&] { return !went.empty() && went.back() == "finalized"; }));
   const tests::Finished finished = run_.wait();
   EXPECT_EQ(finished.code, 130) << finished.err;
-  EXPECT_THAT(went, IsSupersetOf({"deactivating", "inactive", "activating", "active"}));
+  EXPECT_THAT(went, IsSupersetOf({"deactivating", "inactive", "activating", "active", "shuttingdown"}));
   EXPECT_THAT(story("watch"), AllOf(HasSubstr("paus"), HasSubstr("continued"), HasSubstr("CANCELLED")));
 }
 

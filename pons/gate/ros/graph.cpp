@@ -37,7 +37,8 @@ Guid from_gid(const Gid& gid) {
 }
 
 template <typename Info>
-std::vector<std::byte> announce(const NodeName& node, const Guid& participant, const std::vector<Endpoint>& endpoints) {
+Expected<std::vector<std::byte>> announce(const NodeName& node, const Guid& participant,
+                                          const std::vector<Endpoint>& endpoints) {
   Info info;
   info.gid = to_gid<decltype(info.gid)>(participant);
   auto& entry = info.node_entities_info_seq.emplace_back();
@@ -46,7 +47,7 @@ std::vector<std::byte> announce(const NodeName& node, const Guid& participant, c
   for (const Endpoint& each : endpoints)
     (each.writes ? entry.writer_gid_seq : entry.reader_gid_seq).push_back(to_gid<decltype(info.gid)>(each.guid));
   std::vector<std::byte> bytes;
-  (void)wire::encode(info, bytes);  // names are shorter than its bounds: node_name() and the sequences have none
+  if (const auto encoded = wire::encode(info, bytes); !encoded) return std::unexpected(encoded.error());
   return bytes;
 }
 
@@ -97,6 +98,7 @@ void Graph::heard(const Heard& heard) {
     case Heard::Kind::kReader:
       if (participant_of(heard.guid) == participant_) return;  // Fast DDS tells of ours, too
       if (others_.size() >= kEndpointsMost) return warn(fmt::format("more than {} endpoints", kEndpointsMost));
+      recognise(heard);
       Endpoint other{.guid = heard.guid,
                      .writes = heard.kind == Heard::Kind::kWriter,
                      .topic = heard.topic,
@@ -178,6 +180,14 @@ Expected<void> Graph::told(std::span<const std::byte> message, const SampleId& i
   return {};
 }
 
+// Who tells of a type's hash there is of Iron or later, and reads that form. What he says himself comes later, by up to
+// a tenth of a second, and who lists the nodes on the command line waits for half of one.
+void Graph::recognise(const Heard& endpoint) {
+  if (endpoint.topic != kDiscoveryTopic || value_of(endpoint.user_data, "typehash").empty()) return;
+  if (peers_.size() >= kPeersMost) return;
+  if (peers_.try_emplace(participant_of(endpoint.guid), Peer{.form = Form::kJazzy}).second) choose_form();
+}
+
 void Graph::learn(const Guid& participant, Peer peer) {
   if (peers_.size() >= kPeersMost && !peers_.contains(participant))
     return warn(fmt::format("more than {} participants", kPeersMost));
@@ -217,7 +227,7 @@ void Graph::choose_form() {
   form_ = form;
 }
 
-std::vector<std::byte> Graph::announcement() const {
+Expected<std::vector<std::byte>> Graph::announcement() const {
   return form_ == Form::kJazzy ? announce<Jazzy>(node_, participant_, own_)
                                : announce<Humble>(node_, participant_, own_);
 }

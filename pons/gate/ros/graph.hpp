@@ -44,8 +44,8 @@ class Graph {
   // A message of ros_discovery_info. Error: it is of neither form.
   [[nodiscard]] Expected<void> told(std::span<const std::byte> message, const SampleId& id);
 
-  // What we tell, with the encapsulation.
-  [[nodiscard]] std::vector<std::byte> announcement() const;
+  // What we tell, with the encapsulation. Error: the node is called otherwise than node_name() lets it be.
+  [[nodiscard]] Expected<std::vector<std::byte>> announcement() const;
   // True once after what we tell, or how, has changed.
   [[nodiscard]] bool take_changed() { return std::exchange(changed_, false); }
   // Jazzy's where there is somebody who reads that, and nobody who reads Humble's; else Humble's, which harms nobody:
@@ -78,6 +78,7 @@ class Graph {
   [[nodiscard]] std::string owner_of(const Guid& endpoint) const;
   void learn(const Guid& participant, Peer peer);
   void compare_named(const Node& node, const std::vector<Node>& before);
+  void recognise(const Heard& endpoint);
   void choose_form();
   void warn(std::string_view text);
 

@@ -7,12 +7,17 @@
 #include <charconv>
 #include <utility>
 
+#include "pons/task/json_text.hpp"
+
 namespace pons::gate::ros {
 namespace {
 
 constexpr std::uint32_t kDomainsMost = 232;
 constexpr std::string_view kDdsPart = "::dds_::";
 constexpr std::string_view kFormOnly = "_humble";
+constexpr std::array<std::string_view, 2> kOtherForms{"nav2_msgs_humble", "rmw_dds_common_humble"};  // ros2/interfaces
+// In characters, as rmw has them (rmw/validate_node_name.h, validate_namespace.h, validate_full_topic_name.h).
+constexpr std::size_t kNodeNameMost = 255, kSpaceMost = 245, kNameMost = 247;
 constexpr std::array<std::pair<Use, std::string_view>, 3> kPrefixes{
     {{Use::kTopic, "rt"}, {Use::kRequest, "rq"}, {Use::kReply, "rr"}}};
 
@@ -38,6 +43,13 @@ bool is_absolute(std::string_view name) {
 std::unexpected<Error> no_name(std::string_view text) {
   return fail(fmt::format("'{}' is no name", text), "ROS 2 name",
               "parts of letters, digits and underscores that begin with no digit, divided by single slashes");
+}
+
+// What no node of ROS 2 can be called, or ask for.
+std::unexpected<Error> too_long(std::string_view text, std::size_t most) {
+  constexpr std::size_t kShown = 300;
+  return fail(fmt::format("'{}' has {} characters", task::excerpt(text, kShown), text.size()), "ROS 2 name",
+              fmt::format("{} are the most: shorten it, or the names that it is made of", most));
 }
 
 // "{node}" and the like replaced; empty: an unknown one.
@@ -75,6 +87,8 @@ Expected<NodeName> node_name(std::string space, std::string name) {
   if (space.empty()) space.push_back('/');
   if (space != "/" && !is_absolute(space)) return no_name(space);
   if (!is_token(name)) return no_name(name);
+  if (space.size() > kSpaceMost) return too_long(space, kSpaceMost);
+  if (name.size() > kNodeNameMost) return too_long(name, kNodeNameMost);
   return NodeName{std::move(space), std::move(name)};
 }
 
@@ -88,10 +102,11 @@ Expected<std::string> expanded(std::string_view name, const NodeName& node, cons
     full = under(node.space, full);
   }
   if (!is_absolute(full)) return no_name(name);
-  if (const auto whole = remaps.find(full); whole != remaps.end()) return whole->second;
+  if (const auto whole = remaps.find(full); whole != remaps.end()) return whole->second;  // looked at by add_remap()
   const std::size_t action_end = std::min(full.find(kActionPart), full.size());
   if (const auto action = remaps.find(std::string_view(full).substr(0, action_end)); action != remaps.end())
     full.replace(0, action_end, action->second);
+  if (full.size() > kNameMost) return too_long(full, kNameMost);
   return full;
 }
 
@@ -118,7 +133,7 @@ std::string wire_type(std::string_view type) {
   const std::size_t package_end = type.find('/');
   const std::size_t kind_end = type.find('/', package_end + 1);
   std::string_view package = type.substr(0, package_end);
-  if (package.ends_with(kFormOnly)) package.remove_suffix(kFormOnly.size());
+  if (std::ranges::find(kOtherForms, package) != kOtherForms.end()) package.remove_suffix(kFormOnly.size());
   return fmt::format("{}::{}{}{}_", package, type.substr(package_end + 1, kind_end - package_end - 1), kDdsPart,
                      type.substr(kind_end + 1));
 }

@@ -21,7 +21,7 @@ struct NodeName {
 };
 
 // Error: the namespace is not absolute or a part of either is empty, begins with a digit, or has another character than
-// letters, digits and underscores.
+// letters, digits and underscores; either is longer than other nodes may be called, 255 and 245 characters.
 [[nodiscard]] Expected<NodeName> node_name(std::string space, std::string name);
 
 // What stands between an action's name and those of its services and topics.
@@ -32,7 +32,7 @@ inline constexpr std::string_view kActionPart = "/_action/";
 using Remaps = std::map<std::string, std::string, std::less<>>;
 
 // The absolute name of "scan", "/scan", "~/scan", "{node}/scan" or "{ns}/scan" for that node, remapped. Error: no such
-// name, as for node_name().
+// name, as for node_name(); it is longer than others may ask for, 247 characters.
 [[nodiscard]] Expected<std::string> expanded(std::string_view name, const NodeName& node, const Remaps& remaps);
 
 // Of rules as ROS 2 writes them, "from:=to". Error: another form, a name that is none, two rules for one name.
@@ -41,8 +41,8 @@ using Remaps = std::map<std::string, std::string, std::less<>>;
 // On the wire; of an absolute name.
 enum class Use : std::uint8_t { kTopic, kRequest, kReply };
 [[nodiscard]] std::string wire_topic(std::string_view name, Use use);
-// "std_msgs/msg/String" → "std_msgs::msg::dds_::String_". An ending of a package's name that tells only which form of
-// it is meant, "_humble", is not part of the name.
+// "std_msgs/msg/String" → "std_msgs::msg::dds_::String_". Of the packages that ros2/interfaces has in two forms the
+// ending that tells which one is meant, "_humble", is not part of the name; of anybody else's it is.
 [[nodiscard]] std::string wire_type(std::string_view type);
 
 // Back again; empty: it is none of ROS 2's.

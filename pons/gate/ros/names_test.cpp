@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <string>
+
 namespace pons::gate::ros {
 namespace {
 
@@ -27,6 +30,25 @@ TEST(RosNames, WhatIsNoneIsRefused) {
   EXPECT_FALSE(node_name("/cell", ""));
   EXPECT_EQ(node_name("", "pons").value(), (NodeName{"/", "pons"}));
   EXPECT_NE(expanded("a-b", kNode, {}).error().line().find("'a-b'"), std::string::npos);
+}
+
+TEST(RosNames, AreNoLongerThanOthersMayAskFor) {
+  const auto of = [](std::size_t length) { return std::string(length, 'n'); };
+  EXPECT_TRUE(node_name("/", of(255)));
+  EXPECT_FALSE(node_name("/", of(256)));
+  EXPECT_TRUE(node_name("/" + of(244), "pons"));
+  EXPECT_FALSE(node_name("/" + of(245), "pons"));
+  EXPECT_TRUE(expanded("/" + of(246), kNode, {}));
+  const auto longer = expanded("/" + of(247), kNode, {});
+  ASSERT_FALSE(longer);
+  EXPECT_NE(longer.error().line().find("has 248 characters; 247 are the most"), std::string::npos);
+  // As it stands in its namespace, and by its other name.
+  EXPECT_TRUE(expanded(of(241), kNode, {}));
+  EXPECT_FALSE(expanded(of(242), kNode, {}));
+  Remaps remaps;
+  ASSERT_TRUE(add_remap("/go:=/" + of(230), kNode, remaps));
+  EXPECT_TRUE(expanded("/go/_action/status", kNode, remaps));
+  EXPECT_FALSE(expanded("/go/_action/send_goal", kNode, remaps));
 }
 
 TEST(RosNames, RulesRemap) {
@@ -62,6 +84,16 @@ TEST(RosNames, OnTheWireAndBack) {
   EXPECT_EQ(ros_type("std_msgs::msg::dds_::String_"), "std_msgs/msg/String");
   for (const std::string_view other : {"ShapeType", "a::dds_::B_", "a::msg::dds_::B", ""})
     EXPECT_EQ(ros_type(other), "") << other;
+}
+
+// A package of somebody's own may end so, too.
+TEST(RosNames, OnlyAFormOfOursIsCalledWithoutItsEnding) {
+  EXPECT_EQ(wire_type("nav2_msgs_humble/action/A_Goal"), "nav2_msgs::action::dds_::A_Goal_");
+  EXPECT_EQ(wire_type("turtle_humble/msg/Pose"), "turtle_humble::msg::dds_::Pose_");
+  for (const auto& package : std::filesystem::directory_iterator("ros2/interfaces")) {
+    const std::string name = package.path().filename();
+    EXPECT_EQ(wire_type(name + "/msg/A"), name.substr(0, name.find("_humble")) + "::msg::dds_::A_");
+  }
 }
 
 TEST(RosNames, DomainsAreThoseThatHavePorts) {

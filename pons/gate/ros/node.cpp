@@ -31,6 +31,7 @@ Expected<std::unique_ptr<Node>> Node::open(const NodeSettings& settings, const J
 }
 
 Expected<void> Node::join(const Join& join) {
+  if (auto named = node_name(settings_.name.space, settings_.name.name); !named) return std::unexpected(named.error());
   auto participant = join(settings_.participant, [this] { wake(); });
   if (!participant) return std::unexpected(participant.error());
   participant_ = std::move(*participant);
@@ -57,8 +58,9 @@ std::int64_t Node::stamp_ns() const {
 
 void Node::announce() {
   while (graph_.take_changed()) {
-    if (const auto written = discovery_writer_->write(graph_.announcement()); !written)
-      warnings_.push_back(written.error().line());
+    const auto told = graph_.announcement();
+    const auto written = told ? discovery_writer_->write(*told) : std::unexpected(told.error());
+    if (!written) warnings_.push_back(written.error().line());
   }
 }
 

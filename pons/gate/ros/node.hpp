@@ -30,6 +30,7 @@ struct NodeSettings {
   ParticipantSettings participant;
   NodeName name{"/", "pons"};
   Remaps remaps;
+  std::vector<std::string> notes;  // for people, a line each, before anything else: Node::take_warnings()
 };
 
 // What a node does at each spin(), besides topics: a service that waits for whom it answers, and the like.
@@ -65,7 +66,7 @@ class Publisher {
 
 class Node {
  public:
-  // Errors: those of Participant::join(), or of what takes its place.
+  // Errors: those of node_name(), and of Participant::join(), or of what takes its place.
   [[nodiscard]] static Expected<std::unique_ptr<Node>> open(const NodeSettings& settings,
                                                             const Join& join = Participant::join);
   Node(const Node&) = delete;
@@ -117,7 +118,8 @@ class Node {
 
   [[nodiscard]] const Graph& graph() const { return graph_; }
   [[nodiscard]] const NodeName& name() const { return settings_.name; }
-  // What people should know, a line each: Graph::take_warnings(), and what came and cannot be read.
+  // What people should know, a line each: its settings' notes, Graph::take_warnings(), and what came and cannot be
+  // read.
   [[nodiscard]] std::vector<std::string> take_warnings();
 
   // ---- for services and actions ----
@@ -203,7 +205,8 @@ class Node {
     std::optional<Subscription<T>> opened_;
   };
 
-  explicit Node(const NodeSettings& settings, Descriptor wake) : settings_(settings), wake_(std::move(wake)) {}
+  explicit Node(const NodeSettings& settings, Descriptor wake)
+      : settings_(settings), wake_(std::move(wake)), warnings_(settings.notes) {}
   [[nodiscard]] Expected<void> join(const Join& join);
   [[nodiscard]] Expected<EndpointName> endpoint_name(std::string_view name, Use use, std::string_view type,
                                                      std::string_view hash, std::string_view user_data) const;

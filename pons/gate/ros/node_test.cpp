@@ -70,6 +70,24 @@ TEST(RosNode, WhoComesLaterHearsWhatIsLatched) {
   EXPECT_EQ(heard, "before anybody came");
 }
 
+// A line of the log that is hours old is no news to who comes now.
+TEST(RosNode, WhoComesLaterHearsNothingThatHasOutlivedItsTime) {
+  EXPECT_EQ(kRosoutQos.lifespan, std::chrono::seconds(10)) << "as rcl has it";
+  const auto here = test_node("here");
+  Qos brief = kRosoutQos;
+  brief.lifespan = std::chrono::milliseconds(1);
+  auto publisher = here->advertise<String>("log", brief);
+  ASSERT_TRUE(publisher);
+  ASSERT_TRUE(publisher->publish({"old"}));
+  const auto there = test_node("there");
+  std::vector<std::string> heard;
+  ASSERT_TRUE(there->subscribe<String>("log", kRosoutQos, [&](const String& text) { heard.push_back(text.data); }));
+  ASSERT_TRUE(spin_until({here.get(), there.get()}, [&] { return publisher->matched() == 1; }));
+  EXPECT_TRUE(spin_until({here.get(), there.get()}, [&] { return publisher->publish({"new"}) && !heard.empty(); }));
+  ASSERT_FALSE(heard.empty());
+  EXPECT_EQ(heard.front(), "new");
+}
+
 TEST(RosNode, AMegabyteArrivesWhole) {
   const auto here = test_node("here"), there = test_node("there");
   auto publisher = here->advertise<Image>("image");
@@ -160,6 +178,12 @@ TEST(RosNode, RulesThatRenameNothingAreNamed) {
   EXPECT_THAT((*here)->take_warnings(), ElementsAre(HasSubstr("/scan:=/left/scan")));
 }
 
+TEST(RosNode, TellsWhatItsSettingsNote) {
+  const auto here = Node::open({.participant = {.domain = test_domain()}, .notes = {"a note"}});
+  ASSERT_TRUE(here);
+  EXPECT_THAT((*here)->take_warnings(), ElementsAre("a note"));
+}
+
 TEST(RosNode, WhatCannotBeReadIsToldAndTheNextIsHeard) {
   const auto here = test_node("here"), there = test_node("there");
   // Of the name and the hash of one type, and the bytes of another.
@@ -201,6 +225,9 @@ TEST(RosNode, BadSettingsAreRefused) {
   const auto away = Node::open({.participant = {.domain = test_domain(), .interface = "no_such0"}});
   ASSERT_FALSE(away);
   EXPECT_THAT(away.error().line(), AllOf(HasSubstr("no_such0"), HasSubstr("lo (127.0.0.1)")));
+  const auto nameless = Node::open({.participant = {.domain = test_domain()}, .name = {"/", std::string(256, 'n')}});
+  ASSERT_FALSE(nameless);
+  EXPECT_THAT(nameless.error().line(), HasSubstr("has 256 characters"));
   const auto here = test_node("here");
   EXPECT_FALSE(here->advertise<String>("2d"));
   auto text = here->advertise<String>("chatter");

@@ -329,6 +329,7 @@ class FastParticipant final : public Participant, dds::DomainParticipantListener
       wanted.publish_mode().flow_controller_name = kFlow;
     }
     wanted.reliable_writer_qos().times.heartbeatPeriod = Duration_t(0, kRepeatAfterNs);
+    if (qos.lifespan.count() > 0) wanted.lifespan().duration = Duration_t(1e-3L * qos.lifespan.count());
     auto writer = std::make_unique<FastWriter>(*publisher_, **topic, wanted, inbox_);
     if (!writer->made()) return not_made(name);
     return writer;

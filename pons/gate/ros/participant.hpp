@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -37,6 +38,8 @@ struct Qos {
   Durability durability = Durability::kVolatile;
   int depth = 10;  // samples kept; 0: all
   PublishMode publish_mode = PublishMode::kSynchronous;
+  // Of what a writer keeps: who comes so long after it was said is not told it any more. 0: for as long as it is kept.
+  std::chrono::milliseconds lifespan{0};
   bool operator==(const Qos&) const = default;
 };
 
@@ -46,7 +49,8 @@ inline constexpr Qos kTopicQos{};
 inline constexpr Qos kServiceQos{.depth = 1000};
 inline constexpr Qos kSensorQos{.reliability = Qos::Reliability::kBestEffort, .depth = 5};
 inline constexpr Qos kParametersQos{.depth = 1000};
-inline constexpr Qos kRosoutQos{.durability = Qos::Durability::kTransientLocal, .depth = 1000};
+inline constexpr Qos kRosoutQos{
+    .durability = Qos::Durability::kTransientLocal, .depth = 1000, .lifespan = std::chrono::seconds(10)};
 inline constexpr Qos kLatchedQos{.durability = Qos::Durability::kTransientLocal, .depth = 1};
 
 // Which sample of which writer.

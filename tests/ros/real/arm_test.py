@@ -137,6 +137,15 @@ class Arm(unittest.TestCase):
         for package in ("bridge_layer", "brain_interface", "cerebellum_interface", "universal_robot_core"):
             self.assertTrue([kind for kind in compared if kind.startswith(package)], package)
 
+    def test_its_log_is_kept_as_long_as_that_of_others(self):
+        def qualities(name):
+            return [each.qos_profile for each in self.peer.node.get_publishers_info_by_topic("/rosout")
+                    if each.node_name == name]
+        theirs = self.peer.until("its log", lambda: qualities("pons"))[0]
+        ours = self.peer.until("our log", lambda: qualities(self.peer.node.get_name()))[0]
+        for quality in ("reliability", "durability", "lifespan"):
+            self.assertEqual(getattr(ours, quality), getattr(theirs, quality), quality)
+
     def test_joint_states_come_a_hundred_a_second_with_the_stamps_of_its_clock(self):
         self.peer.until("/clock", lambda: self.peer.node.get_clock().now().nanoseconds > 0)
         ages = []
