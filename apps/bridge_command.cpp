@@ -110,7 +110,8 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   if (!ros) return bad_input(ros.error());
   auto facts = facts_of(options);
   if (auto kept = keep_faults(facts, world, options.faults); !kept) return bad_input(kept.error());
-  const auto along = RunAlong::begin(options.record, options.foxglove, Earlier::kFollowed, facts, world, nullptr);
+  const auto along =
+      RunAlong::begin(options.record, options.foxglove, Earlier{.body = border.body}, facts, world, nullptr);
   if (!along) return bad_input(along.error());
   BrainFaults faults(plan, options.parcels.seed);
   const BridgeOptions half_options{

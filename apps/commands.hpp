@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pons/core/error.hpp"
@@ -52,7 +53,11 @@ void add_completion(CLI::App& app, Chosen& chosen);
 // A line for a person, on stdout or stderr. Never throws.
 void say(std::FILE* out, const std::string& text);
 
-// Print "pons: <line>" on the error stream.
+// What came from elsewhere (a file, its name, another program), for a person's terminal: what would tell that what to
+// do (control characters, those of ISO 8859 among them, and line feeds) is '?', and so are bytes that are no UTF-8.
+[[nodiscard]] std::string plain(std::string_view text);
+
+// Print "pons: <line>" on the error stream, plain.
 int bad_input(const Error& error);
 int bad_run(const Error& error);
 

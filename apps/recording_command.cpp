@@ -12,6 +12,7 @@
 
 #include "apps/commands.hpp"
 #include "apps/run_facts.hpp"
+#include "apps/run_kit.hpp"
 #include "pons/record/export.hpp"
 #include "pons/record/mcap_check.hpp"
 #include "pons/record/mcap_reader.hpp"
@@ -42,13 +43,39 @@ struct Row {
 };
 using Rows = std::map<std::pair<std::string, std::string>, Row>;  // topic, type
 
-// What a file says of itself must not write to the terminal what it likes.
-std::string plain(std::string text) {
-  for (char& each : text) {
-    if (static_cast<unsigned char>(each) < ' ' || each == '\x7F') each = '?';
+constexpr const char* kInterrupted = "interrupted";
+
+// A recording until somebody says Ctrl-C: whoever reads it hears then what he would hear of a broken disk, and leaves
+// nothing half-written, either.
+class Interruptible final : public record::Source {
+ public:
+  explicit Interruptible(std::unique_ptr<record::Source> of) : of_(std::move(of)) {}
+  [[nodiscard]] std::uint64_t size() const override { return of_->size(); }
+  [[nodiscard]] std::string name() const override { return of_->name(); }
+  [[nodiscard]] Expected<void> read(std::uint64_t at, std::span<std::byte> into) const override {
+    if (interrupted()) return fail(kInterrupted, name());
+    return of_->read(at, into);
   }
-  return text;
+
+ private:
+  std::unique_ptr<record::Source> of_;
+};
+
+Expected<std::unique_ptr<record::Source>> source_of(const fs::path& file) {
+  auto source = record::open_file(file);
+  if (!source) return source;
+  return std::make_unique<Interruptible>(*std::move(source));
 }
+
+Expected<std::unique_ptr<McapReader>> reader_of(const fs::path& file) {
+  auto source = source_of(file);
+  if (!source) return std::unexpected(source.error());
+  return McapReader::open(*std::move(source));
+}
+
+// A line for a person: what a file says of itself, and its name, must not write to the terminal what it likes.
+void tell(std::FILE* out, std::string_view line) { say(out, plain(line) + "\n"); }
+void warn(std::string_view line) { tell(stderr, fmt::format("pons: {}", line)); }
 
 std::string megabytes(std::uint64_t bytes) { return fmt::format("{:.1f} MB", 1e-6 * static_cast<double>(bytes)); }
 
@@ -84,7 +111,7 @@ Expected<mcap::Texts> drops_of(const McapReader& reader) {
   return std::move(metadata->texts);
 }
 
-Expected<Rows> rows_of(const McapReader& reader) {
+Rows rows_of(const McapReader& reader) {
   const record::Contents& contents = reader.contents();
   Rows rows;
   for (const auto& [id, channel] : contents.channels) {
@@ -94,8 +121,9 @@ Expected<Rows> rows_of(const McapReader& reader) {
         found == contents.statistics.channel_messages.end() ? 0 : found->second;
   }
   const auto drops = drops_of(reader);
-  if (!drops) return std::unexpected(drops.error());
-  for (const auto& [name, count] : *drops) {
+  // All the rest can be shown without.
+  if (!drops) warn(fmt::format("how many were dropped is not known: {}", drops.error().line()));
+  for (const auto& [name, count] : drops.value_or(mcap::Texts{})) {
     const std::string topic = plain(name);
     const auto row = std::ranges::find_if(rows, [&](const auto& each) { return each.first.first == topic; });
     auto& dropped = row == rows.end() ? rows[{topic, "-"}].dropped : row->second.dropped;
@@ -132,22 +160,22 @@ std::string run_line(const RecordedRun& run) {
   const RunFacts& facts = run.facts;
   const auto count = parcels_of(facts);
   const std::string parcels = count ? fmt::format(", {} parcel{}", *count, *count == 1 ? "" : "s") : "";
-  return plain(fmt::format("run of {}, seed {}{}, {}: {}", facts.world, facts.seed, parcels, pace_of(facts),
-                           run.ended.empty() ? "its end is not in this file" : run.ended));
+  return fmt::format("run of {}, seed {}{}, {}: {}", facts.world, facts.seed, parcels, pace_of(facts),
+                     run.ended.empty() ? "its end is not in this file" : run.ended);
 }
 
 wire::Json run_json(const RecordedRun& run) {
   const RunFacts& facts = run.facts;
-  wire::Json json{{"world", facts.world}, {"seed", facts.seed}, {"pace", pace_of(facts)}};
+  wire::Json json{{"world", plain(facts.world)}, {"seed", facts.seed}, {"pace", pace_of(facts)}};
   const auto parcels = parcels_of(facts);
   json["parcels"] = parcels ? wire::Json(*parcels) : wire::Json();
-  json["ended"] = run.ended.empty() ? wire::Json() : wire::Json(run.ended);
+  json["ended"] = run.ended.empty() ? wire::Json() : wire::Json(plain(run.ended));
   return json;
 }
 
 // Where it is not whole, what is shown is what can be read.
 void show_damage(const record::Contents& contents, const std::string& file) {
-  if (contents.damage) say(stderr, fmt::format("pons: {}\n", contents.damage->error(file).line()));
+  if (contents.damage) warn(contents.damage->error(file).line());
 }
 
 int show_json(const McapReader& reader, const Rows& rows) {
@@ -160,8 +188,8 @@ int show_json(const McapReader& reader, const Rows& rows) {
   const wire::Json json{{"file", reader.source().name()},
                         {"bytes", reader.source().size()},
                         {"finished", contents.finished},
-                        {"profile", contents.header.profile},
-                        {"library", contents.header.library},
+                        {"profile", plain(contents.header.profile)},
+                        {"library", plain(contents.header.library)},
                         {"run", run ? run_json(*run) : wire::Json()},
                         {"start_ns", contents.statistics.start},
                         {"end_ns", contents.statistics.end},
@@ -173,39 +201,40 @@ int show_json(const McapReader& reader, const Rows& rows) {
   return kExitGood;
 }
 
-int info(const RecordingOptions& options) {
-  const auto reader = McapReader::open(options.file);
-  if (!reader) return bad_input(reader.error());
-  const record::Contents& contents = (*reader)->contents();
-  const auto rows = rows_of(**reader);
-  if (!rows) return bad_run(rows.error());
-  show_damage(contents, options.file.string());
-  if (options.json) return show_json(**reader, *rows);
-  const auto& statistics = contents.statistics;
-  say(stdout, fmt::format("{}: {}, {}\n", options.file.string(), contents.finished ? "finished" : "not finished",
-                          megabytes((*reader)->source().size())));
-  if (const auto run = run_of(**reader)) say(stdout, run_line(*run) + "\n");
-  if (statistics.messages > 0)
-    say(stdout,
-        fmt::format("{} to {}, {:.3f} s\n", moment(statistics.start), moment(statistics.end), span_s(statistics)));
-  say(stdout, fmt::format("{}; written by {}\n", compression_of(contents),
-                          contents.header.library.empty() ? "nobody that says so" : plain(contents.header.library)));
+void show_rows(const Rows& rows, double took_s) {
   std::size_t topic_width = 5, type_width = 4;
-  for (const auto& [key, row] : *rows) {
+  for (const auto& [key, row] : rows) {
     topic_width = std::max(topic_width, key.first.size());
     type_width = std::max(type_width, key.second.size());
   }
   say(stdout, fmt::format("\n{:<{}}  {:<{}}  {:>10}  {:>8}  {:>8}\n", "topic", topic_width, "type", type_width,
                           "messages", "a second", "dropped"));
-  for (const auto& [key, row] : *rows) {
-    const double took_s = span_s(statistics);
+  for (const auto& [key, row] : rows) {
     const std::string rate = took_s > 0 ? fmt::format("{:.1f}", static_cast<double>(row.messages) / took_s) : "-";
     say(stdout, fmt::format("{:<{}}  {:<{}}  {:>10}  {:>8}  {:>8}\n", key.first, topic_width, key.second, type_width,
                             row.messages, rate, row.dropped));
   }
+}
+
+int info(const RecordingOptions& options) {
+  const auto reader = reader_of(options.file);
+  if (!reader) return bad_input(reader.error());
+  const record::Contents& contents = (*reader)->contents();
+  const Rows rows = rows_of(**reader);
+  show_damage(contents, options.file.string());
+  if (options.json) return show_json(**reader, rows);
+  const auto& statistics = contents.statistics;
+  tell(stdout, fmt::format("{}: {}, {}", options.file.string(), contents.finished ? "finished" : "not finished",
+                           megabytes((*reader)->source().size())));
+  if (const auto run = run_of(**reader)) tell(stdout, run_line(*run));
+  if (statistics.messages > 0)
+    tell(stdout,
+         fmt::format("{} to {}, {:.3f} s", moment(statistics.start), moment(statistics.end), span_s(statistics)));
+  tell(stdout, fmt::format("{}; written by {}", compression_of(contents),
+                           contents.header.library.empty() ? "nobody that says so" : contents.header.library));
+  show_rows(rows, span_s(statistics));
   for (const auto& each : contents.attachments)
-    say(stdout,
-        fmt::format("attachment {} ({}, {} bytes)\n", plain(each.name), plain(each.media_type), each.data_size));
+    tell(stdout, fmt::format("attachment {} ({}, {} bytes)", each.name, each.media_type, each.data_size));
   return kExitGood;
 }
 
@@ -220,7 +249,7 @@ int cannot_make(Error error) {
 }
 
 int check(const RecordingOptions& options) {
-  const auto source = record::open_file(options.file);
+  const auto source = source_of(options.file);
   if (!source) return bad_input(source.error());
   const auto verdict = record::check(**source);
   if (!verdict) return bad_input(verdict.error());
@@ -229,14 +258,14 @@ int check(const RecordingOptions& options) {
     return kExitGood;
   }
   for (const record::Damage& each : verdict->damage)
-    say(stderr, fmt::format("pons: {}: byte {}: {}\n", options.file.string(), each.at, each.what));
-  if (verdict->further > 0) say(stderr, fmt::format("pons: and {} more\n", verdict->further));
+    warn(fmt::format("{}: byte {}: {}", options.file.string(), each.at, each.what));
+  if (verdict->further > 0) warn(fmt::format("and {} more", verdict->further));
   say(stdout, fmt::format("not whole; can be saved by pons recording repair: {}\n", held(*verdict)));
   return kExitBadRun;
 }
 
 int repair(const RecordingOptions& options) {
-  const auto source = record::open_file(options.file);
+  const auto source = source_of(options.file);
   if (!source) return bad_input(source.error());
   fs::path output = options.output;
   if (output.empty()) {
@@ -245,11 +274,11 @@ int repair(const RecordingOptions& options) {
   }
   if (auto repaired = record::repair(**source, output, options.overwriting()); !repaired)
     return cannot_make(repaired.error());
-  const auto made = record::open_file(output);
+  const auto made = source_of(output);
   if (!made) return bad_run(made.error());
   const auto verdict = record::check(**made);
   if (!verdict) return bad_run(verdict.error());
-  say(stdout, fmt::format("{}: {}\n", output.string(), held(*verdict)));
+  tell(stdout, fmt::format("{}: {}", output.string(), held(*verdict)));
   return kExitGood;
 }
 
@@ -258,7 +287,7 @@ int film(const RecordingOptions& options, const McapReader& reader) {
     return bad_input({"a film is of one topic", options.mp4.string(), "name it with --topic"});
   const auto filmed = record::export_mp4(reader, options.topics.front(), options.mp4, options.overwriting());
   if (!filmed) return cannot_make(filmed.error());
-  if (filmed->damage) say(stderr, fmt::format("pons: {}\n", filmed->damage->error(options.file.string()).line()));
+  if (filmed->damage) warn(filmed->damage->error(options.file.string()).line());
   say(stdout, fmt::format("{} pictures, {:.2f} a second\n", filmed->pictures, filmed->a_second));
   return filmed->damage ? kExitBadRun : kExitGood;
 }
@@ -271,6 +300,8 @@ constexpr std::string_view kNobodyReads = "nobody reads it any more";
 Expected<void> write_out(std::string_view lines) {
   while (!lines.empty()) {
     const ssize_t written = ::write(STDOUT_FILENO, lines.data(), lines.size());
+    // One that reads no more for now must not keep a person waiting who has had enough.
+    if (written < 0 && errno == EINTR && interrupted()) return fail(kInterrupted, "the standard output");
     if (written < 0 && errno == EINTR) continue;
     if (written < 0 && errno == EPIPE) return fail(std::string(kNobodyReads), "the standard output");
     if (written < 0)
@@ -289,7 +320,7 @@ Expected<record::Exported> export_texts(const RecordingOptions& options, const M
 }
 
 int export_it(const RecordingOptions& options) {
-  const auto reader = McapReader::open(options.file);
+  const auto reader = reader_of(options.file);
   if (!reader) return bad_input(reader.error());
   if (!options.mp4.empty()) return film(options, **reader);
   record::Query query;
@@ -298,15 +329,20 @@ int export_it(const RecordingOptions& options) {
   // A reader that has seen enough (head).
   if (!exported && exported.error().what == kNobodyReads) return kExitGood;
   if (!exported) return cannot_make(exported.error());
-  for (const auto& [topic, why] : exported->left_out)
-    say(stderr, fmt::format("pons: {} is left out: {}\n", plain(topic), plain(why)));
+  for (const auto& [topic, why] : exported->left_out) warn(fmt::format("{} is left out: {}", topic, why));
   if (exported->first_unreadable)
-    say(stderr, fmt::format("pons: {} messages left out; the first: {}\n", exported->unreadable,
-                            plain(exported->first_unreadable->line())));
-  if (exported->damage) say(stderr, fmt::format("pons: {}\n", exported->damage->error(options.file.string()).line()));
+    warn(fmt::format("{} messages left out; the first: {}", exported->unreadable, exported->first_unreadable->line()));
+  if (exported->damage) warn(exported->damage->error(options.file.string()).line());
   say(options.jsonl == kStandardOutput ? stderr : stdout, fmt::format("{} messages\n", exported->messages));
   const bool all = exported->unreadable == 0 && !exported->damage && (exported->left_out.empty() || !query.topics);
   return all ? kExitGood : kExitBadRun;
+}
+
+// What was done to its end before Ctrl-C came is done.
+int unless_interrupted(int (*run)(const RecordingOptions&), const RecordingOptions& options) {
+  watch_interrupts();
+  const int code = run(options);
+  return code != kExitGood && interrupted() ? kExitInterrupted : code;
 }
 
 }  // namespace
@@ -319,12 +355,14 @@ void add_recording(CLI::App& app, Chosen& chosen) {
   const auto add = [&](const char* name, const char* what, int (*run)(const RecordingOptions&)) {
     CLI::App* command = recording->add_subcommand(name, what);
     command->add_option("file", options->file, "An MCAP file, whoever wrote it")->required();
-    command->callback([options, run, &chosen] { chosen = [options, run] { return run(*options); }; });
+    command->callback(
+        [options, run, &chosen] { chosen = [options, run] { return unless_interrupted(run, *options); }; });
     return command;
   };
-  add("info", "Its topics, types, counts, duration and compression, and whether it was finished", info)
-      ->add_flag("--json", options->json, "The same for programs");
-  add("check", "Whether it is whole to the last byte, and what can be saved if not", check);
+  CLI::App* shows =
+      add("info", "Its topics, types, counts, duration and compression, and whether it was finished", info);
+  shows->add_flag("--json", options->json, "The same for programs");
+  CLI::App* checks = add("check", "Whether it is whole to the last byte, and what can be saved if not", check);
   CLI::App* mend = add("repair", "Write a whole one of all that can be read of it", repair);
   mend->add_option("--output", options->output, "The new file (FILE_repaired.mcap beside it)");
   mend->add_flag("--overwrite", options->overwrite, "The new file may replace one; also FILE itself");
@@ -336,12 +374,14 @@ void add_recording(CLI::App& app, Chosen& chosen) {
   auto* mp4 = tables->add_option("--mp4", options->mp4, "A film of a topic of compressed images, by ffmpeg");
   csv->excludes(jsonl);
   mp4->excludes(csv)->excludes(jsonl);
+  for (CLI::App* each : {shows, checks, mend, tables}) refuse_empty(*each);
+  // After that: a topic's name may be empty.
   tables->add_option("--topic", options->topics, "Only this one; may be given several times")->allow_extra_args(false);
   tables->add_flag("--overwrite", options->overwrite, "New files may replace others");
   tables->callback([options, &chosen] {
     if (options->csv.empty() && options->jsonl.empty() && options->mp4.empty())
       throw CLI::RequiredError("pons recording export: --csv DIR, --jsonl FILE or --mp4 FILE");
-    chosen = [options] { return export_it(*options); };
+    chosen = [options] { return unless_interrupted(export_it, *options); };
   });
 }
 

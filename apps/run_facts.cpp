@@ -14,6 +14,7 @@
 #include "apps/run_recorder.hpp"
 #include "apps/sweep/plan.hpp"
 #include "pons/core/digest.hpp"
+#include "pons/task/json_text.hpp"
 #include "pons/world/faults.hpp"
 
 namespace pons::apps {
@@ -106,8 +107,15 @@ class Reading {
   }
   template <typename T>
   T json(const std::string& key, T (*take)(const Json&)) {
+    // A list of objects, and in them tasks, which nest no deeper than any that is sent.
+    constexpr std::size_t kDeepest = 2 + static_cast<std::size_t>(task::kMaxJsonDepth);
+    const std::string written = text_or_none(key);
+    if (task::nests_deeper(written, kDeepest)) {
+      refuse(fmt::format("'{}' is nested deeper than {} levels", key, kDeepest));
+      return {};
+    }
     try {
-      return take(Json::parse(text_or_none(key).empty() ? "[]" : text_or_none(key)));
+      return take(Json::parse(written.empty() ? "[]" : written));
     } catch (const Json::exception&) {
       refuse(fmt::format("'{}' is of another form", key));
       return {};

@@ -15,6 +15,7 @@
 #include "pons/bridge/journal/place.hpp"
 #include "pons/core/digest.hpp"
 #include "pons/record/file.hpp"
+#include "pons/record/rotation.hpp"
 #include "pons/sim/truth.hpp"
 
 namespace pons::apps {
@@ -39,6 +40,24 @@ fs::path absolute_of(const fs::path& file) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(fs::absolute(file, error), error);
   return error ? file : whole;
+}
+
+// A recording may go on in further files even where nobody asked for several: after its disk was full.
+Expected<void> check_further_files(std::span<const FileOption> files) {
+  constexpr std::string_view kRecord = "--record";
+  const auto recording = std::ranges::find(files, kRecord, [](const FileOption& each) { return each.first; });
+  if (recording == files.end() || recording->second.empty()) return {};
+  const fs::path record = absolute_of(recording->second);
+  for (const auto& [option, file] : files) {
+    if (file.empty() || option == kRecord) continue;
+    const fs::path whole = absolute_of(file);
+    if (whole.parent_path() != record.parent_path() ||
+        !record::Rotation::number_of(whole.filename().string(), record.stem().string(), record::FirstFile::kPlain))
+      continue;
+    return fail(fmt::format("may become a further file of --record {}", recording->second.string()),
+                fmt::format("{} {}", option, file.string()), "name another file");
+  }
+  return {};
 }
 
 std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) {
@@ -139,6 +158,7 @@ Expected<void> check_files(std::span<const FileOption> files, std::span<const fs
                   "name another file");
     }
   }
+  if (auto further = check_further_files(files); !further) return further;
   for (const fs::path& file : written) {
     if (file.empty()) continue;
     if (auto possible = record::check_writable(file); !possible) return possible;

@@ -66,8 +66,8 @@ void refuse_empty(CLI::App& command);
 // A journal's; empty where it lies in a database.
 [[nodiscard]] std::filesystem::path file_of(const std::string& journal);
 
-// A command's files by option. Refused now rather than after the work: one file for two things, and among `written`
-// those that cannot be.
+// A command's files by option. Refused now rather than after the work: one file for two things, or one that --record
+// may come to write, and among `written` those that cannot be.
 using FileOption = std::pair<const char*, std::filesystem::path>;
 [[nodiscard]] Expected<void> check_files(std::span<const FileOption> files,
                                          std::span<const std::filesystem::path> written);

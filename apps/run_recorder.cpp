@@ -44,8 +44,10 @@ record::Topic topic_of(const ShownTopic& shown, std::string name) {
   return topic;
 }
 
+std::uint64_t mib_of(std::uint64_t bytes) { return (bytes + kMiB - 1) / kMiB; }
+
 Expected<record::RecorderOptions> recorder_options(const RecordOptions& options, runner::Pace pace,
-                                                   std::uint64_t keep_free) {
+                                                   std::uint64_t keep_free, std::span<const mcap::Metadata> notes) {
   const std::string where = "--record " + options.file.string();
   if (options.file.extension() != kEnding || options.file.stem().empty())
     return fail("is no name of a recording", where, "let it end with .mcap");
@@ -53,14 +55,20 @@ Expected<record::RecorderOptions> recorder_options(const RecordOptions& options,
   made.first = record::FirstFile::kPlain;
   made.queue_bytes = kQueueBytes;
   made.file_bytes = ~std::uint64_t{0};
+  // Notes are repeated in each file, and half of it is for what is new.
+  const std::uint64_t noted = record::size_of(notes), least_mib = mib_of(2 * noted);
   if (options.quota_mib > 0) {
     made.quota_bytes = options.quota_mib * kMiB;
-    made.file_bytes = std::max(kMiB, *made.quota_bytes / kFilesOfQuota);
+    made.file_bytes = std::max({kMiB, *made.quota_bytes / kFilesOfQuota, least_mib * kMiB});
   }
   if (options.file_mib > 0) made.file_bytes = options.file_mib * kMiB;
+  if (options.file_mib > 0 && options.file_mib < least_mib)
+    return fail(fmt::format("each file begins with what its run was made of, {} KiB, which is more than half of it",
+                            (noted + 1023) / 1024),
+                fmt::format("--record-file {}", options.file_mib), fmt::format("ask for {} at least", least_mib));
   if (made.quota_bytes && *made.quota_bytes / 2 < made.file_bytes)
     return fail("is less than two files take", fmt::format("--record-quota {}", options.quota_mib),
-                fmt::format("ask for {} at least", 2 * made.file_bytes / kMiB));
+                fmt::format("ask for {} at least", 2 * mib_of(made.file_bytes)));
   made.keep_free_bytes = kKeptFree * keep_free;
   made.writer.compression = mcap::Compression::kZstd;
   // The disk decides nothing in virtual time, nor does the loss of power matter much to it.
@@ -92,13 +100,15 @@ Expected<std::string> recorded_name(std::string_view topic) { return gate::ros::
 Expected<std::unique_ptr<RunRecorder>> RunRecorder::open(const RecordOptions& options, Earlier earlier,
                                                          runner::Pace pace, std::uint64_t keep_free,
                                                          std::vector<mcap::Metadata> notes) {
-  auto made = recorder_options(options, pace, keep_free);
+  auto made = recorder_options(options, pace, keep_free, notes);
   if (!made) return std::unexpected(made.error());
   made->notes = std::move(notes);
-  if (earlier == Earlier::kRefused) {
+  if (earlier.body) {
+    made->series = mcap::Metadata{std::string(kBodyName), {{"life", fmt::format("{:016x}", *earlier.body)}}};
+  } else {
     const auto there = record::Rotation::open(made->folder, made->name, made->first);
     if (!there) return std::unexpected(there.error());
-    if (!there->empty())
+    if (!there->at_first())
       return fail("there is a recording of that name already", options.file.string(),
                   "name another file for --record, or move its files away");
   }
@@ -190,9 +200,11 @@ std::string RunRecorder::line() const {
     dropped += topic.dropped;
     if (topic.dropped > 0) of += fmt::format("{}{} of {}", of.empty() ? "" : ", ", topic.dropped, topic.name);
   }
-  std::string line =
-      fmt::format("{}: {} messages, {:.1f} MB", file_.string(), written, 1e-6 * static_cast<double>(status.bytes));
-  if (status.files > 1) line += fmt::format(" in {} files", status.files - status.removed);
+  const auto& [files, bytes, first, last] = status.kept;
+  std::string line = files > 0 ? first.string() : file_.string();
+  if (files > 1) line += fmt::format(" to {}", last.filename().string());
+  line += fmt::format(": {} messages, {:.1f} MB", written, 1e-6 * static_cast<double>(bytes));
+  if (files > 1) line += fmt::format(" in {} files", files);
   if (status.removed > 0) line += fmt::format(", {} older ones removed", status.removed);
   if (dropped > 0) line += fmt::format("; {} dropped: {}", dropped, of);
   if (status.error) line += fmt::format("; at last: {}", status.error->line());

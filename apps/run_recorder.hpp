@@ -33,15 +33,19 @@ struct RecordOptions {
 };
 void add_record_options(CLI::App& command, RecordOptions& options);
 
-// What is done where a recording of that name is there already: a run's is refused, a bridge's goes on in further
-// files.
-enum class Earlier : std::uint8_t { kRefused, kFollowed };
+// What is done where a recording of that name is there already: a run's is refused; a bridge's goes on in further
+// files if bridges of the same body have recorded all of it, for it is one run with one clock, and is refused if not.
+struct Earlier {
+  std::optional<std::uint64_t> body;  // a bridge's
+  static const Earlier kRefused;
+};
+inline constexpr Earlier Earlier::kRefused{};
 
 class RunRecorder final : public Sink {
  public:
   // `keep_free`: bytes that the journal keeps free on its disk; twice as much is left on the recording's, which may be
   // the same. `notes` stand at the beginning of each file. Errors: no name of a recording; one that is there; the quota
-  // is too small; those of the recorder.
+  // is too small, or the files are for the notes; those of the recorder.
   [[nodiscard]] static Expected<std::unique_ptr<RunRecorder>> open(const RecordOptions& options, Earlier earlier,
                                                                    runner::Pace pace, std::uint64_t keep_free,
                                                                    std::vector<record::mcap::Metadata> notes);
@@ -69,7 +73,8 @@ class RunRecorder final : public Sink {
 
   // What people should know at once, a line each: recording has stopped, or goes on.
   [[nodiscard]] std::vector<std::string> take_warnings();
-  // What it came to, after end(): "F.mcap: 1200 messages, 3.4 MB; 17 dropped: …".
+  // What it came to, after end(): "F.mcap: 1200 messages, 3.4 MB; 17 dropped: …", or "F_2.mcap to F_4.mcap: …", the
+  // files that it has written and that are there.
   [[nodiscard]] std::string line() const;
 
  private:
@@ -95,6 +100,9 @@ class RunRecorder final : public Sink {
   bool closed_ = false;
   std::thread writes_;  // by the clock only
 };
+
+// The metadata with which each file of a bridge's recording begins; its key: life, the body's number.
+inline constexpr std::string_view kBodyName = "pons.body";
 
 // The metadata with which a recording says how its run ended; its keys: how ("complete", or why not), end_ns, and
 // interrupted_ns, when a person broke it off.

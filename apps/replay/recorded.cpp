@@ -116,8 +116,9 @@ bool RecordedMessages::read_one(const fs::path& file) {
     return goes_on;
   });
   if (!read) return cut(read.error().line());
-  if (!gap.empty()) return cut(gap);
+  // Before a gap: it is why something is missing.
   if (*read) return cut((*read)->error(file.string()).line());
+  if (!gap.empty()) return cut(gap);
   if (!(*reader)->contents().finished) return cut(fmt::format("{}: was not finished", file.string()));
   // What follows by its name is another run's.
   return goes_on && std::ranges::none_of((*reader)->contents().metadata,

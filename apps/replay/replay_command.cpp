@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "apps/commands.hpp"
@@ -14,6 +16,8 @@
 #include "apps/run_command.hpp"
 #include "apps/run_facts.hpp"
 #include "pons/record/mcap_reader.hpp"
+#include "pons/task/json_text.hpp"
+#include "pons/world/faults.hpp"
 
 namespace pons::apps {
 namespace {
@@ -46,8 +50,26 @@ class Inputs {
   int count_ = 0;
 };
 
+// A recording comes from anywhere: a plan is one that the world has, or the one whose text the recording has itself,
+// and no file of this machine that it names.
+Expected<std::string> faults_of(const RunFacts& facts, const world::World& world, Inputs& inputs) {
+  const std::string shown = task::excerpt(facts.faults);
+  if (facts.faults_file.empty()) {
+    const auto file = world::faults_file(world, facts.faults);
+    if (!file || *file != facts.faults) return facts.faults;
+    return fail(fmt::format("its plan of faults '{}' is none of the world's, nor in the recording", shown), "",
+                "put a plan of that name into the folder faults of the worlds, or take another recording");
+  }
+  const fs::path name = fs::path(facts.faults).filename();
+  if (name.empty() || name == "." || name == ".." || facts.faults.find('\0') != std::string::npos)
+    return fail(fmt::format("its plan of faults has no name of a file: '{}'", shown), "",
+                "take one that this pons has recorded");
+  const auto plan = inputs.file(name.string(), facts.faults_file);
+  return plan ? Expected<std::string>(plan->string()) : std::unexpected(plan.error());
+}
+
 // As a person would have asked for it.
-Expected<RunOptions> run_options(const RunFacts& facts, Inputs& inputs) {
+Expected<RunOptions> run_options(const RunFacts& facts, const world::World& world, Inputs& inputs) {
   RunOptions options;
   options.world = facts.world;
   options.parcels.seed = facts.seed;
@@ -55,7 +77,6 @@ Expected<RunOptions> run_options(const RunFacts& facts, Inputs& inputs) {
   if (facts.parcels) options.parcels.parcels = *facts.parcels;
   options.body.visits = facts.visits;
   options.body.arm_at = facts.arm_at;
-  options.body.faults = facts.faults;
   options.recover = facts.recovers;
   options.stay = facts.stays;
   options.keep_free_mib = facts.keep_free_mib;
@@ -65,11 +86,9 @@ Expected<RunOptions> run_options(const RunFacts& facts, Inputs& inputs) {
     if (!manifest) return std::unexpected(manifest.error());
     options.parcels.manifest = *std::move(manifest);
   }
-  if (!facts.faults_file.empty()) {
-    const auto plan = inputs.file(fs::path(facts.faults).filename().string(), facts.faults_file);
-    if (!plan) return std::unexpected(plan.error());
-    options.body.faults = plan->string();
-  }
+  auto faults = faults_of(facts, world, inputs);
+  if (!faults) return std::unexpected(faults.error());
+  options.body.faults = *std::move(faults);
   for (const brain::Errand& errand : facts.errands) {
     const auto task = inputs.file("task.json", errand.task.dump());
     if (!task) return std::unexpected(task.error());
@@ -80,20 +99,24 @@ Expected<RunOptions> run_options(const RunFacts& facts, Inputs& inputs) {
 
 // Said before: what may be the cause of whatever is found.
 void tell_differences(const RecordedRun& run, const std::vector<std::string>& changed) {
-  for (const std::string& line : changed) say(stderr, fmt::format("pons: not as recorded: {}\n", line));
+  const auto tell = [](const std::string& what) {
+    say(stderr, fmt::format("pons: not as recorded: {}\n", plain(what)));
+  };
+  std::ranges::for_each(changed, tell);
   if (!run.facts.attended.empty())
-    say(stderr,
-        fmt::format("pons: not as recorded: what others asked for ({}) is not asked for again\n", run.facts.attended));
+    tell(fmt::format("what others asked for ({}) is not asked for again", run.facts.attended));
 }
+
+void tell(const std::string& line) { say(stdout, plain(line) + "\n"); }
 
 int verdict(const ReplayOptions& options, Comparison& comparison) {
   const std::string at = fmt::format("{:.3f} s", comparison.latest().s());
   if (!comparison.difference().empty()) {
-    say(stdout, fmt::format("differs after {} equal messages: {}\n", comparison.equal(), comparison.difference()));
+    tell(fmt::format("differs after {} equal messages: {}", comparison.equal(), comparison.difference()));
     return kExitBadRun;
   }
   if (interrupted()) {
-    say(stdout, fmt::format("equal so far: {} messages, {}\n", comparison.equal(), at));
+    tell(fmt::format("equal so far: {} messages, {}", comparison.equal(), at));
     return kExitInterrupted;
   }
   if (const std::string why = comparison.cut(); !why.empty()) {
@@ -102,11 +125,11 @@ int verdict(const ReplayOptions& options, Comparison& comparison) {
       return bad_input({"nothing of it can be replayed: " + (why.starts_with(named) ? why.substr(named.size()) : why),
                         file, "name the first of its files"});
     }
-    say(stdout, fmt::format("equal as far as it goes: {} messages, {}; {}\n", comparison.equal(), at, why));
+    tell(fmt::format("equal as far as it goes: {} messages, {}; {}", comparison.equal(), at, why));
     return kExitGood;
   }
-  say(stdout, fmt::format("equal: {} messages, {}\n", comparison.equal(), at));
-  if (options.record.on()) say(stdout, fmt::format("recording: {}\n", options.record.file.string()));
+  tell(fmt::format("equal: {} messages, {}", comparison.equal(), at));
+  if (options.record.on()) tell(fmt::format("recording: {}", options.record.file.string()));
   return kExitGood;
 }
 
@@ -120,6 +143,12 @@ Expected<RecordedRun> replayable(const fs::path& file) {
   return run;
 }
 
+// What is wrong with what a recording says has that file for its place, where it has no other.
+Error placed_in(const fs::path& file, Error error) {
+  if (error.where.empty()) error.where = file.string();
+  return error;
+}
+
 int replay(const ReplayOptions& options) {
   watch_interrupts();
   const auto run = replayable(options.file);
@@ -129,8 +158,8 @@ int replay(const ReplayOptions& options) {
   const auto changed = what_changed(*run, *world);
   if (!changed) return bad_input(changed.error());
   Inputs inputs;
-  auto again = run_options(run->facts, inputs);
-  if (!again) return bad_input(again.error());
+  auto again = run_options(run->facts, *world, inputs);
+  if (!again) return bad_input(placed_in(options.file, again.error()));
   again->record = options.record;
   again->record.depth = options.record.on() && (options.record.depth || run->facts.depth);
   if (!options.quiet) tell_differences(*run, *changed);

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -12,6 +15,7 @@
 #include "pons/record/new_file.hpp"
 #include "pons/record/posix.hpp"
 #include "pons/record/ros_types.hpp"
+#include "pons/task/json_text.hpp"
 
 namespace pons::record {
 namespace {
@@ -21,9 +25,13 @@ using wire::Json;
 
 constexpr std::size_t kLinesAtOnce = std::size_t{16} * 1024;
 
+// Arrays and objects in messages that are JSON already: more than anybody means, and far from taking the stack.
+constexpr std::size_t kDeepest = 256;
+
 Expected<Json> json_itself(std::span<const std::byte> bytes) {
-  const auto* begin = reinterpret_cast<const char*>(bytes.data());
-  Json json = Json::parse(begin, begin + bytes.size(), nullptr, false);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (task::nests_deeper(text, kDeepest)) return fail(fmt::format("it is nested deeper than {} levels", kDeepest));
+  Json json = Json::parse(text, nullptr, false);
   if (json.is_discarded()) return fail("it is no JSON");
   return json;
 }
@@ -160,15 +168,26 @@ class Tables {
         fmt::format("{},{},{}{}\r\n", message.log_time, message.publish_time, message.sequence, cells));
   }
 
+  // All of them or none: a disk that is full says so before the first of them has its name.
   Expected<void> end() {
     for (auto& [key, file] : tables_) {
-      if (auto ended = file.end(); !ended) return ended;
+      if (auto settled = file.settle(); !settled) return settled;
+    }
+    std::vector<fs::path> named;
+    for (auto& [key, file] : tables_) {
+      if (auto ended = file.end(); !ended) {
+        // Those that replaced others stay: there is nothing to put back.
+        if (overwrite_ == Overwrite::kNever)
+          std::ranges::for_each(named, [](const auto& each) { ::unlink(each.c_str()); });
+        return ended;
+      }
+      named.push_back(file.path());
     }
     return {};
   }
 
  private:
-  // Two topics may have names that become one.
+  // Two topics may have names that become one, also with a number behind, or where a file system takes "A" for "a".
   std::string name_for(const std::string& topic) {
     std::string name = topic.starts_with('/') ? topic.substr(1) : topic;
     for (char& each : name) {
@@ -176,14 +195,28 @@ class Tables {
       if (!plain && each != '-') each = '_';
     }
     if (name.empty()) name = "topic";
-    const int times = ++names_[name];
-    return times == 1 ? name + ".csv" : fmt::format("{}_{}.csv", name, times);
+    name.resize(std::min(name.size(), kLongestName));
+    const auto is_new = [this](std::string as) {
+      for (char& each : as) each = each >= 'A' && each <= 'Z' ? static_cast<char>(each - 'A' + 'a') : each;
+      return names_.insert(std::move(as)).second;
+    };
+    int& times = times_[name];
+    std::string numbered;
+    do {
+      ++times;
+      numbered = times == 1 ? name : fmt::format("{}_{}", name, times);
+    } while (!is_new(numbered));
+    return numbered + ".csv";
   }
+
+  // A file system takes 255 bytes: there is room for a number, and for what a file is called before it is whole.
+  static constexpr std::size_t kLongestName = 200;
 
   fs::path recording_, folder_;
   Overwrite overwrite_;
   std::map<std::pair<std::string, std::uint16_t>, NewText> tables_;  // by topic and schema
-  std::map<std::string, int> names_;
+  std::set<std::string> names_;                                      // that are given, in small letters
+  std::map<std::string, int> times_;                                 // how often each was asked for
 };
 
 }  // namespace

@@ -155,6 +155,77 @@ TEST_F(ExportTest, AFolderThatWasMadeForNoTableGoesAgain) {
   EXPECT_TRUE(there("old"));
 }
 
+// What was written before the disk was full has no name yet.
+TEST_F(ExportTest, AFullDiskLeavesNoTableAtAll) {
+  ASSERT_TRUE(export_csv(*reader_, {}, folder_ / "all", Overwrite::kNever));
+  std::uintmax_t largest = 0, smallest = ~std::uintmax_t{0};
+  for (const auto& each : std::filesystem::directory_iterator(folder_ / "all")) {
+    largest = std::max(largest, each.file_size());
+    smallest = std::min(smallest, each.file_size());
+  }
+  ASSERT_LT(smallest, largest);
+  {
+    const FullDisk limit(largest - 1);
+    EXPECT_FALSE(export_csv(*reader_, {}, folder_ / "some", Overwrite::kNever));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "some"));
+}
+
+// A recording of JSON: topics, each with a message.
+class JsonExportTest : public testing::Test {
+ protected:
+  void write(const std::vector<std::pair<std::string, std::string>>& messages) {
+    const auto writer = McapWriter::create(folder_ / "json.mcap", {});
+    ASSERT_TRUE(writer) << writer.error().line();
+    for (const auto& [topic, text] : messages) {
+      const auto channel = (*writer)->add_channel(0, topic, "json", {});
+      ASSERT_TRUE(channel && (*writer)->write({*channel, 0, 5, 5, bytes_of(text)}));
+    }
+    ASSERT_TRUE((*writer)->finish());
+    auto reader = McapReader::open(folder_ / "json.mcap");
+    ASSERT_TRUE(reader) << reader.error().line();
+    reader_ = std::move(*reader);
+  }
+  [[nodiscard]] static std::string nested(std::size_t levels) {
+    return std::string(levels, '[') + std::string(levels, ']');
+  }
+
+  TestFolder folder_;
+  std::unique_ptr<McapReader> reader_;
+};
+
+// What writes out JSON, and copies it, goes down as far as that does.
+TEST_F(JsonExportTest, WhatIsNestedTooDeepIsLeftOutAndTakesNoStack) {
+  write({{"/good", nested(256)}, {"/deeper", nested(257)}, {"/deep", nested(1'000'000)}});
+  const auto lines = export_jsonl(*reader_, {}, folder_ / "a.jsonl", Overwrite::kNever);
+  const auto tables = export_csv(*reader_, {}, folder_ / "tables", Overwrite::kNever);
+  for (const auto* const exported : {&lines, &tables}) {
+    ASSERT_TRUE(*exported) << exported->error().line();
+    EXPECT_EQ((*exported)->messages, 1U);
+    EXPECT_EQ((*exported)->unreadable, 2U);
+    EXPECT_THAT((*exported)->first_unreadable->line(),
+                HasSubstr("message 0 of /deeper cannot be read: it is nested deeper than 256 levels"));
+  }
+  EXPECT_THAT(read_bytes(folder_ / "a.jsonl"), HasSubstr(nested(256)));
+}
+
+TEST_F(JsonExportTest, EachTableHasANameOfItsOwnThatAFileCanHave) {
+  const std::string far(300, 'x');
+  write({{"/a/b", "1"}, {"/a_b", "2"}, {"/a_b_2", "3"}, {"/A/B", "4"}, {far, "5"}, {far + "y", "6"}, {"", "7"}});
+  const auto exported = export_csv(*reader_, {}, folder_ / "tables", Overwrite::kNever);
+  ASSERT_TRUE(exported) << exported.error().line();
+  std::map<std::string, std::string> tables;
+  for (const auto& each : std::filesystem::directory_iterator(folder_ / "tables"))
+    tables[each.path().filename().string()] = read_bytes(each.path());
+  const std::string begin = "record.log_time_ns,record.publish_time_ns,record.sequence,message\r\n5,5,0,";
+  const std::string cut(200, 'x');
+  const std::map<std::string, std::string> expected{{"a_b.csv", begin + "1\r\n"},     {"a_b_2.csv", begin + "2\r\n"},
+                                                    {"a_b_2_2.csv", begin + "3\r\n"}, {"A_B_3.csv", begin + "4\r\n"},
+                                                    {cut + ".csv", begin + "5\r\n"},  {cut + "_2.csv", begin + "6\r\n"},
+                                                    {"topic.csv", begin + "7\r\n"}};
+  EXPECT_EQ(tables, expected);
+}
+
 TEST_F(ExportTest, OfTwoFormsOfATypeTheOneIsTakenWhoseFieldsAreTheFiles) {
   const auto& channels = reader_->contents().channels;
   for (const auto& [id, channel] : channels) {

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -17,25 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The file that a name stands for once links are followed: replacing the link itself would cut it off from its target.
-[[nodiscard]] fs::path behind_links(const fs::path& path) {
-  constexpr int kHops = 16;  // a ring of links has no end
-  fs::path target = path;
-  std::error_code error;
-  for (int hop = 0; hop < kHops && fs::is_symlink(target, error); ++hop) {
-    const fs::path next = fs::read_symlink(target, error);
-    if (error) return path;
-    target = next.is_absolute() ? next : target.parent_path() / next;
-  }
-  return target;
-}
-
 std::string part_ending() { return fmt::format(".{}.part", ::getpid()); }
 
 // 0, or the errno of what went wrong.
 [[nodiscard]] int write_and_sync(const fs::path& path, std::string_view bytes) {
   const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666));
   if (!file.open()) return errno;
+  keep_mode(path);  // before there is anything to be read in it
   while (!bytes.empty()) {
     const ssize_t written = ::write(file.number(), bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR) continue;
@@ -62,6 +51,29 @@ fs::path part_of(const fs::path& path) { return path.native() + part_ending(); }
 fs::path whole_of(const fs::path& part) {
   const std::string ending = part_ending(), &name = part.native();
   return name.ends_with(ending) ? name.substr(0, name.size() - ending.size()) : name;
+}
+
+fs::path behind_links(const fs::path& path) {
+  constexpr int kHops = 16;  // a ring of links has no end
+  fs::path target = path;
+  std::error_code error;
+  for (int hop = 0; hop < kHops && fs::is_symlink(target, error); ++hop) {
+    const fs::path next = fs::read_symlink(target, error);
+    if (error) return path;
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target;
+}
+
+void keep_mode(const fs::path& part) {
+  constexpr mode_t kAll = 0777, kAllButGroup = 0707;
+  constexpr auto kSameOwner = static_cast<uid_t>(-1);
+  struct stat was{};
+  if (::stat(whole_of(part).c_str(), &was) != 0 || !S_ISREG(was.st_mode)) return;
+  const bool same_group =
+      ::chown(part.c_str(), was.st_uid, was.st_gid) == 0 || ::chown(part.c_str(), kSameOwner, was.st_gid) == 0;
+  // Another group is not to have what that one had.
+  ::chmod(part.c_str(), was.st_mode & (same_group ? kAll : kAllButGroup));
 }
 
 fs::path folder_of(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }

@@ -14,7 +14,7 @@ namespace pons::record {
 [[nodiscard]] Expected<void> check_writable(const std::filesystem::path& path);
 
 // Replaces the file at `path`: a reader, or a crash at any moment, sees the old file or the new one, never a part. The
-// bytes are on disk when it returns. A symbolic link is followed. Blocks on the disk.
+// bytes are on disk when it returns. A symbolic link is followed; the mode stays. Blocks on the disk.
 // Errors: those of check_writable; the disk is full or broken. The old file is untouched then, and nothing is left
 // over.
 [[nodiscard]] Expected<void> write_whole(const std::filesystem::path& path, std::string_view bytes);

@@ -54,6 +54,40 @@ TEST_F(FileTest, KeepsALinkALink) {
   EXPECT_EQ(read(folder_ / "target.json"), "new");
 }
 
+TEST_F(FileTest, WhatReplacesAFileHasItsMode) {
+  const auto mode = [](const fs::path& path) { return fs::status(path).permissions(); };
+  const fs::path path = folder_ / "secret.json", link = folder_ / "link.json";
+  constexpr fs::perms kOurs = fs::perms::owner_read | fs::perms::owner_write, kAll = kOurs | fs::perms::others_read;
+  ASSERT_TRUE(write_whole(path, "old"));
+  fs::create_symlink("secret.json", link);
+  for (const fs::perms kept : {kOurs, kAll}) {
+    fs::permissions(path, kept);
+    ASSERT_TRUE(write_whole(path, "new"));
+    EXPECT_EQ(mode(path), kept);
+    auto file = NewText::create(link, Overwrite::kAllowed);
+    ASSERT_TRUE(file && file->add("newer"));
+    for (const auto& each : fs::directory_iterator(folder_)) {
+      EXPECT_EQ(mode(each.path()), kept) << each.path() << ": also while it is written";
+    }
+    ASSERT_TRUE(file->end());
+    EXPECT_EQ(mode(path), kept);
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(read(path), "newer");
+  }
+}
+
+TEST_F(FileTest, ALinkThatLeadsNowhereIsANameThatIsTaken) {
+  const fs::path link = folder_ / "link.json";
+  fs::create_symlink("nowhere.json", link);
+  const auto refused = NewText::create(link, Overwrite::kNever);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().line(), HasSubstr("link.json: there is such a file already"));
+  auto file = NewText::create(link, Overwrite::kAllowed);
+  ASSERT_TRUE(file && file->add("new") && file->end());
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(read(folder_ / "nowhere.json"), "new");
+}
+
 TEST_F(FileTest, SaysWhatWhereAndHowToMend) {
   const auto missing = write_whole(folder_ / "nowhere" / "a.json", "x");
   ASSERT_FALSE(missing);

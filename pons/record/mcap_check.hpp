@@ -28,9 +28,9 @@ struct Verdict {
 
 // Writes what can be read of `source` into a new file at `path`, with the compression of its chunks, indexes and a
 // summary: the messages in the order in which they lie there, their times and sequence numbers kept, attachments and
-// metadata. At any moment there is at `path` what was there before or the whole new file, which is on disk when it
-// returns.
-// Errors: it is no MCAP file; `path` exists and may not be overwritten; those of writing. Nothing is left over then.
+// metadata. At any moment there is at `path`, or where that leads as a symbolic link, what was there before or the
+// whole new file, which has the mode of what it replaces and is on disk when it returns. Errors: it is no MCAP file;
+// `path` exists and may not be overwritten; those of writing. Nothing is left over then.
 [[nodiscard]] Expected<void> repair(const Source& source, const std::filesystem::path& path, Overwrite overwrite,
                                     const ReadLimits& limits = {});
 

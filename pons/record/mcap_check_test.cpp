@@ -156,6 +156,23 @@ TEST_F(CheckTest, WhatIsRepairedIsWholeAndHoldsAllThatCouldBeRead) {
   }
 }
 
+// They come from whoever wrote the file, and go into a line for a person.
+TEST_F(CheckTest, NamesInDamageAreCutAndWriteNothingToATerminal) {
+  const std::string hostile = "\x1b[2J\xc2\x9b\n" + std::string(10'000, 'x');
+  mcap::Bytes bytes;
+  bytes.raw(mcap::kMagic);
+  write(bytes, mcap::Header{"", "a test"});
+  write(bytes, mcap::ChunkHead{.uncompressed_size = 1, .compression = hostile.substr(0, 3000), .records_size = 1});
+  bytes.number(std::uint8_t{0});
+  write(bytes, mcap::Attachment{0, 0, hostile, "", {}});
+  bytes.data()[bytes.size() - 1] ^= std::byte{1};  // of its checksum
+  const Verdict verdict = check_text(text_of(bytes.span()));
+  ASSERT_GE(verdict.damage.size(), 2U);
+  EXPECT_THAT(verdict.damage[0].what, HasSubstr("the chunk is compressed by '\\x1b[2J\\x9b\\x0axxx"));
+  EXPECT_THAT(verdict.damage[1].what, HasSubstr("the checksum of the attachment '\\x1b[2J\\x9b\\x0axxx"));
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_LT(verdict.damage[i].what.size(), 200U);
+}
+
 // As of a writer that describes channels in the chunk that needs them first, and a disk that lost that chunk.
 TEST_F(CheckTest, WhatOnlyTheSummaryDescribesIsSavedAllTheSame) {
   std::string bytes = whole_;
@@ -195,6 +212,16 @@ TEST_F(CheckTest, RepairOverwritesNothingUnlessToldAndLeavesNothingOver) {
   EXPECT_EQ(read_bytes(folder_ / "b.mcap"), "precious");
   ASSERT_TRUE(repair(**source, folder_ / "b.mcap", Overwrite::kAllowed));
   EXPECT_EQ(read_bytes(folder_ / "b.mcap").substr(1, 4), "MCAP");
+  // What a link leads to is replaced, not the link, and nobody may read it who could not.
+  constexpr auto kOurs = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write;
+  write_bytes(folder_ / "b.mcap", "precious");
+  std::filesystem::permissions(folder_ / "b.mcap", kOurs);
+  std::filesystem::create_symlink("b.mcap", folder_ / "link");
+  EXPECT_FALSE(repair(**source, folder_ / "link", Overwrite::kNever));
+  ASSERT_TRUE(repair(**source, folder_ / "link", Overwrite::kAllowed));
+  EXPECT_EQ(read_bytes(folder_ / "b.mcap").substr(1, 4), "MCAP");
+  EXPECT_EQ(std::filesystem::status(folder_ / "b.mcap").permissions(), kOurs);
+  EXPECT_TRUE(std::filesystem::remove(folder_ / "link"));
   // A recording may be its own repaired one.
   ASSERT_TRUE(repair(**source, folder_ / "a.mcap", Overwrite::kAllowed));
   EXPECT_FALSE(repair(**source, folder_ / "no" / "c.mcap", Overwrite::kNever));

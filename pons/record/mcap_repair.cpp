@@ -8,6 +8,7 @@
 #include "pons/record/mcap_gather.hpp"
 #include "pons/record/mcap_writer.hpp"
 #include "pons/record/new_file.hpp"
+#include "pons/record/posix.hpp"
 
 namespace pons::record {
 namespace {
@@ -73,6 +74,7 @@ Expected<void> write_copy(const Source& source, const std::filesystem::path& pat
   if (!contents) return std::unexpected(contents.error());
   auto writer = McapWriter::create(path, options_of(*contents));
   if (!writer) return std::unexpected(writer.error());
+  keep_mode(path);  // before there are messages to be read in it
   Copy copy(**writer, *contents);
   if (copy.failed()) return std::unexpected(*copy.failed());
   const auto copied = walk(source, limits, copy, {contents->schemas, contents->channels});

@@ -1,4 +1,5 @@
 // What the writer writes, the reader reads; that others read it, tests/recording/ shows.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 
+#include "pons/record/mcap_check.hpp"
 #include "pons/record/mcap_reader.hpp"
 #include "pons/record/mcap_records.hpp"
 #include "pons/record/mcap_writer.hpp"
@@ -17,9 +19,19 @@ namespace {
 // How often the program brought something onto the disk, and the error that it shall hear (0: none).
 int synced = 0, sync_error = 0;
 
+// So long a file may become before the disk is full; 0: as long as it likes.
+off_t disk_bytes = 0;
+
 }  // namespace
 
 // In place of the C library's, for the whole of this program.
+// NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name)
+extern "C" int fallocate(int file, int mode, off_t at, off_t bytes) {
+  errno = ENOSPC;
+  const bool full = disk_bytes > 0 && at + bytes > disk_bytes;
+  return full ? -1 : static_cast<int>(::syscall(SYS_fallocate, file, mode, at, bytes));
+}
+
 // NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name)
 extern "C" int fdatasync(int file) {
   ++synced;
@@ -146,6 +158,47 @@ TEST(McapTest, WhatCannotBeWrittenIsRefusedByName) {
   EXPECT_THAT(McapWriter::create(folder / "no" / "a.mcap", {}).error().line(), HasSubstr("the folder does not exist"));
   EXPECT_THAT(McapWriter::create(folder / std::string(300, 'x'), {}).error().line(),
               HasSubstr("cannot create the file"));
+  EXPECT_THAT(McapWriter::create("/proc/a.mcap", {}).error().line(),
+              HasSubstr("/proc: no file can be made in this folder; choose another one"));
+}
+
+// With whatever its room ends, and wherever: in a chunk, in a schema, before the first.
+TEST(McapTest, WhatAFullDiskEndsIsWhole) {
+  enum class End { kDisk, kLimit };
+  for (const End end : {End::kDisk, End::kLimit}) {
+    bool refused = false, begun = false;
+    for (std::uint64_t room = 100; room < 12'000; room += 97) {
+      SCOPED_TRACE(fmt::format("{} bytes of {}", room, end == End::kDisk ? "a disk" : "a limit"));
+      const TestFolder folder;
+      const auto path = folder / "a.mcap";
+      {
+        std::optional<FullDisk> limit;
+        if (end == End::kLimit) limit.emplace(room);
+        if (end == End::kDisk) disk_bytes = static_cast<off_t>(room);
+        auto writer = McapWriter::create(path, {.chunk_bytes = 1'000});
+        Expected<void> written;
+        for (int i = 0; writer && written && i < 100; ++i) {
+          // Half of a summary is what the schemas say.
+          const auto schema = (*writer)->add_schema("T", "text", std::string(static_cast<std::size_t>(10 * i), 's'));
+          const auto channel = schema ? (*writer)->add_channel(*schema, "/a", "cdr", {}) : schema;
+          if (!channel) written = std::unexpected(channel.error());
+          if (channel) written = (*writer)->write({*channel, 0, 1, 1, bytes_of(std::string(300, 'x'))});
+        }
+        EXPECT_TRUE(!writer || !written) << "it was not full";
+        EXPECT_TRUE(!writer || !(*writer)->finish()) << "and that is said";
+        refused = refused || !writer;
+        begun = begun || writer;
+        disk_bytes = 0;
+      }
+      if (!std::filesystem::exists(path)) continue;
+      EXPECT_LE(std::filesystem::file_size(path), room);
+      const auto source = open_file(path);
+      ASSERT_TRUE(source);
+      const auto verdict = check(**source);
+      EXPECT_TRUE(verdict && verdict->whole());
+    }
+    EXPECT_TRUE(refused && begun);
+  }
 }
 
 TEST(McapTest, WhoseFileIsRemovedHearsOfIt) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "pons/record/mcap_records.hpp"
+#include "pons/task/json_text.hpp"
 
 namespace pons::record {
 
@@ -186,7 +187,7 @@ class Walk {
     mcap::Attachment attachment;
     if (!mcap::read(content, attachment)) return false;
     if (!mcap::attachment_is_whole(content)) {
-      damaged(at, fmt::format("the checksum of the attachment '{}' is wrong", attachment.name));
+      damaged(at, fmt::format("the checksum of the attachment '{}' is wrong", task::excerpt(attachment.name)));
       return true;
     }
     visitor_.attachment({at, kPrefix + content.size(), attachment.log_time, attachment.create_time,
@@ -222,7 +223,8 @@ class Walk {
     const auto& head = place.head;
     const auto compression = mcap::compression_named(head.compression);
     if (!compression)
-      return fail(fmt::format("the chunk is compressed by '{}', which Pons does not know", head.compression));
+      return fail(
+          fmt::format("the chunk is compressed by '{}', which Pons does not know", task::excerpt(head.compression)));
     if (std::max(head.records_size, head.uncompressed_size) > limits_.record_bytes)
       return fail(fmt::format("the chunk is longer than {} bytes", limits_.record_bytes));
     const auto bytes = window_.view(place.offset + mcap::chunk_head_size(head.compression), head.records_size);
@@ -349,7 +351,8 @@ class Walk {
 }  // namespace
 
 Error Damage::error(const std::string& file) const {
-  return {fmt::format("byte {}: {}", at, what), file, "pons recording repair makes a whole file of what can be read"};
+  return {fmt::format("byte {}: {}", at, what), file,
+          "pons recording check tells more, pons recording repair makes a whole file of what can be read"};
 }
 
 Expected<WalkEnd> walk(const Source& source, const ReadLimits& limits, DataVisitor& visitor, Described described) {

@@ -21,7 +21,19 @@ constexpr std::size_t kMost = std::numeric_limits<std::uint16_t>::max();
 // Before so many bytes of the disk are asked for at once by a channel that is rarely heard.
 constexpr std::size_t kEntriesAtFirst = 64;
 
+// In the summary, at most: beside the names in it, the index of a chunk, a piece of metadata or an attachment; of a
+// channel, what each chunk's index and the statistics say of it; Data End, Statistics, Summary Offsets, Footer, magic.
+constexpr std::uint64_t kIndex = 128, kIndexInSummary = 2 + 8, kEnds = 512;
+
 }  // namespace
+
+Bytes beginning_of_file(const WriterOptions& options, const mcap::Metadata& note) {
+  Bytes bytes;
+  bytes.raw(mcap::kMagic);
+  mcap::write(bytes, mcap::Header{options.profile, options.library});
+  mcap::write(bytes, note);
+  return bytes;
+}
 
 Expected<std::unique_ptr<McapWriter>> McapWriter::create(const std::filesystem::path& path,
                                                          const WriterOptions& options) {
@@ -50,23 +62,23 @@ McapWriter::~McapWriter() {
 Expected<void> McapWriter::begin() {
   scratch_.raw(mcap::kMagic);
   mcap::write(scratch_, mcap::Header{options_.profile, options_.library});
-  if (auto begun = append_scratch(); !begun) return begun;
+  if (auto begun = append_scratch(0); !begun) return begun;
   if (!options_.sync_every) return {};
   // The file's name, too, has to survive.
   if (const int error = sync_folder(folder_of(path())); error != 0) return cannot("sync the folder", path(), error);
   return {};
 }
 
-Expected<void> McapWriter::append(std::span<const std::byte> bytes) {
+Expected<void> McapWriter::append(std::span<const std::byte> bytes, std::uint64_t spare) {
   if (failed_) return std::unexpected(*failed_);
-  auto appended = file_.append(bytes);
+  auto appended = file_.append(bytes, spare);
   if (!appended) failed_ = appended.error();
   if (appended) crc_ = mcap::crc32(crc_, bytes);
   return appended;
 }
 
-Expected<void> McapWriter::append_scratch() {
-  auto appended = append(scratch_.span());
+Expected<void> McapWriter::append_scratch(std::uint64_t indexed) {
+  auto appended = append(scratch_.span(), bytes_of_summary() + indexed);
   scratch_.clear();
   return appended;
 }
@@ -78,7 +90,7 @@ Expected<std::uint16_t> McapWriter::add_schema(std::string_view name, std::strin
   mcap::Schema schema{id, std::string(name), std::string(encoding), std::string(data)};
   mcap::write(scratch_, schema);
   const std::size_t size = scratch_.size();
-  if (auto appended = append_scratch(); !appended) return std::unexpected(appended.error());
+  if (auto appended = append_scratch(size); !appended) return std::unexpected(appended.error());
   described_ += size;
   schemas_.push_back(std::move(schema));
   return id;
@@ -93,7 +105,7 @@ Expected<std::uint16_t> McapWriter::add_channel(std::uint16_t schema, std::strin
   mcap::Channel channel{id, schema, std::string(topic), std::string(message_encoding), std::move(metadata)};
   mcap::write(scratch_, channel);
   const std::size_t size = scratch_.size();
-  if (auto appended = append_scratch(); !appended) return std::unexpected(appended.error());
+  if (auto appended = append_scratch(size + kIndexInSummary); !appended) return std::unexpected(appended.error());
   described_ += size;
   streams_.push_back({std::move(channel), {}, 0});
   streams_.back().entries.reserve(kEntriesAtFirst);
@@ -154,7 +166,8 @@ Expected<void> McapWriter::put_chunk(Bytes& whole, const mcap::ChunkHead& head) 
     mcap::write(whole, each.channel.id, each.entries);
   }
   index.message_index_length = whole.size() - index.length;
-  if (auto appended = append(whole.span()); !appended) return appended;
+  const std::uint64_t indexed = kIndex + index.message_indexes.size() * kIndexInSummary;
+  if (auto appended = append(whole.span(), bytes_of_summary() + indexed); !appended) return appended;
   mcap::write(chunk_indexes_, index);
   for (Stream& each : streams_) each.written += each.entries.size();
   statistics_.start = statistics_.messages == 0 ? head.start : std::min(statistics_.start, head.start);
@@ -186,7 +199,8 @@ Expected<void> McapWriter::attach(const mcap::Attachment& attachment) {
   const mcap::AttachmentIndex index{file_.size(),           scratch_.size(),        attachment.log_time,
                                     attachment.create_time, attachment.data.size(), attachment.name,
                                     attachment.media_type};
-  if (auto appended = append_scratch(); !appended) return appended;
+  const std::uint64_t indexed = kIndex + attachment.name.size() + attachment.media_type.size();
+  if (auto appended = append_scratch(indexed); !appended) return appended;
   mcap::write(attachment_indexes_, index);
   ++statistics_.attachments;
   return {};
@@ -195,7 +209,7 @@ Expected<void> McapWriter::attach(const mcap::Attachment& attachment) {
 Expected<void> McapWriter::note(const mcap::Metadata& metadata) {
   mcap::write(scratch_, metadata);
   const mcap::MetadataIndex index{file_.size(), scratch_.size(), metadata.name};
-  if (auto appended = append_scratch(); !appended) return appended;
+  if (auto appended = append_scratch(kIndex + metadata.name.size()); !appended) return appended;
   mcap::write(metadata_indexes_, index);
   ++statistics_.metadata;
   return {};
@@ -209,6 +223,7 @@ Expected<void> McapWriter::finish() {
   auto flushed = flush();
   failed_.reset();
   auto summed = write_summary();
+  file_.give_back_spare();
   if (summed) summed = file_.sync();
   failed_ = Error{"the recording is finished", path().string(), "begin another one"};
   if (before) return std::unexpected(*before);
@@ -246,20 +261,22 @@ Expected<void> McapWriter::write_summary() {
       0, all.span().subspan(summary - file_.size()).first(file_.size() + all.size() - sizeof(std::uint32_t) - summary));
   std::memcpy(all.data() + all.size() - sizeof crc, &crc, sizeof crc);
   all.raw(mcap::kMagic);
-  return append(all.span());
+  return append(all.span(), 0);
+}
+
+std::uint64_t McapWriter::bytes_of_summary() const {
+  return described_ + streams_.size() * kIndexInSummary + chunk_indexes_.size() + attachment_indexes_.size() +
+         metadata_indexes_.size() + kEnds;
 }
 
 std::uint64_t McapWriter::bytes_when_finished(std::optional<std::size_t> size) const {
   // Two chunks: the message may not fit into the one that is being filled. What cannot be compressed grows a little.
   std::uint64_t records = chunk_.size() - gap_ + (size ? mcap::kPrefix + mcap::kMessageHead + *size : 0);
   if (options_.compression != mcap::Compression::kNone) records += records / 128 + 1024;
-  constexpr std::uint64_t kIndexHead = mcap::kPrefix + 2 + 4, kIndexInSummary = 2 + 8, kChunkIndex = 128;
-  const std::uint64_t chunks = 2 * (gap_ + kChunkIndex + streams_.size() * (kIndexHead + kIndexInSummary));
+  constexpr std::uint64_t kIndexHead = mcap::kPrefix + 2 + 4;
+  const std::uint64_t chunks = 2 * (gap_ + kIndex + streams_.size() * (kIndexHead + kIndexInSummary));
   const std::uint64_t entries = (waiting_ + 1) * sizeof(mcap::MessageIndexEntry);
-  constexpr std::uint64_t kEnds = 512;  // Data End, Statistics, Summary Offsets, Footer, magic
-  const std::uint64_t summary = described_ + streams_.size() * kIndexInSummary + chunk_indexes_.size() +
-                                attachment_indexes_.size() + metadata_indexes_.size() + kEnds;
-  return file_.size() + records + chunks + entries + summary;
+  return file_.size() + records + chunks + entries + bytes_of_summary();
 }
 
 std::optional<Timestamp> McapWriter::oldest_waiting() const {

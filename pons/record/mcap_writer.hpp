@@ -4,6 +4,9 @@
 //
 // What a process that is killed leaves: every finished chunk. A chunk reaches the file in one write together with its
 // index, and after the schemas and channels that its messages need.
+//
+// Nothing is written that would leave no room for the summary behind it, so that a file on a full disk is whole when it
+// is finished.
 #pragma once
 
 #include <cstdint>
@@ -36,6 +39,9 @@ struct WriterOptions {
   std::string profile = "ros2", library = "pons";
 };
 
+// The first bytes of a file that such a writer makes, and whose first record is that note.
+[[nodiscard]] mcap::Bytes beginning_of_file(const WriterOptions& options, const mcap::Metadata& note);
+
 class McapWriter {
  public:
   // A new file. Errors: those of OutputFile::create and append; nothing is left of it then.
@@ -65,8 +71,10 @@ class McapWriter {
   // make a whole file of what is there.
   [[nodiscard]] Expected<void> finish();
 
-  // The file holds neither messages nor attachments, those of the chunk that is being filled left out.
-  [[nodiscard]] bool empty() const { return statistics_.messages == 0 && statistics_.attachments == 0; }
+  // The file holds more messages than that, or an attachment; those of the chunk that is being filled left out.
+  [[nodiscard]] bool holds_more_than(std::uint64_t messages) const {
+    return statistics_.messages > messages || statistics_.attachments > 0;
+  }
   [[nodiscard]] std::uint64_t bytes() const { return file_.size(); }  // of the file, as it is now
   // At most so long will it be if it is finished now, or, if another message of `size` bytes is written, after that
   // one.
@@ -86,9 +94,12 @@ class McapWriter {
 
   McapWriter(OutputFile file, WriterOptions options);
   [[nodiscard]] Expected<void> begin();
-  [[nodiscard]] Expected<void> append(std::span<const std::byte> bytes);
-  // scratch_, which it empties.
-  [[nodiscard]] Expected<void> append_scratch();
+  // `spare`: what has to find room behind it.
+  [[nodiscard]] Expected<void> append(std::span<const std::byte> bytes, std::uint64_t spare);
+  // scratch_, which it empties; the summary grows by `indexed` bytes at most with it.
+  [[nodiscard]] Expected<void> append_scratch(std::uint64_t indexed);
+  // With all that ends the file, at most, as of what is written now.
+  [[nodiscard]] std::uint64_t bytes_of_summary() const;
   [[nodiscard]] Expected<void> put_chunk(mcap::Bytes& whole, const mcap::ChunkHead& head);
   void forget_chunk();
   [[nodiscard]] Expected<void> sync_if_due(mcap::Timestamp now);

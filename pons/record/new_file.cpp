@@ -35,8 +35,8 @@ int rename_to(const fs::path& part, const fs::path& path, Overwrite overwrite) {
 Expected<fs::path> begin_file(const fs::path& path, Overwrite overwrite) {
   if (auto writable = check_writable(path); !writable) return std::unexpected(writable.error());
   std::error_code ignored;
-  if (overwrite == Overwrite::kNever && fs::exists(path, ignored)) return taken(path);
-  fs::path part = part_of(path);
+  if (overwrite == Overwrite::kNever && fs::exists(fs::symlink_status(path, ignored))) return taken(path);
+  fs::path part = part_of(behind_links(path));
   ::unlink(part.c_str());  // of a process that had this number and was killed
   return part;
 }
@@ -48,12 +48,14 @@ Expected<void> check_is_not(const fs::path& recording, const fs::path& path) {
 }
 
 Expected<void> end_file(const fs::path& part, const fs::path& path, Overwrite overwrite) {
-  if (const int error = rename_to(part, path, overwrite); error != 0) {
+  const fs::path target = whole_of(part);
+  keep_mode(part);
+  if (const int error = rename_to(part, target, overwrite); error != 0) {
     ::unlink(part.c_str());
     if (error == EEXIST) return taken(path);
     return cannot("rename the file", path, error);
   }
-  if (const int error = sync_folder(folder_of(path)); error != 0) return cannot("sync the folder", path, error);
+  if (const int error = sync_folder(folder_of(target)); error != 0) return cannot("sync the folder", path, error);
   return {};
 }
 
@@ -62,6 +64,7 @@ Expected<NewText> NewText::create(const fs::path& path, Overwrite overwrite) {
   if (!part) return std::unexpected(part.error());
   auto file = OutputFile::create(*part);
   if (!file) return std::unexpected(file.error());
+  keep_mode(*part);  // before there is anything to be read in it
   return NewText(path, overwrite, std::move(*file));
 }
 
@@ -80,9 +83,13 @@ Expected<void> NewText::flush() {
   return appended;
 }
 
-Expected<void> NewText::end() {
+Expected<void> NewText::settle() {
   if (auto flushed = flush(); !flushed) return flushed;
-  if (auto synced = file_->sync(); !synced) return synced;
+  return file_->sync();
+}
+
+Expected<void> NewText::end() {
+  if (auto settled = settle(); !settled) return settled;
   const fs::path part = file_->path();
   file_.reset();
   return end_file(part, path_, overwrite_);

@@ -20,7 +20,11 @@ class OutputFile {
   // All of it or nothing: after an error the file ends where it ended before. Errors: the disk or its quota is full,
   // the file would become larger than the system allows, the disk is broken, or the file was removed meanwhile, so that
   // nobody would find what is written.
-  [[nodiscard]] Expected<void> append(std::span<const std::byte> bytes);
+  // `spare`: behind it so much room more has to be there, for what ends the file; it is kept for that, where the file
+  // system can do so.
+  [[nodiscard]] Expected<void> append(std::span<const std::byte> bytes, std::uint64_t spare = 0);
+  // What was kept and is not needed any more goes back to the disk.
+  void give_back_spare();
   // What was appended survives the loss of power once this has returned. Errors: the disk is broken.
   [[nodiscard]] Expected<void> sync();
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -28,10 +32,13 @@ class OutputFile {
 
  private:
   OutputFile(std::filesystem::path path, Descriptor file) : path_(std::move(path)), file_(std::move(file)) {}
+  // 0, or the errno with which no file can become so long.
+  [[nodiscard]] int keep_room(std::uint64_t end);
 
   std::filesystem::path path_;
   Descriptor file_;
   std::uint64_t size_ = 0;
+  bool keeps_room_ = false;
 };
 
 }  // namespace pons::record

@@ -44,6 +44,13 @@ class Descriptor {
 
 [[nodiscard]] std::filesystem::path folder_of(const std::filesystem::path& path);
 
+// The file that a name stands for once links are followed: replacing the link itself would cut it off from its target.
+[[nodiscard]] std::filesystem::path behind_links(const std::filesystem::path& path);
+
+// To `part`, which was made under the name of part_of(), the mode, group and, where the system lets us, owner of the
+// file that it shall replace: whoever could not read that one must not read this one. Where there is none, nothing.
+void keep_mode(const std::filesystem::path& part);
+
 // What was made, renamed or removed in a folder lasts only once this has returned. 0, or the errno of what went wrong.
 [[nodiscard]] int sync_folder(const std::filesystem::path& folder);
 

@@ -18,9 +18,24 @@ constexpr std::size_t kLeastQueue = 4096;
 
 constexpr std::size_t kCountInWords = 4 + 4 + 20;  // of a topic's drops, beside its name
 
+constexpr std::size_t kRecord = 64;  // a record's prefix and numbers, and what counts its texts; at most
+
+std::size_t size_of(const mcap::Texts& texts) {
+  std::size_t size = 0;
+  for (const auto& [key, text] : texts) size += 4 + key.size() + 4 + text.size();
+  return size;
+}
+
+// With what the summary says of it.
+std::size_t size_of(const mcap::Metadata& note) { return 2 * (kRecord + note.name.size()) + size_of(note.texts); }
+
 constexpr Timestamp kLooksAtDiskEvery = 1'000'000'000;
 
 constexpr std::size_t aligned(std::size_t size) { return (size + 7) / 8 * 8; }
+
+std::unexpected<Error> too_much(const std::string& name) {
+  return fail("what each file begins with takes more than half of the quota", name, "raise the quota");
+}
 
 }  // namespace
 
@@ -30,13 +45,20 @@ std::optional<std::uint64_t> free_bytes_of_disk(const std::filesystem::path& fol
   return unknown || space.capacity == 0 ? std::nullopt : std::optional<std::uint64_t>(space.available);
 }
 
+std::uint64_t size_of(std::span<const mcap::Metadata> notes) {
+  std::uint64_t size = 0;
+  for (const mcap::Metadata& each : notes) size += size_of(each);
+  return size;
+}
+
 Expected<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options) {
   const std::string name = options.name;
   if (options.queue_bytes < kLeastQueue)
     return fail("the queue is too small", name, fmt::format("give it {} bytes or more", kLeastQueue));
   if (options.quota_bytes && *options.quota_bytes / 2 < options.file_bytes)
     return fail("the quota is less than two files'", name, "raise it, or make the files smaller");
-  auto rotation = Rotation::open(options.folder, name, options.first);
+  const mcap::Bytes beginning = options.series ? beginning_of_file(options.writer, *options.series) : mcap::Bytes();
+  auto rotation = Rotation::open(options.folder, name, options.first, beginning.span());
   if (!rotation) return std::unexpected(rotation.error());
   std::unique_ptr<Recorder> recorder(new Recorder(std::move(options), std::move(*rotation)));
   if (auto begun = recorder->begin_file(0); !begun) {
@@ -184,25 +206,31 @@ bool Recorder::work_off() {
   }
   lock.lock();
   half.used = 0;
-  status_.bytes = rotation_.bytes() + (writer_ ? writer_->bytes() : 0);
-  status_.removed = rotation_.removed();
+  // Of the rest there is seldom news.
+  status_.kept.bytes = rotation_.added_bytes() + (writer_ ? writer_->bytes() : 0);
+  if (status_.removed != rotation_.removed()) show_files();
   return true;
 }
 
 void Recorder::write_attachment(const mcap::Attachment& attachment) {
-  if (writer_ && is_full(attachment.data.size() + attachment.name.size() + attachment.media_type.size() + 128)) {
+  const std::size_t size =
+      attachment.data.size() + 2 * (kRecord + attachment.name.size() + attachment.media_type.size());
+  if (writer_ && is_full(size)) {
     end_file();
     if (auto begun = begin_file(attachment.log_time); !begun) failed(begun.error(), attachment.log_time);
   }
-  const bool had_file = writer_ != nullptr;
-  const auto attached = had_file ? writer_->attach(attachment) : Expected<void>{};
-  if (!attached) failed(attached.error(), attachment.log_time);
-  if (had_file && attached) return;
+  auto fits = writer_ ? fits_quota(size) : false;
+  if (fits && *fits) {
+    const auto attached = writer_->attach(attachment);
+    if (attached) return;
+    fits = std::unexpected(attached.error());
+  }
+  if (!fits) failed(fits.error(), attachment.log_time);
   const std::scoped_lock lock(mutex_);
   ++status_.lost_attachments;
 }
 
-// A few words: they may make a file a little longer than it was to be.
+// A few words, for which each file has room.
 void Recorder::write_note(const mcap::Metadata& metadata, Timestamp now) {
   if (!writer_) return;
   if (auto noted = writer_->note(metadata); !noted) failed(noted.error(), now);
@@ -231,12 +259,16 @@ void Recorder::write_one(const Item& item, std::span<const std::byte> data) {
       return lose(item.topic, 1);
     }
   }
-  auto channel = channel_of(item.topic);
-  if (channel && is_full(data.size())) {
+  if (is_full(size_of_channel(item.topic) + data.size())) {
     end_file();
-    const auto begun = begin_file(item.log_time);
-    channel = begun ? channel_of(item.topic) : std::unexpected(begun.error());
+    if (auto begun = begin_file(item.log_time); !begun) {
+      lose(item.topic, 1);
+      return failed(begun.error(), item.log_time);
+    }
   }
+  const auto fits = fits_quota(size_of_channel(item.topic) + data.size());
+  if (fits && !*fits) return lose_too_long(item);
+  const auto channel = fits ? channel_of(item.topic) : std::unexpected(fits.error());
   if (!channel) {
     lose(item.topic, 1);
     return failed(channel.error(), item.log_time);
@@ -250,6 +282,7 @@ Expected<void> Recorder::begin_file(Timestamp now) {
   if (options_.quota_bytes) {
     auto room = rotation_.make_room(options_.file_bytes, *options_.quota_bytes);
     if (!room) return room;
+    has_room_ = options_.file_bytes;
   }
   if (auto left = leave_room(); !left) return left;
   auto writer = McapWriter::create(rotation_.next_path(), options_.writer);
@@ -259,14 +292,19 @@ Expected<void> Recorder::begin_file(Timestamp now) {
     const std::scoped_lock lock(mutex_);
     ++status_.files;
     status_.file = writer_->path();
+    show_files();
   }
   schemas_.clear();
   in_file_.assign(known_.size(), {});
   retry_at_.reset();
+  if (options_.series) {
+    if (auto noted = begin_with(*options_.series); !noted) return noted;
+  }
   for (const mcap::Metadata& each : options_.notes) {
-    if (auto noted = writer_->note(each); !noted) return noted;
+    if (auto noted = begin_with(each); !noted) return noted;
   }
   if (auto repeated = repeat_latched(now); !repeated) return repeated;
+  if (auto measured = measure_beginning(); !measured) return measured;
   const std::scoped_lock lock(mutex_);
   status_.failing = false;
   return {};
@@ -286,8 +324,17 @@ Expected<void> Recorder::leave_room() {
   }
 }
 
+Expected<void> Recorder::begin_with(const mcap::Metadata& note) {
+  const auto fits = fits_quota(size_of(note));
+  if (!fits) return std::unexpected(fits.error());
+  return *fits ? writer_->note(note) : too_much(options_.name);
+}
+
 Expected<void> Recorder::repeat_latched(Timestamp now) {
   for (const auto& [topic, newest] : newest_) {
+    const auto fits = fits_quota(size_of_channel(topic) + newest.data.size());
+    if (!fits) return std::unexpected(fits.error());
+    if (!*fits) return too_much(options_.name);
     const auto channel = channel_of(topic);
     if (!channel) return std::unexpected(channel.error());
     ++in_file_[topic].repeated;
@@ -297,10 +344,40 @@ Expected<void> Recorder::repeat_latched(Timestamp now) {
   return {};
 }
 
+// What does not leave half of a file to what is new makes it longer.
+Expected<void> Recorder::measure_beginning() {
+  longest_ = options_.file_bytes;
+  if (writer_->bytes_when_finished() <= options_.file_bytes / 2) return {};
+  // So long it would be uncompressed.
+  if (auto flushed = writer_->flush(); !flushed) return flushed;
+  const std::uint64_t twice = 2 * writer_->bytes_when_finished();
+  if (options_.quota_bytes && twice > *options_.quota_bytes) return too_much(options_.name);
+  longest_ = std::max(longest_, twice);
+  return {};
+}
+
 // A file holds one message at least, however long.
 bool Recorder::is_full(std::size_t size) const {
-  if (writer_->bytes_when_finished(size) + words_ <= options_.file_bytes) return false;
+  if (writer_->bytes_when_finished(size) + words_ <= longest_) return false;
   return std::ranges::any_of(in_file_, [](const InFile& each) { return each.handed > 0; });
+}
+
+Expected<bool> Recorder::fits_quota(std::size_t size) {
+  if (!options_.quota_bytes) return true;
+  const std::uint64_t needed = writer_->bytes_when_finished(size) + words_;
+  if (needed <= has_room_) return true;
+  if (needed > *options_.quota_bytes) return false;
+  if (auto room = rotation_.make_room(needed, *options_.quota_bytes); !room) return std::unexpected(room.error());
+  has_room_ = needed;
+  return true;
+}
+
+std::size_t Recorder::size_of_channel(TopicId topic) const {
+  if (in_file_[topic].channel != 0) return 0;
+  const Topic& facts = known_[topic];
+  // In the data and in the summary, and in the indexes of two chunks.
+  return 2 * (3 * kRecord + facts.type.size() + facts.schema_encoding.size() + facts.schema.size() + facts.name.size() +
+              facts.message_encoding.size() + size_of(facts.metadata));
 }
 
 Expected<std::uint16_t> Recorder::channel_of(TopicId topic) {
@@ -354,7 +431,9 @@ void Recorder::end_file(Empty empty) {
     const auto& [channel, handed, repeated] = in_file_[i];
     if (handed + repeated > held) lose(static_cast<TopicId>(i), std::min(handed, handed + repeated - held));
   }
-  const bool removed = empty == Empty::kRemoved && writer_->empty();
+  std::uint64_t repeated = 0;
+  for (const InFile& each : in_file_) repeated += each.repeated;
+  const bool removed = empty == Empty::kRemoved && !writer_->holds_more_than(repeated);
   if (removed) {
     ::unlink(writer_->path().c_str());
   } else {
@@ -364,7 +443,7 @@ void Recorder::end_file(Empty empty) {
   writer_.reset();
   const std::scoped_lock lock(mutex_);
   if (removed) --status_.files;
-  status_.bytes = rotation_.bytes();
+  show_files();
   if (!ended) status_.error = ended.error();
 }
 
@@ -379,6 +458,23 @@ void Recorder::failed(const Error& error, Timestamp now) {
 void Recorder::lose(TopicId topic, std::uint64_t count) {
   const std::scoped_lock lock(mutex_);
   counts_[topic].dropped += count;
+}
+
+void Recorder::lose_too_long(const Item& item) {
+  lose(item.topic, 1);
+  const std::scoped_lock lock(mutex_);
+  status_.error = Error{fmt::format("a message of {} bytes is longer than the quota", item.size),
+                        known_[item.topic].name, "raise the quota"};
+}
+
+void Recorder::show_files() {
+  status_.kept = rotation_.added();
+  if (writer_) {
+    if (status_.kept.files++ == 0) status_.kept.first = writer_->path();
+    status_.kept.last = writer_->path();
+    status_.kept.bytes += writer_->bytes();
+  }
+  status_.removed = rotation_.removed();
 }
 
 }  // namespace pons::record

@@ -43,8 +43,11 @@ struct RecorderOptions {
   std::string name;                                  // of NAME_0.mcap, NAME_1.mcap, …
   FirstFile first = FirstFile::kNumbered;            // kPlain: of NAME.mcap, NAME_1.mcap, …
   std::size_t queue_bytes = std::size_t{64} << 20U;  // taken at once; half of it fills while the other half is written
-  std::uint64_t file_bytes = std::uint64_t{1} << 30U;  // at most, but for a single message that is longer
-  std::optional<std::uint64_t> quota_bytes;            // of all files of that name; the oldest are removed
+  // At most, but for a single message that is longer; and where what each file begins with takes more than half of it,
+  // twice as much as that, for else each message might have a file of its own.
+  std::uint64_t file_bytes = std::uint64_t{1} << 30U;
+  // Of all its files; the oldest are removed. A message that alone would take more is dropped.
+  std::optional<std::uint64_t> quota_bytes;
   // So much of the disk is left to others: what would take more of it is not written, as if the disk were full; with a
   // quota the oldest files go first.
   std::uint64_t keep_free_bytes = 0;
@@ -52,7 +55,13 @@ struct RecorderOptions {
   Duration retry_after = std::chrono::seconds(10);  // log time from an error to the next try, with a new file
   WriterOptions writer;
   std::vector<mcap::Metadata> notes;  // at the beginning of each file
+  // Before them: by which the recording's files are known. Those that are there from an earlier recorder are its own,
+  // and go on; should another file have that name, it is refused. Without, nothing that is there is its own.
+  std::optional<mcap::Metadata> series;
 };
+
+// What notes take of each file, at most.
+[[nodiscard]] std::uint64_t size_of(std::span<const mcap::Metadata> notes);
 
 // What a channel is to be.
 struct Topic {
@@ -88,18 +97,20 @@ struct TopicStatus {
 };
 
 struct RecorderStatus {
-  std::vector<TopicStatus> topics;                  // by TopicId
-  std::uint64_t files = 0, bytes = 0, removed = 0;  // files begun; bytes of them all now; files that the quota took
-  std::filesystem::path file;                       // begun last
-  std::optional<Error> error;                       // the last one; it may be over
-  bool failing = false;                             // nothing is recorded now
+  std::vector<TopicStatus> topics;  // by TopicId
+  std::uint64_t files = 0;          // begun
+  std::filesystem::path file;       // begun last
+  Rotation::Added kept;             // of those that it has begun, what there is now
+  std::uint64_t removed = 0;        // files that the quota took, those of earlier recorders too
+  std::optional<Error> error;       // the last one; it may be over
+  bool failing = false;             // nothing is recorded now
   std::uint64_t lost_attachments = 0;
 };
 
 class Recorder {
  public:
-  // Errors: those of Rotation::open and McapWriter::create; the quota is less than two files', the queue less than 4
-  // KiB; the disk has less free than is to be left.
+  // Errors: those of Rotation::open and McapWriter::create; the quota is less than two files', or than twice what each
+  // begins with, the queue less than 4 KiB; the disk has less free than is to be left.
   [[nodiscard]] static Expected<std::unique_ptr<Recorder>> open(RecorderOptions options);
   // After close(), and when work() has returned: what is queued would be lost.
   ~Recorder();
@@ -179,17 +190,26 @@ class Recorder {
   void write_one(const Item& item, std::span<const std::byte> data);
   [[nodiscard]] Expected<void> begin_file(mcap::Timestamp now);
   [[nodiscard]] Expected<void> leave_room();
+  [[nodiscard]] Expected<void> begin_with(const mcap::Metadata& note);
   [[nodiscard]] Expected<void> repeat_latched(mcap::Timestamp now);
+  [[nodiscard]] Expected<void> measure_beginning();
   void write_attachment(const mcap::Attachment& attachment);
   void write_note(const mcap::Metadata& metadata, mcap::Timestamp now);
   // With so many bytes more.
   [[nodiscard]] bool is_full(std::size_t size) const;
+  // The oldest files go before all of them are larger than the quota with so many bytes more. False: this file alone
+  // would be. Error: one cannot be removed.
+  [[nodiscard]] Expected<bool> fits_quota(std::size_t size);
+  // What a file takes to describe it, if it does not yet.
+  [[nodiscard]] std::size_t size_of_channel(TopicId topic) const;
   [[nodiscard]] Expected<std::uint16_t> channel_of(TopicId topic);
   [[nodiscard]] Expected<void> tell_drops();
   enum class Empty : std::uint8_t { kKept, kRemoved };
   void end_file(Empty empty = Empty::kKept);
   void failed(const Error& error, mcap::Timestamp now);
   void lose(TopicId topic, std::uint64_t count);
+  void lose_too_long(const Item& item);
+  void show_files();  // in status_; mutex_ is held
 
   const RecorderOptions options_;
   const std::size_t half_bytes_;
@@ -214,7 +234,9 @@ class Recorder {
   std::vector<Topic> known_;  // topics_, as it was last seen
   std::vector<InFile> in_file_;
   std::map<TopicId, Newest> newest_;
-  std::size_t words_ = 64;  // how long what a file says of drops may become
+  std::size_t words_ = 512;     // how long what a file says of drops and of the end may become
+  std::uint64_t longest_ = 0;   // the file that is being written may become
+  std::uint64_t has_room_ = 0;  // of the quota, so much is left for it by the others
   std::map<std::pair<std::string, std::string>, std::uint16_t> schemas_;  // of the file, by type and text
   std::vector<std::uint64_t> told_before_;  // drops that earlier files tell of, by TopicId
   std::vector<std::uint64_t> told_;         // and with this one

@@ -234,7 +234,7 @@ TEST_F(RecorderTest, TheFirstFileMayHaveThePlainName) {
   RecorderOptions told = options();
   told.first = FirstFile::kPlain;
   for (const char* name : {"run.mcap", "run_1.mcap", "run_2.mcap"}) {
-    EXPECT_TRUE(Rotation::open(folder_.path(), "run", told.first)->empty() == (std::string(name) == "run.mcap"));
+    EXPECT_EQ(Rotation::open(folder_.path(), "run", told.first)->at_first(), std::string(name) == "run.mcap");
     auto recorder = Recorder::open(told);
     ASSERT_TRUE(recorder) << recorder.error().line();
     EXPECT_EQ((*recorder)->status().file, folder_ / name);

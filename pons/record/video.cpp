@@ -56,30 +56,44 @@ class Film {
     if (error != 0) return cannot("start ffmpeg", path, error);
     return Film(std::move(ours), child);
   }
-  Film(Film&& other) noexcept : to_(std::move(other.to_)), child_(std::exchange(other.child_, -1)) {}
+  Film(Film&& other) noexcept
+      : to_(std::move(other.to_)), child_(std::exchange(other.child_, -1)), took_all_(other.took_all_) {}
   Film& operator=(Film&&) = delete;
-  ~Film() { (void)end(); }
+  ~Film() { (void)end({}); }
 
   // False: it takes no more.
-  bool add(std::span<const std::uint8_t> picture) const {
+  bool add(std::span<const std::uint8_t> picture) {
     while (!picture.empty()) {
       const ssize_t sent = ::send(to_.number(), picture.data(), picture.size(), MSG_NOSIGNAL);
       if (sent < 0 && errno == EINTR) continue;
-      if (sent < 0) return false;
+      if (sent < 0) {
+        took_all_ = false;
+        return false;
+      }
       picture = picture.subspan(static_cast<std::size_t>(sent));
     }
     return true;
   }
 
-  // Whether it has made the film.
-  bool end() {
-    to_.close();
-    if (child_ < 0) return false;
+  // Errors: it has made no film for `path`, or one of a part of what it was given.
+  Expected<void> end(const std::filesystem::path& path) {
+    if (child_ < 0) return fail("ffmpeg has ended already", path.string());
+    ::shutdown(to_.number(), SHUT_WR);
     int status = 0;
     while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
     }
     child_ = -1;
-    return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    // Of what lay there and was not read by the time that nobody could any more, the system makes an error.
+    int unread = 0;
+    socklen_t size = sizeof unread;
+    if (::getsockopt(to_.number(), SOL_SOCKET, SO_ERROR, &unread, &size) != 0 || unread != 0) took_all_ = false;
+    to_.close();
+    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+      return fail("ffmpeg has made no film of it", path.string(), "it has said why on the error stream");
+    if (!took_all_)
+      return fail("ffmpeg has ended before it had read all pictures", path.string(),
+                  "see which program is called ffmpeg here, and what it says on the error stream");
+    return {};
   }
 
  private:
@@ -87,6 +101,7 @@ class Film {
 
   Descriptor to_;
   pid_t child_;
+  bool took_all_ = true;  // so far
 };
 
 // ffmpeg's name for what made a picture; nothing: it is neither JPEG nor PNG.
@@ -169,8 +184,7 @@ Expected<Filmed> export_mp4(const McapReader& reader, const std::string& topic, 
     return film->add(picture.data);  // where it takes no more, it has said why
   };
   const auto read = reader.each_message(query, take);
-  if (done && film && !film->end())
-    done = fail("ffmpeg has made no film of it", path.string(), "it has said why on the error stream");
+  if (done && film) done = film->end(path);
   film.reset();
   if (!read) done = std::unexpected(read.error());
   if (!done) {

@@ -150,6 +150,26 @@ std::map<std::string, std::string, std::less<>> glimpse(std::string_view text,
   return std::move(glimpser.seen);
 }
 
+bool nests_deeper(std::string_view text, std::size_t levels) {
+  std::size_t open = 0;
+  bool quoted = false;
+  // As long as it is JSON, a parser sees the same brackets; where it is none any more, a parser has stopped.
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char each = text[i];
+    if (quoted) {
+      if (each == '\\') ++i;
+      quoted = each != '"';
+    } else if (each == '"') {
+      quoted = true;
+    } else if (each == '[' || each == '{') {
+      if (++open > levels) return true;
+    } else if ((each == ']' || each == '}') && open > 0) {
+      --open;
+    }
+  }
+  return false;
+}
+
 std::string excerpt(std::string_view text, std::size_t bytes) {
   const bool cut = text.size() > bytes;
   if (cut) {
@@ -158,12 +178,16 @@ std::string excerpt(std::string_view text, std::size_t bytes) {
     text = text.substr(0, end);
   }
   std::string shown;
-  for (const char byte : text) {
-    const auto code = static_cast<unsigned char>(byte);
+  const auto code_at = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const unsigned code = code_at(i), next = code_at(i + 1);
     if (code < 0x20 || code == 0x7F) {
       shown += fmt::format("\\x{:02x}", code);
+    } else if (code == 0xC2 && next >= 0x80 && next < 0xA0) {
+      shown += fmt::format("\\x{:02x}", next);
+      ++i;
     } else {
-      shown += byte;
+      shown += text[i];
     }
   }
   return cut ? shown + "…" : shown;

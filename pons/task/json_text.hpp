@@ -25,7 +25,13 @@ inline constexpr int kMaxJsonDepth = 16;  // arrays and objects inside one anoth
 [[nodiscard]] std::map<std::string, std::string, std::less<>> glimpse(std::string_view text,
                                                                       std::span<const std::string_view> places);
 
-// Text cut to `bytes` at a character border and with control characters made visible: fit for an error line.
+// Whether arrays and objects lie deeper inside one another than `levels`, the outermost counts, in what a parser would
+// read of `text`, be that as long as it may. Nothing is built: what is built so deep takes the stack of whoever copies
+// it or writes it out.
+[[nodiscard]] bool nests_deeper(std::string_view text, std::size_t levels);
+
+// Text cut to `bytes` at a character border and with control characters made visible, those of ISO 8859 (U+0080 to
+// U+009F) among them, which some terminals obey: fit for an error line.
 [[nodiscard]] std::string excerpt(std::string_view text, std::size_t bytes = 64);
 
 }  // namespace pons::task

@@ -102,10 +102,27 @@ TEST(Glimpse, SeesAsFarAsTheTextCanBeRead) {
   for (const char* text : {"", "{", "]", "op"}) EXPECT_EQ(seen(text), Seen{}) << text;
 }
 
+TEST(NestsDeeper, CountsWhatAParserWouldOpen) {
+  EXPECT_FALSE(nests_deeper("", 0));
+  EXPECT_FALSE(nests_deeper("1", 0));
+  EXPECT_TRUE(nests_deeper("[]", 0));
+  EXPECT_FALSE(nests_deeper(R"([[],{"a":[1]},[[]]])", 3));
+  EXPECT_TRUE(nests_deeper(R"([[],{"a":[1]},[[]]])", 2));
+  EXPECT_FALSE(nests_deeper(R"(["[[[[","\"[[[[",{"\\":"{{{"}])", 2)) << "brackets in text open nothing";
+  EXPECT_TRUE(nests_deeper(R"(["\\",[[]]])", 2)) << "nor does a backslash of its own hide a quotation mark";
+  EXPECT_TRUE(nests_deeper(nested(1000), 999));
+  EXPECT_FALSE(nests_deeper(nested(1000), 1000));
+  EXPECT_FALSE(nests_deeper("]]]]]][", 1));
+}
+
 TEST(Excerpt, CutsBetweenCharactersAndShowsControls) {
   EXPECT_EQ(excerpt("abc"), "abc");
   EXPECT_EQ(excerpt("aüb", 2), "a…");
   EXPECT_EQ(excerpt("a\nb\x7f"), "a\\x0ab\\x7f");
+  EXPECT_EQ(excerpt("a\xc2\x9b"
+                    "31m\xc2\xa0é"),
+            "a\\x9b31m\xc2\xa0é")
+      << "CSI as one character";
 }
 
 }  // namespace

@@ -34,6 +34,16 @@ class Recording : public ::testing::Test {
     expect_refused(words, says);
   }
   [[nodiscard]] std::string file(const std::string& name) const { return folder_ / name; }
+  // A recording that says that of its run, and holds nothing else.
+  void note(const std::string& name, const record::mcap::Texts& texts, const record::mcap::Texts& made_of = {}) const {
+    const auto writer = record::McapWriter::create(folder_ / name, {});
+    ASSERT_TRUE(writer);
+    ASSERT_TRUE((*writer)->note({"pons.run", texts}));
+    ASSERT_TRUE((*writer)->note({"pons.made_of", made_of}));
+    ASSERT_TRUE((*writer)->finish());
+  }
+  static inline const record::mcap::Texts kGood{
+      {"world", "small_cell"}, {"pace", "lockstep"}, {"seed", "1"}, {"keep_free_mib", "64"}, {"faults", "none"}};
 
   Folder folder_;
 };
@@ -58,9 +68,12 @@ TEST_F(Recording, WhatCannotBeRecordedIsRefusedByName) {
   expect_run_refused({"--record", file("a.mcap"), "--record-quota", "9", "--record-file", "5"},
                      {"--record-quota 9: is less than two files take; ask for 10 at least"});
   expect_run_refused({"--record", file("a.mcap"), "--journal", file("a.mcap")}, {"--journal", "--record"});
+  expect_run_refused({"--record", file("a.mcap"), "--record-file", "1", "--report", file("a_1.mcap")},
+                     {"--report ", "a_1.mcap: may become a further file of --record "});
   EXPECT_FALSE(fs::exists(folder_ / "a.mcap"));
   // Where nobody can make a file, whatever he may.
   expect_run_refused({"--record", "/sys/a.mcap"}, {"/sys/a.mcap: cannot create the file"});
+  expect_run_refused({"--record", "/proc/a.mcap"}, {"/proc: no file can be made in this folder"});
   write_text(folder_ / "file", "no folder");
   expect_run_refused({"--record", file("file/a.mcap")}, {"file: "});
 }
@@ -89,21 +102,14 @@ TEST_F(Recording, WhatCannotBeReplayedIsRefusedByName) {
   expect_refused({"replay", file("text.mcap")}, {"text.mcap"});
   record::write_sample(folder_ / "other.mcap", {}, 12);
   expect_refused({"replay", file("other.mcap")}, {"other.mcap: does not say which run it is of"});
-  const auto note = [&](const std::string& name, const record::mcap::Texts& texts) {
-    const auto writer = record::McapWriter::create(folder_ / name, {});
-    ASSERT_TRUE(writer);
-    ASSERT_TRUE((*writer)->note({"pons.run", texts}));
-    ASSERT_TRUE((*writer)->note({"pons.made_of", {}}));
-    ASSERT_TRUE((*writer)->finish());
-  };
-  const record::mcap::Texts good{
-      {"world", "small_cell"}, {"pace", "lockstep"}, {"seed", "1"}, {"keep_free_mib", "64"}, {"faults", "none"}};
   const auto with = [&](const std::string& key, const std::string& text) {
-    auto texts = good;
+    auto texts = kGood;
     text.empty() ? void(texts.erase(key)) : void(texts[key] = text);
     note("odd.mcap", texts);
     return file("odd.mcap");
   };
+  // One that could be read: a recording names no file of this machine.
+  write_text(folder_ / "plan.yaml", "missed_grasp: {a_pick: 0.5}\n");
   const std::vector<std::tuple<std::string, std::string, std::string>> odd{
       {"seed", "", "odd.mcap: what it says of its run is not whole: 'seed' is missing"},
       {"seed", "-1", "'seed' is no number it can be"},
@@ -111,7 +117,8 @@ TEST_F(Recording, WhatCannotBeReplayedIsRefusedByName) {
       {"visits", "[1]", "'visits' is of another form"},
       {"errands", "{", "'errands' is of another form"},
       {"world", "nowhere", "nowhere"},
-      {"faults", "hail", "hail"},
+      {"faults", "hail", "odd.mcap: its plan of faults 'hail' is none of the world's, nor in the recording"},
+      {"faults", file("plan.yaml"), "is none of the world's, nor in the recording"},
       {"manifest", "a,b\n1,2\n", "manifest.csv"},
       {"pace", "realtime", "was recorded by the clock"}};
   for (const auto& [key, text, says] : odd) {
@@ -120,6 +127,47 @@ TEST_F(Recording, WhatCannotBeReplayedIsRefusedByName) {
     expect_refused({"replay", "--quiet", path}, {says});
     fs::remove(path);
   }
+}
+
+TEST_F(Recording, APlanOfFaultsInARecordingHasANameOfAFile) {
+  for (const std::string& name : {std::string(".."), std::string("/"), std::string("a/.."), std::string("a\0b", 3)}) {
+    SCOPED_TRACE(name);
+    auto texts = kGood;
+    texts["faults"] = name;
+    texts["faults_file"] = "missed_grasp: {a_pick: 0.5}\n";
+    note("odd.mcap", texts);
+    expect_refused({"replay", "--quiet", file("odd.mcap")}, {"odd.mcap: its plan of faults has no name of a file: '"});
+    fs::remove(folder_ / "odd.mcap");
+  }
+}
+
+// What copies JSON goes down as far as that does.
+TEST_F(Recording, ErrandsThatAreNestedTooDeepTakeNoStack) {
+  constexpr std::size_t kDeep = 1'000'000;
+  auto texts = kGood;
+  texts["errands"] = R"([{"at_ns":0,"task":)" + std::string(kDeep, '[') + std::string(kDeep, ']') + "}]";
+  note("deep.mcap", texts);
+  expect_refused({"replay", file("deep.mcap")}, {"deep.mcap: ", "'errands' is nested deeper than 18 levels"});
+  EXPECT_EQ(run_pons({"recording", "info", file("deep.mcap")}).code, 0);
+}
+
+TEST_F(Recording, WhatARecordingSaysWritesNothingToATerminal) {
+  auto texts = kGood;
+  texts["attended"] = "--socket\x1b[2J";
+  note("odd.mcap", texts,
+       {{"pons", "0\x1b[31m.1"},
+        {"x\xc2\x9b"
+         "2J\nworlds are gone",
+         "1"}});
+  const Finished again = run_pons({"replay", file("odd.mcap")});
+  EXPECT_THAT(again.err, AllOf(HasSubstr("pons: not as recorded: it was recorded by pons 0?[31m.1; this is "),
+                               HasSubstr("pons: not as recorded: worlds/x?2J?worlds are gone is not there any more\n"),
+                               HasSubstr("what others asked for (--socket?[2J) is not asked for again\n")));
+  for (const char* never : {"\x1b", "\x9b", "\nworlds"}) EXPECT_THAT(again.err, testing::Not(HasSubstr(never)));
+  texts["visits"] = R"(["\u001b[2J@1+2"])";
+  fs::remove(folder_ / "odd.mcap");
+  note("odd.mcap", texts);
+  expect_refused({"replay", "--quiet", file("odd.mcap")}, {"'?[2J'"});
 }
 
 // A disk that is full, as a limit of the size of files; the journal has room for what little it needs.
@@ -163,16 +211,23 @@ TEST_F(Recording, ARunByTheClockIsRecordedByAThreadOfItsOwn) {
   expect_refused({"replay", file("a.mcap")}, {"a.mcap: was recorded by the clock"});
 }
 
-// A bridge of a body that lives on: the next one records on, in a file of its own.
+// A bridge of a body that lives on: the next one records on, in a file of its own. What others have recorded it leaves
+// alone.
 TEST_F(Recording, ABridgeThatFollowsAnotherRecordsOn) {
   const std::string link = fmt::format("recording-{}", ::getpid());
   Running body(folder_.path(), "body", {"body", "small_cell", "--parcels", "3", "--link", link, "--quiet"});
-  const auto bridge = [&](const char* name) {
+  const auto bridge = [&](const char* name, const char* record = "a.mcap") {
     return std::make_unique<Running>(
         folder_.path(), name,
         std::vector<std::string>{"bridge", "small_cell", "--parcels", "3", "--link", link, "--quiet", "--journal",
-                                 file("j.db"), "--socket", file("s"), "--record", file("a.mcap")});
+                                 file("j.db"), "--socket", file("s"), "--record", file(record)});
   };
+  record::write_sample(folder_ / "other.mcap", {}, 12);
+  const std::string other = read_text(folder_ / "other.mcap");
+  const Finished refused = bridge("refused", "other.mcap")->wait();
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("other.mcap: is there already, and not of this recording"));
+  EXPECT_TRUE(read_text(folder_ / "other.mcap") == other);
   auto first = bridge("first");
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   const auto messages = [&] {
@@ -184,6 +239,7 @@ TEST_F(Recording, ABridgeThatFollowsAnotherRecordsOn) {
   EXPECT_EQ(first->wait().code, -SIGKILL);
   const Finished second = bridge("second")->wait();
   EXPECT_EQ(second.code, 0) << second.err;
+  EXPECT_THAT(second.out, HasSubstr(fmt::format("recording: {}: ", file("a_1.mcap"))));
   EXPECT_EQ(body.wait().code, 0);
   const auto kept = McapReader::open(folder_ / "a.mcap"), on = McapReader::open(folder_ / "a_1.mcap");
   ASSERT_TRUE(kept && on);

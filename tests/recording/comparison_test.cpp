@@ -144,6 +144,24 @@ TEST_F(ComparisonTest, AFileThatWasCutGoesAsFarAsItGoes) {
   EXPECT_EQ(repaired.equal(), comparison.equal());
 }
 
+// Behind it messages are missing: because of it.
+TEST_F(ComparisonTest, AFileThatIsDamagedIsSaidToBe) {
+  const auto file = recorded({.periods = 1000});
+  const auto chunks = (**record::McapReader::open(file)).contents().chunks;
+  ASSERT_GT(chunks.size(), 6U);
+  std::string bytes = record::read_bytes(file);
+  bytes[chunks[4].offset + 60] ^= 0x04;
+  record::write_bytes(folder_ / "flipped.mcap", bytes);
+  Comparison comparison(folder_ / "flipped.mcap");
+  Course{.periods = 1000}.show(comparison);
+  comparison.end();
+  EXPECT_EQ(comparison.difference(), "");
+  EXPECT_GT(comparison.equal(), 300U);
+  EXPECT_THAT(comparison.cut(),
+              AllOf(HasSubstr(fmt::format("flipped.mcap: byte {}: the chunk is damaged", chunks[4].offset)),
+                    HasSubstr("pons recording check"), HasSubstr("pons recording repair")));
+}
+
 // Whose name is that of a file that would follow.
 TEST_F(ComparisonTest, AnotherRunIsNotFollowed) {
   const auto file = recorded({});

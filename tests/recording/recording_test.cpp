@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
@@ -13,6 +14,7 @@
 #include <sstream>
 
 #include "pons/record/mcap_check.hpp"
+#include "pons/record/mcap_records.hpp"
 #include "pons/record/recorder.hpp"
 #include "pons/record/test_recording.hpp"
 #include "pons/wire/types/sensor_msgs/msg/compressed_image.hpp"
@@ -135,6 +137,65 @@ TEST_F(RecordingCommand, InfoShowsWhatOneHolds) {
   EXPECT_EQ(told["topics"][0]["type"], "test_msgs/msg/Text");
 }
 
+TEST_F(RecordingCommand, InfoShowsTheRestWhereWhatWasDroppedCannotBeRead) {
+  const std::filesystem::path file = folder_ / "drops.mcap";
+  const auto writer = record::McapWriter::create(file, {});
+  ASSERT_TRUE(writer);
+  const auto channel = (*writer)->add_channel(0, "/a", "json", {});
+  ASSERT_TRUE(channel && (*writer)->write({*channel, 0, 0, 0, record::bytes_of("1")}));
+  ASSERT_TRUE((*writer)->note({std::string(record::kDropsName), {{"/a", "7"}}}));
+  ASSERT_TRUE((*writer)->finish());
+  EXPECT_THAT(recording({"info", file.string()}).out, HasSubstr("/a     json           1         -         7\n"));
+  // Texts that end behind the record; what lists it is as it was.
+  std::string bytes = record::read_bytes(file);
+  bytes.replace(bytes.find(record::kDropsName) + record::kDropsName.size(), 4, 4, '\xff');
+  record::write_bytes(file, bytes);
+  const Finished info = recording({"info", file.string()});
+  EXPECT_EQ(info.code, 0);
+  EXPECT_THAT(info.out, HasSubstr("/a     json           1         -         0\n"));
+  EXPECT_THAT(info.err, HasSubstr("how many were dropped is not known: " + file.string() + ": byte "));
+}
+
+// Control characters, also those of ISO 8859, and lines that would look like another's.
+TEST_F(RecordingCommand, WhatAFileSaysOfItselfWritesNothingToATerminal) {
+  const std::string hostile =
+      "\x1b]0;x\x07\xc2\x9b"
+      "2J\x9b\x7f\nnot ours";
+  record::mcap::Bytes bytes;
+  const auto attach = [&](const std::string& name) {
+    write(bytes, record::mcap::Attachment{0, 0, name, "text/" + hostile, {}});
+  };
+  bytes.raw(record::mcap::kMagic);
+  write(bytes, record::mcap::Header{hostile, hostile});
+  write(bytes, record::mcap::Schema{1, hostile, "ros2msg", ""});
+  write(bytes, record::mcap::Channel{1, 1, "/" + hostile, "cdr", {}});
+  write(bytes, record::mcap::Message{1, 0, 5, 5, record::bytes_of("x")});
+  write(bytes, record::mcap::Metadata{std::string(record::kDropsName), {{"/" + hostile, "1"}}});
+  attach(hostile);
+  attach(hostile);
+  bytes.data()[bytes.size() - 1] ^= std::byte{1};  // of its checksum
+  write(bytes, record::mcap::ChunkHead{.uncompressed_size = 1, .compression = hostile, .records_size = 1});
+  bytes.number(std::uint8_t{0});
+  const std::string file = (folder_ / "hostile.mcap").string(), out = (folder_ / "out").string();
+  record::write_bytes(file, record::text_of(bytes.span()));
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"info", file},
+                                                {"info", file, "--json"},
+                                                {"check", file},
+                                                {"export", file, "--jsonl", out},
+                                                {"export", file, "--mp4", out, "--topic", "/" + hostile},
+                                                {"export", file, "--csv", out, "--topic", hostile},
+                                                {"repair", file, "--output", out, "--overwrite"}}) {
+    const Finished done = recording(words);
+    EXPECT_GE(done.code, 0);
+    for (const std::string& said : {done.out, done.err}) {
+      for (const char* never : {"\x1b", "\x07", "\x7f", "\x9b", "\nnot ours"})
+        EXPECT_THAT(said, testing::Not(HasSubstr(never))) << testing::PrintToString(words);
+    }
+  }
+  EXPECT_THAT(recording({"check", file}).err,
+              testing::AllOf(HasSubstr("the chunk is compressed by '"), HasSubstr("the checksum of the attachment '")));
+}
+
 TEST_F(RecordingCommand, CheckTellsAndRepairMends) {
   const Finished whole = recording({"check", (folder_ / "a.mcap").string()});
   EXPECT_EQ(whole.code, 0);
@@ -150,6 +211,10 @@ TEST_F(RecordingCommand, CheckTellsAndRepairMends) {
   EXPECT_EQ(again.code, 2);
   EXPECT_THAT(again.err,
               HasSubstr("cut_repaired.mcap: there is such a file already; choose another name, or give --overwrite"));
+  const Finished nowhere = recording({"repair", (folder_ / "a.mcap").string(), "--output", ""});
+  EXPECT_EQ(nowhere.code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("--output: is empty"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a_repaired.mcap"));
   const std::string cut_file = (folder_ / "cut.mcap").string();
   EXPECT_EQ(recording({"repair", cut_file, "--output", cut_file, "--overwrite"}).code, 0);
   EXPECT_EQ(recording({"check", cut_file}).code, 0);
@@ -281,10 +346,39 @@ TEST_F(RecordingFilm, PicturesGoToFfmpegOneBehindTheOther) {
   EXPECT_EQ(record::read_bytes(folder_ / "camera.csv"), whole);
 }
 
+// By whoever is given the pictures, at a moment at which most of them are still to be read.
+TEST_F(RecordingFilm, WhoeverTellsItToEndHearsThatItWasInterruptedAndFindsNothingHalfWritten) {
+  const auto writer = record::McapWriter::create(folder_ / "long.mcap", {});
+  ASSERT_TRUE(writer);
+  using wire::sensor_msgs::msg::CompressedImage;
+  const auto facts = record::ros_topic<CompressedImage>("/camera");
+  const auto schema = (*writer)->add_schema(facts.type, facts.schema_encoding, facts.schema);
+  const auto channel = (*writer)->add_channel(*schema, "/camera", "cdr", facts.metadata);
+  CompressedImage image;
+  image.data.resize(4'000'000);  // more than waits between two processes, and than a chunk
+  std::ranges::copy(std::array<std::uint8_t, 3>{0xFF, 0xD8, 0xFF}, image.data.begin());
+  std::vector<std::byte> bytes;
+  ASSERT_TRUE(wire::encode(image, bytes));
+  for (std::uint32_t i = 0; i < 3; ++i) ASSERT_TRUE((*writer)->write({*channel, i, i * 250'000'000ULL, 0, bytes}));
+  ASSERT_TRUE((*writer)->finish());
+  for (const std::string signal : {"INT", "TERM", "HUP"}) {
+    ffmpeg("kill -" + signal + " $PPID; /bin/cat > \"$last\"");
+    const Finished told =
+        run_pons({"recording", "export", (folder_ / "long.mcap").string(), "--mp4", out(), "--topic", "/camera"},
+                 {"PATH=" + folder_.path().string()});
+    EXPECT_EQ(told.code, 130) << signal << told.out;
+    EXPECT_THAT(told.err, HasSubstr("long.mcap: interrupted"));
+    for (const auto& each : std::filesystem::directory_iterator(folder_.path()))
+      EXPECT_THAT(each.path().filename().string(), testing::Not(HasSubstr("out.mp4")));
+  }
+}
+
 TEST_F(RecordingFilm, WhatCannotBeFilmedIsNamedAndLeavesNothing) {
   EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg is not installed; install it"));
   ffmpeg("echo no such codec >&2; exit 1");
   EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg has made no film of it"));
+  ffmpeg("echo a part > \"$last\"");
+  EXPECT_THAT(film("/camera").err, HasSubstr("out.mp4: ffmpeg has ended before it had read all pictures"));
   EXPECT_THAT(film("/other").err, HasSubstr("/other: picture 0 is neither JPEG nor PNG"));
   EXPECT_THAT(film("/no").err, HasSubstr("/no: there is no such topic"));
   EXPECT_EQ(run_pons({"recording", "export", (folder_ / "film.mcap").string(), "--mp4", out()}).code, 2);
