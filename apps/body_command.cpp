@@ -100,7 +100,7 @@ int body(const BodyOptions& options) {
   if (auto possible = check_files(files, written); !possible) return bad_input(possible.error());
   const auto world = cell_named(options.world, "pons body");
   if (!world) return bad_input(world.error());
-  const auto manifest = manifest_of(options.parcels, *world, "pons body");
+  const auto manifest = manifest_of(options.parcels, *world);
   if (!manifest) return bad_input(manifest.error());
   return run_body(options, *world, *manifest);
 }
@@ -123,7 +123,7 @@ void add_body(CLI::App& app, Chosen& chosen) {
   command->add_flag("--explain", options->explain,
                     "A line for each parcel not sorted as ordered and each limit exceeded");
   command->add_flag("--quiet", options->quiet, "Not a word about bridges that come and go");
-  refuse_empty(*command);
+  refuse_no_values(*command);
   command->callback([options, &chosen] { chosen = [options] { return body(*options); }; });
 }
 

@@ -189,7 +189,7 @@ int bridge(const BridgeCommandOptions& options) {
   if (!world) return bad_input(world.error());
   if (auto served = check_outside(*world, options.ros, runner::Pace::kRealTime); !served)
     return bad_input(served.error());
-  const auto manifest = manifest_of(options.parcels, *world, "pons bridge");
+  const auto manifest = manifest_of(options.parcels, *world);
   if (!manifest) return bad_input(manifest.error());
   auto plan = world::load_faults(*world, options.faults);
   if (!plan) return bad_input(plan.error());
@@ -237,7 +237,7 @@ void add_bridge(CLI::App& app, Chosen& chosen) {
   add_keep_free(*command, options->keep_free_mib);
   command->add_flag("--recover", options->recover, "Bring an arm that is found outside its position limits slowly in");
   command->add_flag("--quiet", options->quiet, "No progress");
-  refuse_empty(*command);
+  refuse_no_values(*command);
   command->callback([options, &chosen] { chosen = [options] { return bridge(*options); }; });
 }
 

@@ -374,7 +374,7 @@ void add_recording(CLI::App& app, Chosen& chosen) {
   auto* mp4 = tables->add_option("--mp4", options->mp4, "A film of a topic of compressed images, by ffmpeg");
   csv->excludes(jsonl);
   mp4->excludes(csv)->excludes(jsonl);
-  for (CLI::App* each : {shows, checks, mend, tables}) refuse_empty(*each);
+  for (CLI::App* each : {shows, checks, mend, tables}) refuse_no_values(*each);
   // After that: a topic's name may be empty.
   tables->add_option("--topic", options->topics, "Only this one; may be given several times")->allow_extra_args(false);
   tables->add_flag("--overwrite", options->overwrite, "New files may replace others");

@@ -201,7 +201,7 @@ Expected<CellInputs> cell_inputs(const RunOptions& options, const world::World& 
     return fail(fmt::format("{} has {} arms, which run in virtual time", world.name, world.arms().size()), "--realtime",
                 "leave it out");
   }
-  auto manifest = has_parcels(options) ? manifest_of(options.parcels, world, "pons run") : world::Manifest{};
+  auto manifest = has_parcels(options) ? manifest_of(options.parcels, world) : world::Manifest{};
   if (!manifest) return std::unexpected(manifest.error());
   auto setup = body_setup(options.body, options.parcels.seed, world);
   if (!setup) return std::unexpected(setup.error());
@@ -241,7 +241,7 @@ void add_options(CLI::App& command, RunOptions& options) {
   command.add_flag("--explain", options.explain,
                    "A line for each parcel not sorted as ordered and each limit exceeded");
   command.add_flag("--quiet", options.quiet, "No progress");
-  refuse_empty(command);
+  refuse_no_values(command);
 }
 
 }  // namespace

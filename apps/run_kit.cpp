@@ -72,7 +72,12 @@ std::uint64_t state_hash(const BodyHalf& body, const referee::Verdict& verdict) 
   return digest.value();
 }
 
-const CLI::Validator not_empty([](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
+const CLI::Validator is_value(
+    [](const std::string& text) {
+      if (text.empty()) return std::string("is empty");
+      return text.starts_with("--") ? fmt::format("'{}' is an option, not what it is to be", text) : std::string();
+    },
+    "");
 
 }  // namespace
 
@@ -90,24 +95,19 @@ bool interrupted() { return interrupts > 0; }
 int interruptions() { return interrupts; }
 
 void add_parcel_options(CLI::App& command, ParcelOptions& options) {
-  auto* parcels =
-      command.add_option("--parcels", options.parcels, "How many parcels; 1 to 1000000 (200)")->check(whole_number());
+  auto* parcels = command.add_option("--parcels", options.parcels, "How many parcels; 1 to 1000000 (200)")
+                      ->check(whole_number(1, world::kMaxParcels));
   command.add_option("--manifest", options.manifest, "CSV file of parcels, instead of drawing them from the seed");
   command.add_option("--seed", options.seed, "What is drawn: parcels, arrivals, noise; 0 or more (1)")
       ->check(whole_number());
   command.parse_complete_callback([&options, parcels] { options.parcels_given = parcels->count() > 0; });
 }
 
-Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world,
-                                      const std::string& command) {
+Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world) {
   if (options.manifest.empty()) return world::draw_manifest(world, options.parcels, options.seed);
   auto manifest = world::read_manifest(options.manifest, world);
-  if (manifest && options.parcels_given) {
-    if (options.parcels < 1)
-      return fail("--parcels is " + std::to_string(options.parcels), command, "ask for at least 1");
-    if (manifest->size() > static_cast<std::size_t>(options.parcels))
-      manifest->resize(static_cast<std::size_t>(options.parcels));
-  }
+  if (manifest && options.parcels_given && manifest->size() > static_cast<std::size_t>(options.parcels))
+    manifest->resize(static_cast<std::size_t>(options.parcels));
   return manifest;
 }
 
@@ -136,9 +136,9 @@ void add_keep_free(CLI::App& command, std::uint64_t& mib) {
       ->check(whole_number(1'000'000));
 }
 
-void refuse_empty(CLI::App& command) {
+void refuse_no_values(CLI::App& command) {
   for (CLI::Option* option : command.get_options()) {
-    if (option->get_items_expected_max() > 0) option->check(not_empty);
+    if (option->get_items_expected_max() > 0) option->check(is_value);
   }
 }
 

@@ -42,8 +42,7 @@ struct ParcelOptions {
   bool parcels_given = false;
 };
 void add_parcel_options(CLI::App& command, ParcelOptions& options);
-[[nodiscard]] Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world,
-                                                    const std::string& command);
+[[nodiscard]] Expected<world::Manifest> manifest_of(const ParcelOptions& options, const world::World& world);
 
 // Error: none is named, or there is no such world.
 [[nodiscard]] Expected<world::World> world_named(const std::string& name, const std::string& command);
@@ -58,8 +57,9 @@ void add_parcel_options(CLI::App& command, ParcelOptions& options);
 void add_keep_free(CLI::App& command, std::uint64_t& mib);
 [[nodiscard]] inline std::uint64_t bytes_of(std::uint64_t mib) { return mib << 20; }
 
-// Refuses an option that was given an empty text, most often a variable of a script that was never set.
-void refuse_empty(CLI::App& command);
+// Refuses an option that was given an empty text, most often a variable of a script that was never set, or the next
+// option.
+void refuse_no_values(CLI::App& command);
 
 // ---- files ----
 

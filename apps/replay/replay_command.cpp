@@ -184,7 +184,7 @@ void add_replay(CLI::App& app, Chosen& chosen) {
   command->add_option("file", options->file, "What pons run --record has written, in virtual time")->required();
   add_record_options(*command, options->record);
   command->add_flag("--quiet", options->quiet, "Not a word about what is no longer as it was recorded");
-  refuse_empty(*command);
+  refuse_no_values(*command);
   command->callback([options, &chosen] { chosen = [options] { return replay(*options); }; });
 }
 

@@ -252,7 +252,7 @@ void add_sweep(CLI::App& app, Chosen& chosen, const std::vector<std::string>& wo
   command->add_flag("--quiet", options->quiet, "No progress");
   merge->excludes(seeds)->excludes(plan)->excludes(one);
   one->excludes(seeds)->excludes(plan);
-  refuse_empty(*command);
+  refuse_no_values(*command);
   command->callback([options, seeds, merge, one, &chosen] {
     if (seeds->count() + merge->count() + one->count() == 0) throw CLI::RequiredError("--seeds");
     chosen = [options] { return sweep(*options); };

@@ -78,8 +78,9 @@ TEST_F(BadInput, NamesAndNumbers) {
   expect_refused({"run"}, {"parcel_cell", "small_cell"});
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--journal", ":memory:"}, {"--journal :memory:"});
   expect_refused({"skills", "place", "--world", "no_such_world"}, {"no_such_world", "parcel_cell"});
-  expect_refused({"run", "parcel_cell", "--parcels", "0"}, {"0"});
-  expect_refused({"run", "parcel_cell", "--parcels", "1000000000"}, {"1000000000"});
+  for (const char* const count : {"-1", "0", "1000001"})
+    expect_refused({"run", "parcel_cell", "--parcels", count},
+                   {std::string("'") + count + "' is not a whole number from 1 to 1000000;"});
   expect_refused({"run", "parcel_cell", "--parcels", "many"}, {"--parcels"});
   expect_refused({"run", "parcel_cell", "--manifest", folder_ / "none.csv"}, {"none.csv"});
   expect_refused({"skills", "fly"}, {"fly"});
@@ -95,7 +96,8 @@ TEST_F(BadInput, PlacesThatCannotBeWritten) {
 
 TEST_F(BadInput, NothingGivenOrTooMuch) {
   for (const char* option : {"--manifest", "--journal", "--report", "--log", "--picture", "--socket", "--seed"})
-    expect_refused({"run", "parcel_cell", "--parcels", "1", option, ""}, {option});
+    for (const char* const value : {"", "--quiet"})
+      expect_refused({"run", "parcel_cell", "--parcels", "1", option, value}, {option});
   for (const char* seed : {"-1", "18446744073709551616", "1e3"})
     expect_refused({"run", "parcel_cell", "--parcels", "1", "--seed", seed}, {"--seed", seed});
   expect_refused({"run", "parcel_cell", "--parcels", "99999999999999999999"}, {"--parcels", "99999999999999999999"});
