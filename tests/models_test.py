@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the models of the lock-free parts, and of who gets which resource, with spin: each as it is must hold, and each
-wrong variant that its own comment names must not. usage: models_test.py [MODEL.pml ...]"""
+"""Checks the models of the lock-free parts, and of who gets which resource, way and seat, with spin: each as it is must
+hold, and each wrong variant that its own comment names must not. usage: models_test.py [MODEL.pml ...]"""
 
 import re
 import subprocess

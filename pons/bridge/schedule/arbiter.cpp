@@ -194,17 +194,16 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
     Looked& there = looked[ways];
     there.id = entry->claim.id, there.rank = entry->rank;
     const Mask barred = entry->claim.priority == kFirst ? 0 : withheld_;
-    const auto is_free_now = [&](Mask needs) { return is_free(needs, taken | barred); };
     const std::vector<std::size_t> fit = fitting(*entry, fits);
-    const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free_now(ways[way]); });
+    const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free(ways[way], taken | barred); });
     if (free != fit.end()) {
       taken |= ways[*free];
       give(*entry, *free, granted);
     } else {
-      // It has to wait: nobody behind it may take what it waits for.
+      // It has to wait: nobody behind it, in its lane or another, may take what it waits for.
       for (const std::size_t way : fit) taken |= ways[way];
     }
-    const bool all_taken = std::ranges::none_of(ways, is_free_now);
+    const bool all_taken = std::ranges::none_of(ways, [&](Mask needs) { return has_left(needs, taken | barred); });
     if (all_taken || (fits && !look_on(ways, there))) passed.insert(ways);
   }
   changed_ = false;
@@ -226,6 +225,11 @@ void Arbiter::give(const Entry& waits, std::size_t way, std::vector<std::string>
 
 bool Arbiter::is_free(Mask needs, Mask taken) const {
   return needs != 0 ? (needs & taken) == 0 : seated_ < schedule_.running;
+}
+
+// Whether any of it may be given, or kept for who waits for all of it.
+bool Arbiter::has_left(Mask needs, Mask taken) const {
+  return needs != 0 ? (needs & ~taken) != 0 : seated_ < schedule_.running;
 }
 
 void Arbiter::withhold(Withheld what) {
@@ -293,26 +297,38 @@ bool Arbiter::gives_way(const Entry& urgent, Mask needs, std::vector<std::string
   return true;
 }
 
+// In the first of the ways that fit in which it can be helped, and that nobody before it waits for.
+void Arbiter::make_way(const Entry& waits, const std::vector<std::size_t>& fit, Mask& claimed,
+                       std::map<std::string, std::string>& by) const {
+  for (const std::size_t way : fit) {
+    const Mask needs = waits.ways[way];
+    const bool alone = (claimed & needs) == 0;
+    claimed |= needs;
+    std::vector<std::string> holders;
+    if (!alone || waits.claim.priority < schedule_.urgent_priority || !gives_way(waits, needs, holders)) continue;
+    for (std::string& id : holders) by.emplace(std::move(id), waits.claim.id);
+    return;
+  }
+}
+
 std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays, const Fits& fits) const {
   std::map<std::string, std::string> by;
   Mask claimed = 0;  // by those before: who comes after them gains nothing by a preemption
   std::set<Ways> passed;
-  while (const Entry* const first = next(passed, {})) {
-    passed.insert(first->ways);
-    if (first->ways == Ways{0}) {
-      free_seats(lanes_.find(first->ways)->second, stays, by);
+  std::map<Ways, Looked> looked;
+  while (const Entry* const entry = next(passed, looked)) {
+    const Ways& ways = entry->ways;
+    if (ways == Ways{0}) free_seats(lanes_.find(ways)->second, stays, by);
+    // Who counts less than an urgent task is not one, nor is anybody behind it.
+    if (ways == Ways{0} || withheld_ != 0 || -std::get<int>(entry->rank) < schedule_.urgent_priority) {
+      passed.insert(ways);
       continue;
     }
-    if (withheld_ != 0) continue;
-    for (const std::size_t way : fitting(*first, fits)) {
-      const Mask needs = first->ways[way];
-      const bool alone = (claimed & needs) == 0;
-      claimed |= needs;
-      std::vector<std::string> holders;
-      if (!alone || first->claim.priority < schedule_.urgent_priority || !gives_way(*first, needs, holders)) continue;
-      for (std::string& id : holders) by.emplace(std::move(id), first->claim.id);
-      break;
-    }
+    make_way(*entry, fitting(*entry, fits), claimed, by);
+    Looked& there = looked[ways];
+    there.rank = entry->rank;
+    const bool all_claimed = std::ranges::none_of(ways, [&](Mask needs) { return has_left(needs, claimed); });
+    if (all_claimed || ++there.looks == kLooks) passed.insert(ways);
   }
   std::vector<Preemption> preemptions;
   for (auto& [running, urgent] : by) preemptions.push_back({running, urgent});

@@ -33,11 +33,11 @@ struct Claim {
 // than any brain may ask for, where acceptance alone decides: nor can it be starved by a stream of more important ones.
 //
 // Where a task can be done in several ways, as by either of two robots, it is granted the first that is free. Whoever
-// grants may say of each way whether it fits now; a way that does not keeps nobody waiting.
+// grants may say of each way whether it fits now; a way that does not keeps nobody waiting (models/ways.pml).
 //
 // Tasks that need no resource need a seat; there are `running` of them, all alike. Who needs resources needs no seat.
 // Seats are given in the same order. Trees may go round for ever, so seats are also shared by turns: who has waited for
-// one for `ageing` may have that of one that counts no more, and has had it for as long.
+// one for `ageing` may have that of one that counts no more, and has had it for as long (models/seats.pml).
 //
 // add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
 // different sets of resources that are waited for. Where it is asked what fits, at most kLooks of those that wait for
@@ -138,8 +138,11 @@ class Arbiter {
   void give(const Entry& entry, std::size_t way, std::vector<std::string>& granted);
   [[nodiscard]] bool gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const;
   [[nodiscard]] bool is_free(Mask needs, Mask taken) const;
+  [[nodiscard]] bool has_left(Mask needs, Mask taken) const;
   void give_back(const Entry& entry);
   [[nodiscard]] bool gives_seat(const Entry& sits, const Entry& waits) const;
+  void make_way(const Entry& waits, const std::vector<std::size_t>& fit, Mask& claimed,
+                std::map<std::string, std::string>& by) const;
   void free_seats(const Lane& lane, const Stays& stays, std::map<std::string, std::string>& by) const;
 
   world::Schedule schedule_;

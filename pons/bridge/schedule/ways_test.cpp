@@ -83,6 +83,48 @@ TEST(Arbiter, WhoHasBegunInOneWayGoesOnInIt) {
   EXPECT_EQ(arbiter.way("begun"), 0U);
 }
 
+// Those that wait for the same are in one lane; its first is not the only one that waits.
+TEST(Arbiter, WhoFitsBehindOneThatDoesNotIsKeptWhatItWaitsFor) {
+  Arbiter arbiter({"left", "zone"}, {});
+  arbiter.add(claim("holder", 50, {"left"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"holder"}));
+  const Arbiter::Fits fits = [](std::string_view id, std::size_t) { return id != "rides"; };
+  arbiter.add(claim("rides", 70, {"left", "zone"}));
+  arbiter.add(claim("waits", 60, {"left", "zone"}));
+  arbiter.add(claim("later", 50, {"zone"}));
+  EXPECT_EQ(arbiter.grant({}, fits), Ids{}) << "a stream of those would keep it waiting for ever";
+  arbiter.release("holder");
+  EXPECT_EQ(arbiter.grant({}, fits), (Ids{"waits"}));
+}
+
+TEST(Arbiter, WhatIsUrgentPreemptsFromBehindOneThatDoesNotFit) {
+  Arbiter arbiter({"left"}, {.urgent_priority = 90});
+  arbiter.add(claim("runs", 50, {"left"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"runs"}));
+  const Arbiter::Fits fits = [](std::string_view id, std::size_t) { return id == "urgent"; };
+  for (int i = 0; i < 200; ++i) arbiter.add(claim(fmt::format("rides{:03}", i), 95, {"left"}));
+  arbiter.add(claim("urgent", 90, {"left"}));
+  EXPECT_EQ(arbiter.grant({}, fits), Ids{});
+  const auto preemptions = arbiter.preemptions({}, fits);
+  ASSERT_EQ(preemptions.size(), 1U);
+  EXPECT_EQ(preemptions.front().running, "runs");
+  EXPECT_EQ(preemptions.front().by, "urgent");
+}
+
+TEST(Arbiter, OfTwoUrgentOnesEachIsMadeWayFor) {
+  Arbiter arbiter({"left", "right"}, {.urgent_priority = 90});
+  arbiter.add(claim("one", 50, {"left"}));
+  arbiter.add(claim("other", 50, {"right"}));
+  EXPECT_EQ(arbiter.grant({}), (Ids{"one", "other"}));
+  arbiter.add(either("first", 95, {"left"}, {"right"}));
+  arbiter.add(either("second", 95, {"left"}, {"right"}));
+  EXPECT_EQ(arbiter.grant({}), Ids{});
+  const auto preemptions = arbiter.preemptions();
+  ASSERT_EQ(preemptions.size(), 2U);
+  EXPECT_EQ(preemptions.front().by, "first");
+  EXPECT_EQ(preemptions.back().by, "second");
+}
+
 // Of ways that do not fit so many are looked at in one grant.
 TEST(Arbiter, LooksAreBounded) {
   Arbiter arbiter({"left", "right"}, {});
