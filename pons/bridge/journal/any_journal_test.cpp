@@ -224,16 +224,21 @@ TEST_P(AnyJournal, TellsTheStoryOfAnOrder) {
   ASSERT_TRUE(journal->accept(again, at(3)));
   ASSERT_TRUE(journal->event("P1.2", at(4), kStartedEvent));
   ASSERT_TRUE(journal->note(at(5), "closed"));
-  const auto told = [&](std::string_view order) {
+  const auto told = [&](std::string_view order, std::int64_t after = 0) {
     std::vector<std::string> kinds;
-    const auto events = journal->history(order).value();
-    for (const Event& event : events) kinds.push_back(event.task + " " + event.kind);
+    for (const auto events = journal->history(order, after).value(); const Event& event : events)
+      kinds.push_back(event.task + " " + event.kind);
     return kinds;
   };
   EXPECT_EQ(told("P1"),
             (std::vector<std::string>{" seen", "P1 accepted", "P1 ended", "P1.2 accepted", "P1.2 started"}));
   EXPECT_EQ(told("P1.2"), (std::vector<std::string>{"P1.2 accepted", "P1.2 started"}));
   EXPECT_EQ(told("P3"), std::vector<std::string>{});
+  const std::int64_t last = journal->newest();
+  for (int i = 0; i < 2000; ++i) ASSERT_TRUE(journal->event("P2", at(5), "odd"));
+  ASSERT_TRUE(journal->event("P1.2", at(6), "motion"));
+  EXPECT_EQ(told("P1").size(), 6u) << "of a long journal all is searched by another way than what is new";
+  EXPECT_EQ(told("P1", last + 2000), std::vector<std::string>{"P1.2 motion"});
   EXPECT_EQ(told(""), std::vector<std::string>{}) << "what belongs to nothing is nobody's story";
 }
 
@@ -279,109 +284,6 @@ TEST_P(AnyJournal, CompactedItKnowsWhatEachRobotHoldsAndForgetsWhereEndedOrdersW
   std::string left;
   for (const auto notes = journal->notes().value(); const Event& event : notes) left += event.kind + event.order + " ";
   EXPECT_EQ(left, "rideP1 rideP2 seenP3 rideP3 carriesP2 carriesP3 compacted ");
-}
-
-// ---- an open task's story, shortened ----
-
-// Four events a round.
-void go_round(Journal& journal, int from, int to) {
-  for (int i = from; i < to; ++i) {
-    ASSERT_TRUE(journal.event("tree", at(i), kCheckpointEvent, {{"clock_ns", i}}));
-    ASSERT_TRUE(journal.event("tree", at(i), kAttemptEvent, {{"step", 1}, {"number", i}}));
-    ASSERT_TRUE(journal.event("tree", at(i), kAttemptEndedEvent, {{"step", 1}, {"status", "succeeded"}}));
-    ASSERT_TRUE(journal.event("tree", at(i), "motion"));
-  }
-}
-
-void begin_tree(Journal& journal) {
-  ASSERT_TRUE(journal.accept({.id = "tree", .tree = task::TreeRequest{.name = "patrol"}}, at(0)));
-  ASSERT_TRUE(journal.event("tree", at(0), kStartedEvent));
-  ASSERT_TRUE(journal.event("tree", at(0), kAttemptEvent, {{"step", 0}, {"arguments", {{"object", "lamp"}}}}));
-  ASSERT_TRUE(journal.event("tree", at(0), kPausedEvent));
-}
-
-Story story_of(const Journal& journal) {
-  Story story;
-  const auto events = journal.outline("tree", {}).value();
-  for (const Event& event : events) EXPECT_TRUE(story.take(event));
-  return story;
-}
-
-TEST_P(AnyJournal, LeavesOutWhatACheckpointHasTakenIn) {
-  const auto journal = open();
-  ASSERT_TRUE(journal->accept(sample("other"), at(0)));
-  ASSERT_TRUE(journal->event("other", at(0), "odd"));
-  begin_tree(*journal);
-  go_round(*journal, 0, 50);
-  ASSERT_TRUE(shorten(*journal, "tree", 6, at(50)));
-  EXPECT_EQ(audit(*journal), std::vector<std::string>{});
-  std::vector<std::string> kinds;
-  const auto left = journal->task("tree").value()->events;
-  for (const Event& event : left) kinds.push_back(event.kind);
-  EXPECT_EQ(kinds, (std::vector<std::string>{"started", "attempt", "paused", "attempt", "attempt_ended", "motion",
-                                             "checkpoint", "attempt", "attempt_ended", "motion", "left_out"}))
-      << "what still goes on, and the start whose end is among the last six";
-  EXPECT_EQ(left.back().detail, (Json{{"events", 193}}));
-  const Story story = story_of(*journal);
-  EXPECT_TRUE(story.started() && story.paused() && !story.ended() && !story.handed_over());
-  ASSERT_EQ(story.trying().size(), 1u);
-  EXPECT_EQ(story.trying().at(0).arguments, (Json{{"object", "lamp"}}));
-  EXPECT_EQ(story.checkpoint(), (Json{{"clock_ns", 49}}));
-  EXPECT_EQ(journal->task("other").value()->events.size(), 1u);
-  ASSERT_TRUE(shorten(*journal, "tree", 0, at(50)));
-  EXPECT_EQ(story_of(*journal).checkpoint(), (Json{{"clock_ns", 49}})) << "however few shall stay";
-  EXPECT_EQ(journal->task("tree").value()->events.size(), 3u + 4 + 1);
-}
-
-TEST_P(AnyJournal, ShortenedAgainItTellsHowManyAreLeftOutInAll) {
-  const auto journal = open();
-  begin_tree(*journal);
-  for (int i = 0; i < 10; ++i) {
-    go_round(*journal, 5 * i, 5 * i + 5);
-    ASSERT_TRUE(shorten(*journal, "tree", 8, at(5 * i + 5)));
-  }
-  ASSERT_TRUE(journal->commit());
-  const auto left = journal->task("tree").value()->events;
-  EXPECT_EQ(std::ranges::count(left, kLeftOutEvent, &Event::kind), 1);
-  EXPECT_EQ(left.back().detail.at("events").get<std::int64_t>() + std::ssize(left) - 1, 3 + 4 * 50);
-  ASSERT_TRUE(journal->event("tree", at(60), kAttemptEndedEvent, {{"step", 0}, {"status", "succeeded"}}));
-  ASSERT_TRUE(journal->event("tree", at(60), kContinuedEvent));
-  ASSERT_TRUE(journal->outcome("tree", task::Outcome::kSucceeded, "", at(60)));
-  EXPECT_EQ(audit(*journal), std::vector<std::string>{});
-  EXPECT_FALSE(shorten(*journal, "tree", 0, at(61))) << "it is open no more";
-  EXPECT_EQ(journal->task("tree").value()->events.size(), left.size() + 2);
-}
-
-TEST_P(AnyJournal, OfStepsAndWithoutACheckpointNothingIsLeftOut) {
-  const auto journal = open();
-  begin_tree(*journal);
-  for (int i = 0; i < 20; ++i) ASSERT_TRUE(journal->event("tree", at(1), "motion"));
-  ASSERT_TRUE(shorten(*journal, "tree", 2, at(2)));
-  EXPECT_EQ(journal->task("tree").value()->events.size(), 23u);
-  ASSERT_TRUE(shorten(*journal, "nobody", 2, at(2)));
-}
-
-TEST_P(AnyJournal, WhatWasLeftOutIsThereUntilTheCheckpointIsDurable) {
-  const auto fill = [](Journal& journal) {
-    begin_tree(journal);
-    go_round(journal, 0, 20);
-  };
-  {
-    const auto journal = open();
-    fill(*journal);
-    ASSERT_TRUE(journal->commit());
-  }
-  in_a_process_that_is_killed([this] {
-    auto opened = Journal::open(place());
-    if (!opened) return false;
-    Journal* const journal = opened->release();  // closed, it would commit
-    go_round(*journal, 20, 40);
-    return shorten(*journal, "tree", 4, at(40)).has_value() && journal->task("tree").value()->events.size() < 20;
-  });
-  const auto journal = open();
-  EXPECT_EQ(journal->task("tree").value()->events.size(), 3u + 4 * 20);
-  EXPECT_EQ(story_of(*journal).checkpoint(), (Json{{"clock_ns", 19}}));
-  EXPECT_EQ(audit(*journal), std::vector<std::string>{});
 }
 
 TEST_P(AnyJournal, TellsThoseThatHaveEndedPageByPage) {

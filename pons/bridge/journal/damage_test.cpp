@@ -225,5 +225,21 @@ TEST_F(JournalTest, AFileThatIsGoneTakesNothingMore) {
   EXPECT_EQ(tasks[0].task.id, "a");
 }
 
+// As by who cleans up and does not know what belongs to a journal. Until it is closed it has its log all the same.
+TEST_F(JournalTest, WithoutItsLogItTakesNothingMoreAndWhatItToldIsThere) {
+  {
+    const auto journal = open();
+    ASSERT_TRUE(journal->accept(sample("a"), at(1)));
+    ASSERT_TRUE(journal->commit());
+    ASSERT_TRUE(fs::remove(file_.string() + "-wal"));
+    ASSERT_TRUE(journal->accept(sample("b"), at(1)));
+    EXPECT_NE(journal->commit().error().line().find("the journal's log is gone"), std::string::npos);
+    EXPECT_FALSE(journal->accept(sample("c"), at(1)));
+  }
+  const auto tasks = open()->tasks().value();
+  ASSERT_EQ(tasks.size(), 1u);
+  EXPECT_EQ(tasks[0].task.id, "a");
+}
+
 }  // namespace
 }  // namespace pons::bridge

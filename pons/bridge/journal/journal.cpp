@@ -78,7 +78,7 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
   };
   const std::string tasks = fmt::format(kTaskColumns, acceptances(database->dialect())), events(kEventColumns);
   const std::string in_order = fmt::format(kTaskColumns, in_their_order(database->dialect()));
-  const std::array<std::pair<Statement*, std::string>, 15> reads{{
+  const std::array<std::pair<Statement*, std::string>, 16> reads{{
       {&find_task, "SELECT detail FROM event WHERE task = ?1 AND kind = 'accepted'"},
       {&tasks_after, in_order + "AND a.sequence > ?1 ORDER BY a.sequence LIMIT ?2"},
       {&one_task, tasks + "AND a.task = ?1"},
@@ -94,6 +94,10 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
                                   "UNION SELECT e.sequence FROM event a JOIN event e ON e.task = a.task "
                                   "WHERE a.order_id = ?1 AND a.order_id <> '' AND a.kind = 'accepted' "
                                   "UNION SELECT sequence FROM event WHERE task = ?1) ORDER BY sequence"},
+      {&news_of_order, events +
+                           "AS n WHERE ?1 <> '' AND sequence > ?2 AND (order_id = ?1 OR task = ?1 OR EXISTS(SELECT 1 "
+                           "FROM event a WHERE a.task = n.task AND a.kind = 'accepted' AND a.order_id = ?1)) "
+                           "ORDER BY sequence"},
       {&events_since, events + "WHERE sequence > ?1 AND sequence <= ?2 ORDER BY sequence LIMIT ?3"},
       {&every_event, events + "ORDER BY task, sequence"},
       {&newest, "SELECT coalesce(max(sequence), 0) FROM event"},
@@ -102,7 +106,8 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
       {&endings, "SELECT detail FROM event WHERE kind = 'ended'"},
   }};
   const std::string returning = database->dialect() == Dialect::kSqlite ? "" : " RETURNING sequence";
-  const std::array<std::pair<Statement*, std::string>, 5> writes{{
+  const std::string open_still = "AND NOT EXISTS(SELECT 1 FROM event e WHERE e.task = ?1 AND e.kind = 'ended')";
+  const std::array<std::pair<Statement*, std::string>, 7> writes{{
       {&add_first,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, ?3, ?4, 'accepted', ?5) "
        "ON CONFLICT DO NOTHING" +
@@ -114,6 +119,11 @@ Expected<void> Journal::Impl::prepare(Mode mode) {
            returning},
       {&add_note,
        "INSERT INTO event(run, stamp_ns, task, order_id, kind, detail) VALUES(?1, ?2, '', ?3, ?4, ?5)" + returning},
+      {&drop_told, fmt::format("DELETE FROM event WHERE task = ?1 AND kind = '{}' ", kLeftOutEvent) + open_still},
+      {&drop_before,
+       "DELETE FROM event WHERE task = ?1 AND sequence < ?2 AND kind NOT IN ('accepted', 'started', 'ended') "
+       "AND ?3 NOT LIKE '%,' || sequence || ',%' " +
+           open_still},
       {&begin, database->dialect() == Dialect::kSqlite ? "BEGIN IMMEDIATE" : "BEGIN"},
       {&commit, "COMMIT"},
   }};
@@ -327,19 +337,11 @@ Expected<void> Journal::outcome(std::string_view id, task::Outcome outcome, std:
 Expected<void> Journal::leave_out(std::string_view id, Time now, std::int64_t before, const std::set<std::int64_t>& but,
                                   std::int64_t so_far) {
   if (auto begun = impl_->ensure_transaction(); !begun) return begun;
-  const auto drop = [&](const std::string& which, std::int64_t below) -> Expected<std::int64_t> {
-    auto dropped = impl_->database->prepare(
-        "DELETE FROM event WHERE task = ?1 AND sequence < ?2 AND kind NOT IN ('accepted', 'started', 'ended') AND " +
-        which + " AND NOT EXISTS(SELECT 1 FROM event e WHERE e.task = ?1 AND e.kind = 'ended')");
-    if (!dropped) return std::unexpected(dropped.error());
-    if (auto done = impl_->write(dropped->bind(id).bind(below)); !done) return std::unexpected(done.error());
-    return impl_->database->changes();
-  };
-  const auto told = drop(fmt::format("kind = '{}'", kLeftOutEvent), std::numeric_limits<std::int64_t>::max());
-  if (!told) return std::unexpected(told.error());
-  const auto dropped = drop(fmt::format("sequence NOT IN ({})", fmt::join(but, ",")), before);
-  if (!dropped) return std::unexpected(dropped.error());
-  return impl_->add(id, now, kLeftOutEvent, {{"events", so_far + *dropped}});
+  if (auto told = impl_->write(impl_->drop_told.bind(id)); !told) return std::unexpected(told.error());
+  const std::string stay = fmt::format(",{},", fmt::join(but, ","));
+  if (auto done = impl_->write(impl_->drop_before.bind(id).bind(before).bind(stay)); !done)
+    return std::unexpected(done.error());
+  return impl_->add(id, now, kLeftOutEvent, {{"events", so_far + impl_->database->changes()}});
 }
 
 Expected<void> Journal::commit() { return impl_->make_durable(); }

@@ -29,12 +29,12 @@ struct Journal::Impl {
   bool pending = false;  // a transaction was begun and is not committed
   // Only open_to_read() leaves those that write unprepared.
   mutable Statement find_task, tasks_after, one_task, open_tasks, ended_tasks, events_of_task, outline, notes_after,
-      events_of_order, events_since, every_event, count, count_ended, endings, newest;
+      events_of_order, news_of_order, events_since, every_event, count, count_ended, endings, newest;
   std::int64_t last_written = 0, durable = 0;  // sequences
   std::int64_t ended = 0;                      // tasks
   std::function<Time()> clock;                 // none: nobody asks how long a commit takes
   Duration longest_commit{0};
-  Statement add_first, add_event, add_note, begin, commit;
+  Statement add_first, add_event, add_note, drop_told, drop_before, begin, commit;
 
   [[nodiscard]] Expected<void> begin_run();
   [[nodiscard]] Expected<std::int64_t> drop(std::int64_t keep, std::int64_t still_true);

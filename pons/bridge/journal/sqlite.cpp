@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -100,16 +102,19 @@ std::uint64_t size_of(const std::string& file) {
 
 // SQLite takes a file that has lost its end for a whole one as long as it asks for nothing of that, and one of less
 // than a header for a new one. Not where a log or a rollback journal is to complete it.
-Expected<void> check_length(const std::string& file) {
+Expected<void> check_length(const std::string& named) {
   constexpr std::string_view kMagic = "SQLite format 3";  // and a zero
   constexpr std::size_t kHeader = 100;
+  std::error_code none;
+  const std::string real = std::filesystem::canonical(named, none).string();  // where the log lies, too
+  const std::string& file = none ? named : real;
   const std::uint64_t size = size_of(file), log = size_of(file + "-wal");
   if (size == 0 && log == 0) return {};
   if (size_of(file + "-journal") > 0 || (size >= kHeader && log > 0)) return {};
   std::string header(std::min<std::uint64_t>(size, kHeader), '\0');
   std::ifstream(file, std::ios::binary).read(header.data(), static_cast<std::streamsize>(header.size()));
   const std::size_t shared = std::min(header.size(), kMagic.size());
-  if (header.substr(0, shared) != kMagic.substr(0, shared)) return no_journal(file);
+  if (header.substr(0, shared) != kMagic.substr(0, shared)) return no_journal(named);
   const auto number = [&](std::size_t at, int bytes) {
     std::uint64_t value = 0;
     for (int i = 0; i < bytes; ++i)
@@ -123,7 +128,7 @@ Expected<void> check_length(const std::string& file) {
     whole = valid ? page * number(28, 4) : 0;
   }
   if (size >= whole) return {};
-  return fail(fmt::format("the journal has lost its end: {} of at least {} bytes are there", size, whole), file,
+  return fail(fmt::format("the journal has lost its end: {} of at least {} bytes are there", size, whole), named,
               "restore a copy, or name another file");
 }
 
@@ -213,12 +218,19 @@ class SqliteDatabase final : public Database {
     return execute("PRAGMA synchronous=FULL;PRAGMA foreign_keys=ON");
   }
 
-  // The log would go on into a file that no name leads to any more.
+  // The log would go on into a file that no name leads to any more, or be one itself.
   Expected<void> still_there() override {
     int moved = 0;
     const int code = sqlite3_file_control(database_, "main", SQLITE_FCNTL_HAS_MOVED, &moved);
-    if (code != SQLITE_OK || moved == 0) return {};
-    return fail("the journal's file is gone", shown_, "put it back where it was, and start again");
+    if (code == SQLITE_OK && moved != 0)
+      return fail("the journal's file is gone", shown_, "put it back where it was, and start again");
+    if (!on_disk_) return {};
+    struct stat there{};
+    const bool is_there = ::stat(log_name().c_str(), &there) == 0;
+    if (!log_ && is_there) log_ = there.st_ino;  // it is made by what is written first
+    if (!log_ || (is_there && there.st_ino == *log_)) return {};
+    // What was told is written into the file when it is closed.
+    return fail("the journal's log is gone", log_name(), "keep others from the files beside a journal; start again");
   }
 
   // Both grow: the file, and the log beside it that goes into the file from time to time.
@@ -239,8 +251,12 @@ class SqliteDatabase final : public Database {
   [[nodiscard]] bool read_only() const { return sqlite3_db_readonly(database_, "main") == 1; }
 
  private:
+  // Beside the file itself, not beside a link to it.
+  [[nodiscard]] std::string log_name() const { return sqlite3_filename_wal(sqlite3_db_filename(database_, "main")); }
+
   sqlite3* database_ = nullptr;
   bool on_disk_ = false;  // the operating system's
+  std::optional<ino_t> log_;
 };
 
 }  // namespace
