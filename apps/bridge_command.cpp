@@ -106,6 +106,7 @@ int body_gone(bridge::Journal& journal, Time now) {
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
                const world::FaultPlan& plan, const MeetingPlace& place) {
   link::Border& border = place.border();
+  if (auto there = find_journal(border, options.journal); !there) return bad_input(there.error());
   auto ros = ros_settings(options.ros);
   if (!ros) return bad_input(ros.error());
   auto facts = facts_of(options);

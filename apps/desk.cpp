@@ -33,6 +33,13 @@ Json to_json(const ObjectBelief& object) {
 
 bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kApprove; }
 
+// What the next bridge keeps to, if it finds it in the journal.
+bool outlasts_bridge(gate::Operation operation) {
+  using enum gate::Operation;
+  return operation == kStop || operation == kEmergencyStop || operation == kReset || operation == kArm ||
+         operation == kRest || operation == kGoOn;
+}
+
 constexpr Duration kWatchedFor = std::chrono::seconds(30);  // then who still is there asks again
 constexpr std::size_t kWatchersMost = 16;  // half of the socket's clients: the other half is for whoever else asks
 constexpr std::int64_t kEndOfJournal = std::numeric_limits<std::int64_t>::max();
@@ -96,6 +103,11 @@ void Desk::attend(Time now) {
       continue;
     }
     Json answered = asked ? answer(*asked, now) : gate::refusal(asked.error());
+    if (const auto& fault = bridge_.fault(); asked && fault && outlasts_bridge(asked->operation)) {
+      const std::string what =
+          fmt::format("what was asked is not kept, and the next bridge will not know: {}", fault->what);
+      answered = gate::refusal({what, fault->where, "ask again once it is there"});
+    }
     if (!asked || tells_of_tasks(asked->operation)) answered["time_s"] = now.s();
     if (asked && tells_of_tasks(asked->operation)) {
       of_tasks.emplace_back(std::move(request), std::move(answered));

@@ -89,10 +89,26 @@ Expected<MeetingPlace> MeetingPlace::join(const std::string& name, const world::
 
 std::string journal_of(const link::Border& border) { return border.journal(); }
 
-Expected<void> name_journal(link::Border& border, const std::string& journal) {
+namespace {
+
+std::string absolute(const std::string& journal) {
   std::error_code ignored;
-  if (!border.name_journal(bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string()))
-    return fail("it is too long", "--journal", "choose a shorter one");
+  return bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string();
+}
+
+}  // namespace
+
+Expected<void> find_journal(const link::Border& border, const std::string& journal) {
+  std::error_code ignored;
+  const bool on_disk = !bridge::in_database(journal) && journal != ":memory:";
+  if (!on_disk || border.journal() != absolute(journal) || fs::exists(journal, ignored)) return {};
+  return fail(
+      "the journal is gone that the bridges of this body kept, and with it what was told and what hangs on the arm",
+      journal, "put it back; to begin anew, end the body, too");
+}
+
+Expected<void> name_journal(link::Border& border, const std::string& journal) {
+  if (!border.name_journal(absolute(journal))) return fail("it is too long", "--journal", "choose a shorter one");
   return {};
 }
 

@@ -424,6 +424,27 @@ TEST(StopResultTest, AnArmThatIsPushedOutOfAProtectiveStopLosesItsPower) {
   EXPECT_FALSE(bench.plant.set_points.power);
 }
 
+// As by what it came down on: the drives push against that as long as they are told to be elsewhere.
+TEST(StopResultTest, AnArmThatIsHeldOffAsItBrakesStandsWhereItIs) {
+  Bench bench;
+  get_moving(bench);
+  bench.send(plain_command(CommandKind::kProtectiveStop));
+  bench.tick();
+  const double from = bench.plant.sensors.position[5];
+  for (int i = 0; i < kLongestStop; ++i) {
+    const double held_at = from - std::min(0.15, 1e-3 * i);
+    bench.plant.extra_torque_nm[5] = 500 * (held_at - bench.plant.sensors.position[5]);
+    bench.tick();
+  }
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop) << name(bench.state().cause);
+  EXPECT_EQ(bench.state().stop_result, StopResult::kConfirmed);
+  EXPECT_LT(std::abs(bench.state().commanded.position[5] - bench.plant.sensors.position[5]),
+            Settings{}.following_error_rad);
+  bench.plant.extra_torque_nm[5] = 0;
+  bench.run(500ms);
+  EXPECT_EQ(bench.state().safety, SafetyState::kProtectiveStop);
+}
+
 TEST(Heartbeat, AnyCommandCountsAndOneHundredMillisecondsAreEnough) {
   Bench bench;
   bench.arm();

@@ -183,7 +183,8 @@ void Cerebellum::judge_stop(Time now) {
     return;
   }
   enter(SafetyEvent::kStandstill);
-  if (state_.cause == StopCause::kFollowingError) return hold_measured(now);  // it may have been pushed since
+  // It may have been pushed since, or what it ran into holds it: where it stands it may stay.
+  if (state_.cause == StopCause::kFollowingError || strays_) return hold_measured(now);
   queue_.rest(commanded_.position, now);
 }
 

@@ -243,6 +243,31 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   expect_nothing_left();
 }
 
+// A new one in its place would take again what was taken, and know of no load and of no person's stop.
+TEST_F(Processes, WithoutTheJournalOfItsBodysBridgesNoBridgeBegins) {
+  Running body_process(folder_.path(), "body", body(6));
+  {
+    Running first(folder_.path(), "first", bridge(6));
+    ASSERT_TRUE(eventually([&] { return !task_at("attempt", "pick").empty(); })) << first.err();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait().code, -SIGKILL);
+  }
+  for (const char* const beside : {"j.db", "j.db-wal"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder_ / beside));
+    std::filesystem::rename(folder_ / beside, folder_ / (std::string("away_") + beside));
+  }
+  const Finished refused = run_pons(bridge(6));
+  EXPECT_EQ(refused.code, kBadInput) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("the journal is gone that the bridges of this body kept"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db"));
+  for (const char* const beside : {"j.db", "j.db-wal"})
+    std::filesystem::rename(folder_ / (std::string("away_") + beside), folder_ / beside);
+  Running second(folder_.path(), "second", bridge(6));
+  EXPECT_EQ(second.wait().code, 0) << second.err();
+  EXPECT_EQ(body_process.wait().code, 0);
+  EXPECT_EQ(read_json(folder_ / "body.json")["parcels"]["lost"], 0);
+}
+
 TEST_F(Processes, CtrlCOfEitherIsOrderly) {
   Running body_process(folder_.path(), "body", body(6));
   {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -58,6 +59,30 @@ TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
   desk.attend(Time{});
   EXPECT_EQ(answered, (std::vector{stop, emergency, look, look}));
   EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
+}
+
+// The arm stops all the same, but a bridge that takes over would go on by itself.
+TEST(Desk, WhoAsksForAStopHearsThatItIsNotKept) {
+  const bridge::TemporaryFolder folder;
+  const auto journal = bridge::Journal::open(folder / "j.db").value();
+  const world::World world;
+  const task::SkillRegistry skills;
+  bridge::Bridge bridge(*journal, skills, world);
+  const link::State state;
+  int halts = 0;
+  const runner::SkillPort port{.state = [&]() -> const link::State& { return state; }, .halt = [&] { ++halts; }};
+  runner::Arming arming(bridge, port, world.zones, runner::Recovery::kRefused);
+  const runner::Health health{{}};
+  std::vector<std::string> answered;
+  auto asks = std::make_unique<Asks>(answered);
+  Asks& visitor = *asks;
+  Desk desk(std::move(asks), bridge, *journal, {&arming}, health, [] { return nullptr; });
+  ASSERT_TRUE(std::filesystem::remove(folder / "j.db"));
+  visitor.texts = {R"({"op":"stop"})", R"({"op":"stop"})"};
+  desk.attend(Time{});
+  EXPECT_EQ(halts, 2);
+  ASSERT_EQ(answered.size(), 2U);
+  for (const std::string& answer : answered) EXPECT_NE(answer.find("not kept"), std::string::npos) << answer;
 }
 
 TEST(ByHand, NobodyHearsOfATaskBeforeTheDiskHasIt) {
