@@ -138,7 +138,6 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   if (interrupted()) return kExitInterrupted;
   auto taken = (*half)->bridge_side->take_over(*(*half)->journal, border.clock.now());
   if (!taken) return bad_run(taken.error());
-
   std::optional<KillsItself> dies;
   constexpr auto kCrash = world::Fault::kBridgeCrash;
   if (plan[kCrash].often > 0)
