@@ -132,7 +132,8 @@ void Desk::tell_watchers(Time now) {
   const std::int64_t durable = journal_.durable();
   std::erase_if(watchers_, [&](Watcher& watcher) {
     std::optional<Json> told;
-    if (std::exchange(watcher.looked, durable) != durable) told = news(watcher.asked);
+    const std::int64_t looked = std::exchange(watcher.looked, durable);
+    if (looked != durable) told = news(watcher.asked, std::max(watcher.asked.after, looked));
     if (!told && now >= watcher.until) told = {{"ok", true}, {"events", Json::array()}, {"after", watcher.asked.after}};
     if (told) watcher.request.reply(*told);
     return told.has_value();
@@ -242,11 +243,11 @@ Json Desk::history(const std::string& order) const {
   return {{"ok", true}, {"events", to_json(*events)}};
 }
 
-std::optional<Json> Desk::news(const gate::Asked& asked) const {
+std::optional<Json> Desk::news(const gate::Asked& asked, std::int64_t after) const {
   const bool all = asked.task.empty();
-  auto events = all ? journal_.since(asked.after, gate::kWatchedAtOnce) : journal_.history(asked.task, asked.after);
+  auto events = all ? journal_.since(after, gate::kWatchedAtOnce) : journal_.history(asked.task, after);
   if (!events) return gate::refusal(events.error());
-  if (!all && events->empty() && asked.after == 0) return history(asked.task);  // nothing is known of it
+  if (!all && events->empty() && after == 0) return history(asked.task);  // nothing is known of it
   std::erase_if(*events, [&](const bridge::Event& event) { return event.sequence > journal_.durable(); });
   if (!events->empty()) return Json{{"ok", true}, {"events", to_json(*events)}, {"after", events->back().sequence}};
   return std::nullopt;

@@ -60,7 +60,7 @@ class Desk {
   [[nodiscard]] bridge::Json history(const std::string& order) const;
   [[nodiscard]] bridge::Json tell_task(const gate::Asked& asked, Time now);
   // What there is to tell to who watches; nothing while there is nothing new.
-  [[nodiscard]] std::optional<bridge::Json> news(const gate::Asked& asked) const;
+  [[nodiscard]] std::optional<bridge::Json> news(const gate::Asked& asked, std::int64_t after) const;
   void tell_watchers(Time now);
   [[nodiscard]] Expected<void> tell_arm(gate::Operation operation, Time now);
   [[nodiscard]] bridge::Json describe() const;

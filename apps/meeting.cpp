@@ -41,6 +41,11 @@ std::uint64_t orders_of(const world::Manifest& manifest) {
 
 rt::SharedMemory::Layout layout_of(const link::FramePages& pages) { return {pages.bytes(), link::kFramesVersion}; }
 
+std::string absolute(const std::string& journal) {
+  std::error_code ignored;
+  return bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string();
+}
+
 }  // namespace
 
 std::string default_link(const std::string& world) { return fmt::format("{}-{}", world, getuid()); }
@@ -88,15 +93,6 @@ Expected<MeetingPlace> MeetingPlace::join(const std::string& name, const world::
 }
 
 std::string journal_of(const link::Border& border) { return border.journal(); }
-
-namespace {
-
-std::string absolute(const std::string& journal) {
-  std::error_code ignored;
-  return bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string();
-}
-
-}  // namespace
 
 Expected<void> find_journal(const link::Border& border, const std::string& journal) {
   std::error_code ignored;

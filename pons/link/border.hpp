@@ -68,7 +68,7 @@ struct Border {
   // The bridge's journal, by its absolute path. False: the path is too long. A bridge that comes after the end names
   // none.
   [[nodiscard]] bool name_journal(std::string_view path);
-  // The body's call, after the end: what was named last, by a bridge that may be dead. Empty: none has come so far.
+  // The body's, after the end, or a bridge's that comes: what was named last, by one that may be dead. Empty: by none.
   [[nodiscard]] std::string journal() const;
 
   [[nodiscard]] Stage now_at() const { return static_cast<Stage>(stage.value()); }

@@ -34,55 +34,43 @@ class Asks final : public gate::Visitors {
   std::vector<std::string>& answered_;
 };
 
-TEST(Desk, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
-  const bridge::TemporaryFolder folder;
-  const auto journal = bridge::Journal::open(folder / "j.db").value();
-  world::World world;
-  world.resources = {{"arm"}};
-  bridge::Actor actor{"act", {{}}};
-  task::SkillRegistry skills;
-  skills.add(actor.type());
-  bridge::Bridge bridge(*journal, skills, world);
-  const link::State state;
-  std::vector<std::string> done;
-  const runner::SkillPort port{.state = [&]() -> const link::State& { return state; },
-                               .halt = [&] { done.emplace_back("halt"); },
-                               .raise_emergency = [&] { done.emplace_back("emergency"); }};
-  runner::Arming arming(bridge, port, world.zones, runner::Recovery::kRefused);
-  const runner::Health health{{}};
-  std::vector<std::string> answered;
-  auto asks = std::make_unique<Asks>(answered);
-  Asks& visitor = *asks;
-  Desk desk(std::move(asks), bridge, *journal, {&arming}, health, [] { return nullptr; });
+// Of a run with one robot, whose stops are written down.
+class DeskOfARobot : public testing::Test {
+ protected:
+  bridge::TemporaryFolder folder_;
+  std::unique_ptr<bridge::Journal> journal_ = bridge::Journal::open(folder_ / "j.db").value();
+  const world::World world_;
+  const task::SkillRegistry skills_;
+  bridge::Bridge bridge_{*journal_, skills_, world_};
+  const link::State state_;
+  std::vector<std::string> done_;
+  const runner::SkillPort port_{.state = [this]() -> const link::State& { return state_; },
+                                .halt = [this] { done_.emplace_back("halt"); },
+                                .raise_emergency = [this] { done_.emplace_back("emergency"); }};
+  runner::Arming arming_{bridge_, port_, world_.zones, runner::Recovery::kRefused};
+  const runner::Health health_{{}};
+  std::vector<std::string> answered_;
+  std::unique_ptr<Asks> asks_ = std::make_unique<Asks>(answered_);
+  Asks& visitor_ = *asks_;
+  Desk desk_{std::move(asks_), bridge_, *journal_, {&arming_}, health_, [] { return nullptr; }};
+};
+
+TEST_F(DeskOfARobot, AnswersStopsBeforeAllElseAndInTheSamePeriod) {
   const std::string stop = R"({"op":"stop"})", emergency = R"({"op":"emergency_stop"})", look = R"({"op":"health"})";
-  visitor.texts = {look, stop, look, emergency};
-  desk.attend(Time{});
-  EXPECT_EQ(answered, (std::vector{stop, emergency, look, look}));
-  EXPECT_EQ(done, (std::vector<std::string>{"halt", "emergency"}));
+  visitor_.texts = {look, stop, look, emergency};
+  desk_.attend(Time{});
+  EXPECT_EQ(answered_, (std::vector{stop, emergency, look, look}));
+  EXPECT_EQ(done_, (std::vector<std::string>{"halt", "emergency"}));
 }
 
 // The arm stops all the same, but a bridge that takes over would go on by itself.
-TEST(Desk, WhoAsksForAStopHearsThatItIsNotKept) {
-  const bridge::TemporaryFolder folder;
-  const auto journal = bridge::Journal::open(folder / "j.db").value();
-  const world::World world;
-  const task::SkillRegistry skills;
-  bridge::Bridge bridge(*journal, skills, world);
-  const link::State state;
-  int halts = 0;
-  const runner::SkillPort port{.state = [&]() -> const link::State& { return state; }, .halt = [&] { ++halts; }};
-  runner::Arming arming(bridge, port, world.zones, runner::Recovery::kRefused);
-  const runner::Health health{{}};
-  std::vector<std::string> answered;
-  auto asks = std::make_unique<Asks>(answered);
-  Asks& visitor = *asks;
-  Desk desk(std::move(asks), bridge, *journal, {&arming}, health, [] { return nullptr; });
-  ASSERT_TRUE(std::filesystem::remove(folder / "j.db"));
-  visitor.texts = {R"({"op":"stop"})", R"({"op":"stop"})"};
-  desk.attend(Time{});
-  EXPECT_EQ(halts, 2);
-  ASSERT_EQ(answered.size(), 2U);
-  for (const std::string& answer : answered) EXPECT_NE(answer.find("not kept"), std::string::npos) << answer;
+TEST_F(DeskOfARobot, WhoAsksForAStopHearsThatItIsNotKept) {
+  ASSERT_TRUE(std::filesystem::remove(folder_ / "j.db"));
+  visitor_.texts = {R"({"op":"stop"})", R"({"op":"stop"})"};
+  desk_.attend(Time{});
+  EXPECT_EQ(done_, (std::vector<std::string>{"halt", "halt"}));
+  ASSERT_EQ(answered_.size(), 2U);
+  for (const std::string& answer : answered_) EXPECT_NE(answer.find("not kept"), std::string::npos) << answer;
 }
 
 TEST(ByHand, NobodyHearsOfATaskBeforeTheDiskHasIt) {
