@@ -22,4 +22,14 @@ std::size_t edits(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+std::string nearest(std::string_view word, std::span<const std::string> names) {
+  std::string meant;
+  std::size_t fewest = (word.size() + 2) / 3 + 1;  // a slip in three characters: "foo" is not "book"
+  for (const std::string& name : names) {
+    const std::size_t distance = edits(word, name);
+    if (distance < fewest) fewest = distance, meant = name;
+  }
+  return meant;
+}
+
 }  // namespace pons::task
