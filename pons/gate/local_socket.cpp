@@ -114,6 +114,15 @@ bool wait_for(const Descriptor& socket, short events, Clock::time_point until) {
   }
 }
 
+// 0 or errno; EAGAIN once the time is over and as many as the other side lets wait still wait before us.
+int connect_until(const Descriptor& socket, const sockaddr_un& address, Clock::time_point until) {
+  for (;;) {
+    const int error = connect_to(socket, address);
+    if (error != EAGAIN || Clock::now() >= until) return error;
+    (void)::poll(nullptr, 0, 1);  // the kernel tells nobody when there is room
+  }
+}
+
 std::unexpected<Error> gone(const std::filesystem::path& path) {
   return fail("the connection ended before the answer", path.string(), "see whether the run still goes on");
 }
@@ -164,7 +173,8 @@ Expected<Json> ask(const std::filesystem::path& path, const Json& request, std::
   const auto until = Clock::now() + patience;
   const Descriptor socket = unix_socket();
   if (!socket) return fail("no descriptor left", path.string(), "raise the limit on open files");
-  if (const int error = connect_to(socket, *address); error != 0) {
+  if (const int error = connect_until(socket, *address, until); error != 0) {
+    if (error == EAGAIN) return silent(path);
     const bool nobody = error == ENOENT || error == ECONNREFUSED || error == ENOTSOCK;
     return fail(nobody ? std::string("nobody listens there") : fmt::format("cannot connect: {}", std::strerror(error)),
                 path.string(), "start a run, or name the socket of the one that goes on");

@@ -65,6 +65,10 @@ class RawClient {
     return sent < 0 ? 0 : static_cast<std::size_t>(sent);
   }
   void end_sending() const { EXPECT_EQ(::shutdown(socket_.get(), SHUT_WR), 0); }
+  [[nodiscard]] bool dropped() const {
+    pollfd polled{socket_.get(), 0, 0};
+    return ::poll(&polled, 1, 0) == 1 && (polled.revents & POLLHUP) != 0;
+  }
   void wait_until_dropped() const {
     pollfd polled{socket_.get(), 0, 0};
     EXPECT_EQ(::poll(&polled, 1, 20'000), 1);
@@ -214,8 +218,9 @@ TEST_F(LocalSocketTest, WhoLeavesTakesTheirPlaceUntilTheyAreAnswered) {
   requests.at(0).reply("late");
   std::vector<Request> next;
   while (next.empty()) {
-    RawClient(path_).send("b\n");  // refused until the server has seen the answer
-    next = socket->poll();
+    const RawClient client(path_);  // refused until the server has seen the answer
+    client.send("b\n");
+    while (next.empty() && !client.dropped()) next = socket->poll();
   }
   EXPECT_EQ(next.at(0).text, "b");
 }
@@ -237,6 +242,32 @@ TEST_F(LocalSocketTest, OfWhatWaitsStopsComeFirstAndTheRestInPortions) {
   for (std::size_t i = 0; i <= Portion::kRequests; ++i) mailbox.deliver({{}, "s"});
   EXPECT_EQ(texts().size(), Portion::kRequests);
   EXPECT_EQ(texts().size(), 1u);
+}
+
+TEST_F(LocalSocketTest, WhoAsksWaitsForRoomAmongThoseThatConnect) {
+  const auto address = unix_address(path_).value();
+  const Descriptor listener = unix_socket();
+  ASSERT_EQ(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(listener.get(), 0), 0);  // one may wait
+  const RawClient before(path_);
+  const auto late = ask(path_, {{"op", "stop"}}, milliseconds(20));
+  ASSERT_FALSE(late);
+  ASSERT_EQ(late.error().what, "no answer in time");
+  Expected<Json> answer = fail("none");
+  std::thread client([&] { answer = ask(path_, {{"op", "stop"}}); });
+  std::vector<Descriptor> accepted;
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (accepted.size() < 2 && std::chrono::steady_clock::now() < until) {
+    Descriptor next(::accept(listener.get(), nullptr, nullptr));
+    if (next) accepted.push_back(std::move(next));
+  }
+  if (accepted.size() == 2) {
+    EXPECT_EQ(::send(accepted[1].get(), "{}\n", 3, MSG_NOSIGNAL), 3);
+  }
+  accepted.clear();
+  client.join();
+  ASSERT_TRUE(answer) << answer.error().line();
+  EXPECT_EQ(*answer, Json::object());
 }
 
 TEST_F(LocalSocketTest, DropsAClientThatSendsHalfALine) {
