@@ -19,13 +19,6 @@ using link::StopCause;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
 
-void get_moving(Bench& bench) {
-  bench.arm();
-  bench.move(bench_robot().home.array() + 0.8);
-  bench.run(300ms);
-  ASSERT_TRUE(bench.operational());
-}
-
 // For so long, or until it stands: finite torques, and no tick that breaks a limit.
 void run_unharmed(Bench& bench, Duration duration) {
   for (const Time until = bench.now + duration; bench.now < until;) {

@@ -300,7 +300,10 @@ void Cerebellum::advance(Time now) {
   if (moves(state_.safety)) follow(now);
   if (is_braking(state_.safety)) stop_at(to_s(now - stop_began_), commanded_);
   // A heap creeps while it is pressed, and an arm that creeps with it never stands.
-  if ((gives_way_ || held_off_) && now >= stop_ends_) hold_measured(now);
+  if ((gives_way_ || held_off_) && now >= stop_ends_) {
+    laws_.forget();
+    hold_measured(now);
+  }
   limit_watch_.record(before_, commanded_, dt_s_, statistics_);
 }
 

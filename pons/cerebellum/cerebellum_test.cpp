@@ -18,15 +18,6 @@ using link::StopCause;
 
 AxisVector away(double by) { return bench_robot().home.array() + by; }
 
-// In motion, well before its end.
-void get_moving(Bench& bench) {
-  bench.arm();
-  bench.move(away(0.8));
-  bench.run(300ms);
-  ASSERT_TRUE(bench.operational());
-  ASSERT_GT(bench.state().commanded.speed.cwiseAbs().maxCoeff(), 0.5);
-}
-
 TEST(Cerebellum, BeginsDisarmedWithoutPower) {
   Bench bench;
   bench.run(50ms);

@@ -12,13 +12,19 @@ constexpr double kFast = 0.7, kHardestBrake = 5;
 
 }  // namespace
 
+void Corrections::bear(double most_rad_s2) PONS_NONBLOCKING {
+  integral = sent.before(0).cwiseMax(-most_rad_s2).cwiseMin(most_rad_s2);
+  sent.fill(integral);
+}
+
 void computed_torque(model::RobotModel& model, const Gains& gains, const ArmNow& arm, const AxisState& commanded,
                      const AxisState& acting, double dt_s, Corrections& corrections,
                      AxisVector& torque_nm) PONS_NONBLOCKING {
-  const double most = gains.integral_max_rad_s2;
   AxisVector error = acting.position - arm.position;
   AxisVector rate = acting.speed - arm.speed;
   AxisVector& integral = corrections.integral;
+  // What it was given beyond that may only lessen.
+  const AxisVector most = integral.cwiseAbs().cwiseMax(gains.integral_max_rad_s2);
   integral += gains.integral_1_s3 * dt_s * error;
   integral = integral.cwiseMax(-most).cwiseMin(most);
   for (std::size_t ago = corrections.sent.ticks(); ago > 0; --ago) {

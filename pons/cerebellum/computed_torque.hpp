@@ -30,6 +30,8 @@ struct Corrections {
     integral.setZero();
     sent.fill(integral);
   }
+  // What was corrected last goes on, up to so much, though it is no error any longer.
+  void bear(double most_rad_s2) PONS_NONBLOCKING;
 
   AxisVector integral;         // its share of the acceleration
   DelayLine<AxisVector> sent;  // what was added to the commanded acceleration, integral included

@@ -31,6 +31,9 @@ class ControlLaws {
   void reset() PONS_NONBLOCKING;
   // What computed torque has corrected so far counts no longer: the arm is elsewhere, or had no power.
   void forget() PONS_NONBLOCKING { corrections_.forget(); }
+  // The arm stands in what it corrects for, as in what pushes it: as much as pushes it off by `error_rad` is borne on,
+  // wherever it is told to be.
+  void bear(double error_rad) PONS_NONBLOCKING { corrections_.bear(gains_stopped_.position_1_s2 * error_rad); }
   [[nodiscard]] link::Controller controller() const { return controller_; }
   // Where the arm is held while it is commanded to be at `commanded`: where tracking goes on from when the law changes.
   [[nodiscard]] AxisVector held(const AxisVector& commanded, const AxisVector& measured) const PONS_NONBLOCKING;

@@ -15,7 +15,10 @@ namespace {
 // Of the acceleration limits, tried one after the other until the drives can give what that takes.
 constexpr std::array kBrakingShares = {1.0, 0.85, 0.72, 0.61, 0.52};
 constexpr double kDriveShare = 0.95;  // of the drives' torques: the rest is for what the load's swinging adds
-constexpr int kLooks = 12;            // at the torques of a stop: 30 ms apart where it is a long one
+// Of a following error, what an arm that is held where it was pushed to goes on bearing. What pushes by up to twice
+// that moves it on by less than such an error, and so does what ceases to push.
+constexpr double kBorne = 0.9;
+constexpr int kLooks = 12;  // at the torques of a stop: 30 ms apart where it is a long one
 
 }  // namespace
 
@@ -153,7 +156,6 @@ void Cerebellum::go_on_from(const AxisState& state) {
 
 void Cerebellum::hold_measured(Time now) {
   gives_way_ = held_off_ = false;
-  laws_.forget();
   laws_.reset();
   go_on_from(at_rest(measured_position_));
   plan_stop();
@@ -184,7 +186,10 @@ void Cerebellum::judge_stop(Time now) {
   }
   enter(SafetyEvent::kStandstill);
   // It may have been pushed since, or what it ran into holds it: where it stands it may stay.
-  if (state_.cause == StopCause::kFollowingError || strays_) return hold_measured(now);
+  if (state_.cause == StopCause::kFollowingError || strays_) {
+    laws_.bear(kBorne * settings_.following_error_rad);
+    return hold_measured(now);
+  }
   queue_.rest(commanded_.position, now);
 }
 

@@ -175,6 +175,14 @@ void Bench::arm() {
   ASSERT_TRUE(operational());
 }
 
+void get_moving(Bench& bench) {
+  bench.arm();
+  bench.move(bench_robot().home.array() + 0.8);
+  bench.run(std::chrono::milliseconds(300));
+  ASSERT_TRUE(bench.operational());
+  ASSERT_GT(bench.state().commanded.speed.cwiseAbs().maxCoeff(), 0.5);
+}
+
 std::vector<Segment> point_to_point(const AxisState& start, Time at, const AxisVector& to, const AxisLimits& limits) {
   const auto axes = static_cast<std::size_t>(to.size());
   std::vector<motion::AxisProfile> profiles(axes);

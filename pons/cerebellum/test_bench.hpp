@@ -77,6 +77,9 @@ class Bench {
   AxisVector position_before_;
 };
 
+// Armed, and some 300 ms into a fast motion of every axis; a failed test where it is not.
+void get_moving(Bench& bench);
+
 // From rest to rest, all axes in the time of the slowest, each as its own profile.
 [[nodiscard]] std::vector<Segment> point_to_point(const AxisState& start, Time at, const AxisVector& to,
                                                   const AxisLimits& limits);
