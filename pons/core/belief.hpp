@@ -30,7 +30,9 @@ struct ObjectBelief {
   std::string code;                        // label text, empty until read
   std::vector<std::string> disputed = {};  // both, of one that shows two; then `code` is empty
   int label_attempts = 0;                  // frames good enough to read a label on it, readable or not
-  bool half_seen = false;  // has a code, but no frame showed all of it: its own label may be hidden, this another's
+  // No frame showed all of it. It has a code, which may be another's, its own label hidden; or no track (0), and the
+  // view's border still cuts it.
+  bool half_seen = false;
 };
 
 // Where a base is on its map, as of one scan, and what that scan saw beside the map.

@@ -141,6 +141,7 @@ ObjectBelief Perception::Impl::half_seen(const Sighting& sighting, Seen seen, do
   belief.world_from_top.translation() =
       Vector3(x_m - belt_travel_m, middle.y(), world.belt.surface_z_m + belief.size_m.z());
   belief.velocity_m_s.x() = world.belt.speed_m_s;
+  belief.half_seen = true;
   return belief;
 }
 

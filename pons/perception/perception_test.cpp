@@ -196,7 +196,7 @@ TEST(PerceptionTest, WhatComesIntoViewIsAnObstacleBeforeItIsAnObject) {
     EXPECT_NEAR(top.x() + 0.5 * coming[0].size_m.x(), front_m, 0.02);
     EXPECT_LT(top.x() - 0.5 * coming[0].size_m.x(), front_m - size_m.x() + 0.01) << "all of it";
     EXPECT_NEAR(coming[0].size_m.y(), size_m.y(), 0.03);
-    EXPECT_TRUE(coming[0].code.empty());
+    EXPECT_TRUE(coming[0].code.empty() && coming[0].half_seen);
   }
   EXPECT_GE(half, 5);
   EXPECT_GE(whole, 5);

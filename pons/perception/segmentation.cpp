@@ -130,7 +130,7 @@ void Segmenter::collect() {
 void Segmenter::describe(const TopView& view, Region& region) const {
   const cv::Mat1i& labels = segments_.labels;
   const cv::Point below_camera = view.cell(view.camera_m.x(), view.camera_m.y());
-  int outline = 0, hidden = 0, below = 0, crowded = 0, beside_robot = 0, border = 0;
+  int outline = 0, hidden = 0, screened = 0, below = 0, crowded = 0, beside_robot = 0, border = 0;
   region.higher.clear();
   const int own_height = typical_height(view, region.core.empty() ? region.cells : region.core);
   for (const cv::Point& cell : region.cells) {
@@ -143,6 +143,7 @@ void Segmenter::describe(const TopView& view, Region& region) const {
     if (inner) continue;
     ++outline;
     border += edge ? 1 : 0;
+    screened += (view.flags(cell) & TopView::kAtScreen) != 0 ? 1 : 0;
     const double dx = below_camera.x - cell.x, dy = below_camera.y - cell.y, distance = std::hypot(dx, dy);
     if (distance > 2 * kLook) {
       const cv::Point towards = cell + cv::Point(cvRound(kLook * dx / distance), cvRound(kLook * dy / distance));
@@ -167,6 +168,7 @@ void Segmenter::describe(const TopView& view, Region& region) const {
   region.below_share = outline > 0 ? static_cast<double>(below) / outline : 0;
   region.crowded = crowded > 3;
   region.near_robot = beside_robot > 3;
+  region.at_screen = screened > 3;
   region.border_share = outline > 0 ? static_cast<double>(border) / outline : 0;
 }
 
@@ -176,6 +178,7 @@ void Segmenter::cut(std::size_t index, const Line& line) {
   Region second;
   second.label = label;
   second.near_robot = first.near_robot;
+  second.at_screen = first.at_screen;
   const auto beyond = [&](const cv::Point& cell) { return line.beyond(cell); };
   std::ranges::copy_if(first.cells, std::back_inserter(second.cells), beyond);
   std::ranges::copy_if(first.core, std::back_inserter(second.core), beyond);
@@ -210,8 +213,8 @@ void Segmenter::split(const TopView& view) {
       const bool curved = region.plane->curved();
       std::optional<Line> line;
       if (!curved) line = splitter_.by_colour(view, region.core);
-      const bool whole =
-          !region.near_robot && region.border_share == 0 && region.hidden_share < 0.03 && region.below_share < 0.05;
+      const bool whole = !region.near_robot && !region.at_screen && region.border_share == 0 &&
+                         region.hidden_share < 0.03 && region.below_share < 0.05;
       if (!line && whole)
         line = splitter_.by_outline(curved ? region.cells : region.core, kNarrowestPiece_m / view.cell_m);
       if (!line) break;

@@ -24,6 +24,7 @@ struct Region {
   double below_share = 0;        // adjoins something higher
   bool crowded = false;          // another object within about 8 mm
   bool near_robot = false;       // beside or under the robot, or in its hand
+  bool at_screen = false;        // beside what hangs before the camera
   double border_share = 0;       // cut by the picture or the belt's limits
   std::vector<int> higher;       // labels of the higher neighbours, ascending
   std::optional<Plane> plane;    // that fits the core, where that was asked for

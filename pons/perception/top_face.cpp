@@ -30,6 +30,7 @@ struct Rectangle {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();  // cells
   double yaw = 0;
   double length = 0, width = 0;  // cells
+  std::vector<cv::Point> hull;
 };
 
 // Cells as a picture of their own, with a margin.
@@ -178,6 +179,7 @@ Rectangle fit_rectangle(const std::vector<cv::Point>& all_cells, Shape shape) {
     rectangle.yaw += std::numbers::pi / 2;
   }
   rectangle.yaw = std::remainder(rectangle.yaw, std::numbers::pi);
+  rectangle.hull = std::move(hull);
   return rectangle;
 }
 
@@ -217,6 +219,7 @@ bool is_tube(const TopView& view, const std::vector<cv::Point>& cells, const Rec
 void place(const TopView& view, const Rectangle& rectangle, double height_m, const Plane& plane, Sighting& sighting) {
   const double x = view.x0_m + (rectangle.middle.x() + 0.5) * view.cell_m;
   const double y = view.y0_m + (rectangle.middle.y() + 0.5) * view.cell_m;
+  for (const cv::Point& corner : rectangle.hull) sighting.hull_m.push_back(view.xy(corner));
   sighting.yaw_rad = rectangle.yaw;
   sighting.world_from_top = pose_xyz_yaw(x, y, view.surface_z_m + height_m, rectangle.yaw);
   sighting.size_m = {rectangle.length * view.cell_m, rectangle.width * view.cell_m, height_m};
@@ -304,14 +307,7 @@ bool Sighting::covers(double x_m, double y_m, double margin_m) const {
 bool Sighting::holds(const Sighting& part) const {
   const Vector3 middle = part.world_from_top.translation();
   if (std::abs(middle.z() - world_from_top.translation().z()) > kLevel_m) return false;
-  const double c = std::cos(part.yaw_rad), s = std::sin(part.yaw_rad);
-  for (const double a : {-0.5, 0.5}) {
-    for (const double b : {-0.5, 0.5}) {
-      const double along = a * part.size_m.x(), across = b * part.size_m.y();
-      if (!covers(middle.x() + c * along - s * across, middle.y() + s * along + c * across, kBeside_m)) return false;
-    }
-  }
-  return true;
+  return std::ranges::all_of(part.hull_m, [&](const Eigen::Vector2d& at) { return covers(at.x(), at.y(), kBeside_m); });
 }
 
 namespace {
@@ -325,6 +321,7 @@ Sighting measure_one(const TopView& view, const Region& region) {
   sighting.flatness_m = plane.rms_m;
   sighting.crowded = region.crowded || region.below_share > 0 || sighting.tilt_rad > kLeaning_rad;
   sighting.near_robot = region.near_robot;
+  sighting.at_screen = region.at_screen;
   // A box that only lost a corner to the border is measured as well as a whole one.
   // A narrow one is cut across by a short border.
   const double border_m = region.border_share * 2 * (sighting.size_m.x() + sighting.size_m.y());
@@ -332,7 +329,8 @@ Sighting measure_one(const TopView& view, const Region& region) {
                        (region.border_share > 0 && sighting.fill < kNearlyWhole);
   sighting.covered = sighting.shape == Shape::kFlat && region.below_share > kBelow && sighting.fill < kWhole;
   sighting.sliver = sighting.size_m.y() < kNarrowest_m;
-  sighting.complete = !sighting.sliver && !region.near_robot && !sighting.at_border && region.hidden_share < kHidden;
+  sighting.complete = !sighting.sliver && !region.near_robot && !region.at_screen && !sighting.at_border &&
+                      region.hidden_share < kHidden;
   return sighting;
 }
 

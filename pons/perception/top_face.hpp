@@ -26,17 +26,19 @@ struct Sighting {
   Vector3 size_m = Vector3::Zero();  // along x, along y, height of the top above the belt
   double flatness_m = 0;             // RMS distance of the top from its plane
   double tilt_rad = 0;
-  double fill = 0;  // share of the rectangle that was seen
+  double fill = 0;                        // share of the rectangle that was seen
+  std::vector<Eigen::Vector2d> hull_m{};  // world: corners of the convex hull of what was seen of it
   Shape shape = Shape::kFlat;
   bool complete = false;  // the whole outline was seen: pose and size mean something
   bool covered = false;   // something lies or leans on it
   bool crowded = false;
   bool near_robot = false;
+  bool at_screen = false;
   bool at_border = false;
   bool sliver = false;  // too narrow for an object: a piece of one
   // Where its top is, on the ground plan: middle and half sides along x and y of `top`.
   [[nodiscard]] bool covers(double x_m, double y_m, double margin_m) const;
-  // Whether all corners of `part` lie on it, and about as high.
+  // Whether all that was seen of `part` lies on it, and about as high.
   [[nodiscard]] bool holds(const Sighting& part) const;
 };
 

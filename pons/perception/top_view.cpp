@@ -20,6 +20,10 @@ constexpr double kBare_m = 0.006;       // lower readings are of the belt
 constexpr int kSameSurface = 80;        // 8 mm: readings of one cell that far below its highest are of what lies behind
 constexpr std::size_t kSurrounded = 5;  // of 8 neighbours: along the edge of hidden belt there are 3
 constexpr int kBorder = 2;              // samples
+// What hangs before the camera hides that share of some tile, and whole squares with sides of so many samples; lost
+// readings are single ones. What is read so few samples from it is beside it.
+constexpr double kScreen = 0.05;
+constexpr int kScreenLeast = 9, kBesideScreen = 6;
 
 }  // namespace
 
@@ -69,6 +73,7 @@ TopViewer::TopViewer(const RgbdFrame& frame, const world::Belt& belt, Both both)
   const int rows = std::max(8, static_cast<int>((belt.width_m + 2 * kOverhang_m) / view_.cell_m));
   highest_.create(rows, columns), filled_.create(rows, columns), view_.height.create(rows, columns);
   view_.colour.create(rows, columns), view_.flags.create(rows, columns);
+  screen_.create(window_.size());
   const int middle = window_.y + window_.height / 2;
   strips_[0].begin = window_.y, strips_[0].end = strips_[1].begin = middle, strips_[1].end = window_.br().y;
   const auto width = static_cast<std::size_t>(window_.width);
@@ -139,14 +144,16 @@ void TopViewer::drop_robot(const std::uint8_t* seen, int from, int to, Strip& st
 }
 
 // No reading has the camera's own height.
-void TopViewer::count_readings(Strip& strip) const {
+void TopViewer::count_readings(int row, Strip& strip) {
   const int tile = std::max(1, window_.width / static_cast<int>(kTiles));
   constexpr int kTooHigh = TopView::kLevel + static_cast<int>(kTooHigh_m * 1e4F);
   const int* const height = strip.height_row.data();
+  auto* const hidden = screen_.ptr<std::uint8_t>(row - window_.y);
+  for (int i = 0; i < window_.width; ++i) hidden[i] = height[i] >= kTooHigh ? 1 : 0;
   for (std::size_t t = 0; t < kTiles; ++t) {
     const int from = static_cast<int>(t) * tile, to = std::min(from + tile, window_.width);
     int unread = 0;
-    for (int i = from; i < to; ++i) unread += height[i] >= kTooHigh ? 1 : 0;
+    for (int i = from; i < to; ++i) unread += hidden[i];
     strip.unread[t] += unread;
     strip.read[t] += std::max(0, to - from) - unread;
   }
@@ -154,7 +161,7 @@ void TopViewer::count_readings(Strip& strip) const {
 
 // The highest reading of each cell. Those above bare belt are kept: they are few, and of the others only the height
 // matters. The robot is within `near`.
-void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const {
+void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) {
   strip.highest.setTo(0), strip.flags.setTo(0);
   strip.read.fill(0), strip.unread.fill(0);
   auto* const highest = strip.highest.ptr<std::uint16_t>();
@@ -163,7 +170,7 @@ void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv:
   for (int row = strip.begin; row < strip.end; ++row) {
     project(frame, row, strip);
     if (row >= near.y && row < near.br().y) drop_robot(robot.ptr<std::uint8_t>(row), near.x, near.br().x, strip);
-    count_readings(strip);
+    count_readings(row, strip);
     for (int i = 0; i < window_.width; ++i) {
       const int cell = strip.cell_row[static_cast<std::size_t>(i)];
       if (cell < 0) continue;
@@ -174,6 +181,13 @@ void TopViewer::find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv:
     }
   }
   strip.raised_count = count;
+}
+
+// What hangs before the camera hides whole patches of the picture. Beside these, an outline may be theirs.
+void TopViewer::find_screen() {
+  const auto square = [](int side) { return cv::getStructuringElement(cv::MORPH_RECT, {side, side}); };
+  cv::morphologyEx(screen_, screen_, cv::MORPH_OPEN, square(kScreenLeast));
+  cv::dilate(screen_, screen_, square(2 * kBesideScreen + 1));
 }
 
 // What was read of the highest surface of each cell.
@@ -192,6 +206,8 @@ void TopViewer::accumulate(const RgbdFrame& frame, Strip& strip) const {
                                    static_cast<std::size_t>(reading.column * sampling_.step));
     pile.colour = {frame.rgb[pixel], frame.rgb[pixel + 1], frame.rgb[pixel + 2]};
     if (!inner.contains({reading.column, reading.row})) pile.flags |= TopView::kAtBorder;
+    if (has_screen_ && screen_(reading.row - window_.y, reading.column - window_.x) != 0)
+      pile.flags |= TopView::kAtScreen;
   }
 }
 
@@ -258,13 +274,14 @@ const TopView& TopViewer::build(const RgbdFrame& frame, const cv::Mat1b& robot) 
   const cv::Rect near = cv::boundingRect(robot) & window_;
   auto& [first, second] = strips_;
   both_([&] { find_highest(frame, robot, near, first); }, [&] { find_highest(frame, robot, near, second); });
-  const auto is_read = [](const Strip& strip) {
-    const auto hidden = [&](std::size_t t) { return strip.unread[t] > kUnread * (strip.read[t] + strip.unread[t]); };
-    std::size_t t = 0;
-    while (t < kTiles && !hidden(t)) ++t;
-    return t == kTiles;
-  };
-  view_.clear = is_read(first) && is_read(second);
+  double hidden = 0;  // share of the tile of which that is most
+  for (const Strip& strip : strips_) {
+    for (std::size_t t = 0; t < kTiles; ++t)
+      hidden = std::max(hidden, static_cast<double>(strip.unread[t]) / std::max(1, strip.read[t] + strip.unread[t]));
+  }
+  view_.clear = hidden <= kUnread;
+  has_screen_ = hidden > kScreen;
+  if (has_screen_) find_screen();
   const cv::_InputArray one(first.highest);  // else std::max is meant
   cv::max(one, second.highest, highest_);
   both_([&] { accumulate(frame, first); }, [&] { accumulate(frame, second); });

@@ -22,6 +22,7 @@ struct TopView {
   static constexpr int kLevel = 5000;            // in `height`: the belt's surface; one step is 0.1 mm
   static constexpr std::uint8_t kNearRobot = 1;  // in `flags`: seen beside the robot, so perhaps hidden by it in part
   static constexpr std::uint8_t kAtBorder = 2;   // seen at the picture's border or the belt's limits, so perhaps cut
+  static constexpr std::uint8_t kAtScreen = 4;   // seen beside what hangs before the camera, so perhaps hidden by it
 
   double cell_m = 0;
   double x0_m = 0, y0_m = 0;           // world, lower corner of cell (0, 0)
@@ -93,8 +94,9 @@ class TopViewer {
 
   void project(const RgbdFrame& frame, int row, Strip& strip) const;
   void drop_robot(const std::uint8_t* seen, int from, int to, Strip& strip) const;
-  void count_readings(Strip& strip) const;
-  void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip) const;
+  void count_readings(int row, Strip& strip);
+  void find_highest(const RgbdFrame& frame, const cv::Mat1b& robot, cv::Rect near, Strip& strip);
+  void find_screen();
   void accumulate(const RgbdFrame& frame, Strip& strip) const;
   // Of the map's rows from `begin` to `end`:
   void merge(int begin, int end);
@@ -109,6 +111,8 @@ class TopViewer {
   Pose world_from_optical_;
   cv::Rect window_;  // of the sampled picture: what can see the belt
   std::array<Strip, 2> strips_;
+  cv::Mat1b screen_;  // of the window: samples that are hidden; once it is found, those beside them, too
+  bool has_screen_ = false;
   cv::Mat1w highest_, filled_;
   TopView view_;
 };

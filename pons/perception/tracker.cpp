@@ -107,9 +107,9 @@ Tracker::Observation Tracker::observe(const Track* track, const Sighting& sighti
   return o;
 }
 
-// How the track should look now.
+// Where the track should be seen now: pose, yaw and size, and no more than that.
 Sighting Tracker::expected(const Track& track, Time stamp, double travel_m) {
-  Sighting sighting = track.last;
+  Sighting sighting{.world_from_top = track.last.world_from_top};
   const Eigen::Vector2d at = track.estimate.at(stamp);
   sighting.world_from_top.translation() = Vector3(at.x() + travel_m, at.y(), track.estimate.z_m);
   sighting.yaw_rad = track.estimate.yaw_rad;
@@ -203,13 +203,14 @@ bool Tracker::lies_in(const Track& track, const Sighting& sighting, Time stamp, 
 }
 
 // Where a track should be lies something that is not it: what was taken for one may be two, or a shadow or the arm cuts
-// it in two for a moment.
+// it in two for a moment. What hangs before the camera may do so for long.
 void Tracker::count_parted(const std::vector<Sighting>& sightings, const std::vector<int>& track_of, Time stamp,
                            double travel_m) {
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     bool parted = false;
     for (std::size_t s = 0; s < sightings.size() && !parted; ++s)
-      parted = track_of[s] != static_cast<int>(t) && lies_in(tracks_[t], sightings[s], stamp, travel_m);
+      parted = track_of[s] != static_cast<int>(t) && !sightings[s].at_screen &&
+               lies_in(tracks_[t], sightings[s], stamp, travel_m);
     tracks_[t].parted = parted ? tracks_[t].parted + 1 : 0;
   }
 }

@@ -25,6 +25,10 @@ struct Bench {
     Sighting s;
     s.world_from_top = pose_xyz_yaw(x, y, 0.9 + size.z(), yaw);
     s.yaw_rad = yaw, s.size_m = size, s.complete = true, s.fill = 1;
+    const Eigen::Rotation2Dd turn(yaw);
+    for (const double a : {-0.5, 0.5})
+      for (const double b : {-0.5, 0.5})
+        s.hull_m.emplace_back(Eigen::Vector2d(x, y) + turn * Eigen::Vector2d(a * size.x(), b * size.y()));
     return s;
   }
   std::vector<std::uint32_t> update(const std::vector<Sighting>& sightings, double travel_m = 0) {
@@ -96,6 +100,18 @@ TEST(TrackerTest, OneThatComesApartForAMomentStaysOne) {
   for (int i = 0; i < 3; ++i) bench.update(pieces);
   ASSERT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 2u) << "it was two all the time";
   EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.14, 1e-9);
+}
+
+// What hangs before the camera hides its middle for as long as it likes.
+TEST(TrackerTest, WhatShowsOnBothSidesOfAScreenStaysOne) {
+  Bench bench;
+  for (int i = 0; i < 5; ++i) bench.update({Bench::sighting(-0.5, 0)});
+  std::vector<Sighting> pieces{Bench::sighting(-0.57, 0, 0, {0.06, 0.15, 0.1}),
+                               Bench::sighting(-0.43, 0, 0, {0.06, 0.15, 0.1})};
+  for (Sighting& piece : pieces) piece.at_screen = true, piece.complete = false;
+  for (int i = 0; i < 12; ++i) bench.update(pieces);
+  ASSERT_EQ(bench.tracker.beliefs(bench.now, 0).size(), 1u);
+  EXPECT_NEAR(bench.tracker.beliefs(bench.now, 0).at(0).size_m.x(), 0.2, 1e-9);
 }
 
 TEST(TrackerTest, CutsThatAllDifferChangeNothing) {
