@@ -201,9 +201,8 @@ void Cell::lifted(const ObjectBelief& object) {
 }
 
 void Cell::dropped() {
-  const link::State& state = arm.state();
-  const Vector3 tip = model.world_from_tip(state.position).translation();
-  const Vector3 tip_soon = model.world_from_tip(state.position + kInstant_s * state.speed).translation();
+  const AxisVector &q = arm.state().position, soon = q + kInstant_s * arm.state().speed;
+  const Vector3 tip = model.world_from_tip(q).translation(), tip_soon = model.world_from_tip(soon).translation();
   const double height_m = tip.z() - held->load.size_m.z() - world.belt.surface_z_m;
   const double falls_s = std::sqrt(2 * std::max(0.0, height_m) / kGravity_m_s2);
   const Vector3 lands = tip + falls_s / kInstant_s * (tip_soon - tip);
@@ -215,6 +214,13 @@ void Cell::dropped() {
   else if (!in_view(lands.x()) && beside_m < kBounces_m)
     fallen_.fell_unseen(held->code, size_m, lands, top_m);
   holds_nothing();
+}
+
+bool Cell::loses_load() {
+  if (!held || arm.cups().phase != link::VacuumPhase::kLost) return false;
+  strays->dropped(world.arm, held->code, now_);
+  dropped();
+  return true;
 }
 
 void Cell::recognise(double rode_m) {

@@ -125,6 +125,9 @@ class Cell {
   // What is held has fallen, likewise. Where that is over the belt it may lie there again, and belt and arm are to wait
   // and to keep out of the view as long as it awaits() it.
   void dropped();
+  // Once a tick while it should hang there: true when the cups have lost it. Then it has dropped(), and nobody else
+  // fell.
+  [[nodiscard]] bool loses_load();
   [[nodiscard]] bool awaits(std::string_view code) const { return fallen_.awaits(code); }
   // It is known to lie elsewhere.
   void await_no_more(std::string_view code) { fallen_.forget(code); }

@@ -12,7 +12,7 @@
 namespace pons::skills {
 
 struct Companion {
-  std::uint32_t track = 0;
+  std::uint32_t track = 0;  // 0: the cameras' view still cuts it; felt it is, missed by nobody
   std::string code;         // empty: not read
   Eigen::Vector2d aside_m;  // the middle of its top from that of the load's, tip frame
   Vector3 size_m = Vector3::Zero();

@@ -20,6 +20,13 @@ ObjectBelief box(std::uint32_t track, const char* code, double x_m, double y_m) 
   return object;
 }
 
+// The view's border cuts it: no track is made of it yet.
+ObjectBelief half_seen(double x_m, double y_m) {
+  ObjectBelief object = box(0, "", x_m, y_m);
+  object.half_seen = true;
+  return object;
+}
+
 // The tool points down, its x axis along the world's y.
 Eigen::Matrix3d turned() {
   Eigen::Matrix3d axes;
@@ -34,6 +41,17 @@ TEST(CompanyTest, IsWhatLiesCloseToIt) {
   ASSERT_EQ(company.size(), 1U) << "three centimetres apart, five, and only something in the way";
   EXPECT_EQ(company[0].code, "B");
   EXPECT_NEAR((company[0].aside_m - Eigen::Vector2d(0.13, 0)).norm(), 0, 1e-12) << "as the tip sees it";
+}
+
+// A tube hung on a box that was taken while the tube's end was not in view yet, and fell where nobody looked.
+TEST(CompanyTest, MayBeSeenInPart) {
+  const ObjectBelief target = box(1, "A", 0, 0);
+  const Company company = company_of(target, {target, half_seen(-0.21, 0), half_seen(-0.25, 0)}, turned());
+  ASSERT_EQ(company.size(), 1U) << "one centimetre apart, and five";
+  EXPECT_NEAR((company[0].aside_m - Eigen::Vector2d(0, -0.21)).norm(), 0, 1e-12);
+  const auto beside = hangs_beside({.size_m = {0.31, 0.29, 0.15}}, {1.3, {0, -0.045}}, company, std::nullopt);
+  EXPECT_TRUE(beside) << "contents do not lie to one side like that, but near its edge it is not";
+  EXPECT_FALSE(hangs_beside({.size_m = {0.31, 0.29, 0.15}}, {1.3, {0, -0.045}}, {}, std::nullopt));
 }
 
 class FeltTest : public testing::Test {

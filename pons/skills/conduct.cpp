@@ -3,7 +3,7 @@
 #include <optional>
 #include <utility>
 
-#include "pons/skills/scale.hpp"
+#include "pons/skills/late_weighing.hpp"
 #include "pons/skills/standstill.hpp"
 
 namespace pons::skills {
@@ -101,7 +101,7 @@ class Conducted final : public task::Skill {
 
   Progress go(Time now) {
     if (unweighed_ && cell_.arm.operational()) {
-      unweighed_ = cell_.held && !weighing_->tick(now);
+      unweighed_ = !weighing_->tick(now);
       if (unweighed_) return {};
     } else if (unweighed_) {
       weighing_.emplace(cell_);  // a stop broke it off

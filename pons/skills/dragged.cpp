@@ -29,6 +29,7 @@ bool lies_in(const ObjectBelief& object, const ObjectBelief& room) {
 void Dragged::put_back(const Company& company, double by_m, const std::vector<ObjectBelief>& objects, Time now) {
   if (by_m < kDragged_m) return;
   for (const Companion& companion : company) {
+    if (companion.track == 0) continue;
     const auto object = std::ranges::find(objects, companion.track, &ObjectBelief::track);
     if (object == objects.end()) continue;
     std::erase_if(ones_, [&](const One& one) { return one.track == companion.track; });

@@ -30,6 +30,13 @@ class DraggedTest : public ::testing::Test {
   Dragged dragged_;
 };
 
+// Whatever the view's border cuts, and whatever room may be taken, has none either: none of these is what hung there.
+TEST_F(DraggedTest, WhoHasNoTrackIsNotLookedFor) {
+  dragged_ = {};
+  dragged_.put_back({{0, "", {0.3, 0}}}, kBy_m, {thing(0, -0.9, 1)}, Time(from_s(2)));
+  EXPECT_TRUE(in_the_way({}).empty());
+}
+
 TEST_F(DraggedTest, WhoIsNotSeenWhereItLayIsInTheWayFurtherOn) {
   EXPECT_TRUE(in_the_way({thing(5, -0.9, 1, "P5")}).empty()) << "believed there, it is in the way anyhow";
   const auto rooms = in_the_way({}, 0.1);

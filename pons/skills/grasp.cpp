@@ -45,6 +45,11 @@ constexpr double kLeastJerk = 5.7735;  // largest acceleration of a least-jerk m
 constexpr double kThinnest_m = 0.005;  // of what is carried
 constexpr double kSlower = 1.25;
 constexpr double kEmptyTorqueShare = 0.96, kBoldest = 0.7;  // of the drives' torques; of one correction
+// Times the mass limit, as it comes off what it lay on: then the bellows of the heaviest that is sorted tighten, and it
+// pulls like 2.6 times its own weight; and as much as that does what is heavier than two together may be.
+constexpr double kPulls = 1.5, kTears = 3.6;
+// Of any axis from where it is told to be; with drives that act late it is 0.020 at most.
+constexpr double kGivesWay_rad = 0.022;
 constexpr double kGentle = 0.3;           // of the acceleration limits, for what is lifted in another way
 constexpr double kGainsMost_m_s2 = 0.15;  // of a belt whose speed wanders
 constexpr double kRideLifted_s = 0.8;     // with the belt, to be weighed
@@ -187,11 +192,23 @@ task::Progress overweight(double mass_kg) {
   return {task::Status::kException, fmt::format("overweight: {:.2f} kg", mass_kg), {{"mass_kg", mass_kg}}};
 }
 
+std::optional<task::Progress> never_lifted(const Cell& cell, double felt_kg) {
+  using task::Progress, task::Status;
+  if (felt_kg > kTears * cell.world.rules.max_mass_kg)
+    return Progress{Status::kException, fmt::format("overweight: it pulls like {:.0f} kg", felt_kg), {}};
+  const link::State& state = cell.arm.state();
+  const double off_rad = (state.commanded.position - state.position).cwiseAbs().maxCoeff();
+  if (felt_kg > kPulls * cell.world.rules.max_mass_kg && off_rad > kGivesWay_rad)
+    return Progress{Status::kRetry, "it pulls the arm off its way", {}};
+  return std::nullopt;
+}
+
 std::optional<task::Progress> not_as_it_hangs(const world::World& world, const Held& held) {
   using task::Progress, task::Status;
   if (held.doubtful) return Progress{Status::kException, "it may be another: nobody has seen it", {}};
   if (!held.alone) return Progress{Status::kRetry, "another may hang on it", {}};
   if (held.mass_kg > world.rules.max_mass_kg) return overweight(held.mass_kg);
+  if (held.mass_kg <= kLightest_kg) return Progress{Status::kRetry, "something bears it", {}};
   return std::nullopt;
 }
 

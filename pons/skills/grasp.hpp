@@ -62,6 +62,10 @@ struct GraspSearch {
 
 // How the pick of one ends that is heavier than the rules allow.
 [[nodiscard]] task::Progress overweight(double mass_kg);
+// How it ends, or goes on, of one that is felt to pull so while it is lifted as no load does that may be sorted, or
+// that pulls the arm off its way; nothing of all others. Lifted on, it would tear itself off the cups and throw the arm
+// up.
+[[nodiscard]] std::optional<task::Progress> never_lifted(const Cell& cell, double felt_kg);
 // How the pick ends, or goes on, of one that is held after a stop has broken off its lift, and was weighed then;
 // nothing if it is taken as it hangs.
 [[nodiscard]] std::optional<task::Progress> not_as_it_hangs(const world::World& world, const Held& held);

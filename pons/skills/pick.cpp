@@ -231,6 +231,11 @@ class Pick final : public ArmSkill {
     return {};
   }
 
+  Progress let_go_here(Time now, Progress verdict) {
+    set_down_.begin_here(now, target_.world_from_top.translation().z());
+    return verdict_ = std::move(verdict), phase_ = Phase::kSetDown, Progress{};
+  }
+
   Progress set_down(Time now) {
     cell_.hold_belt(now);  // or what is behind it rides against it, and stays behind, perhaps where no camera sees it
     const auto laid = set_down_.tick(now);
@@ -380,21 +385,21 @@ class Pick final : public ArmSkill {
   Progress lift(Time now) {
     const Vector3 tip = cell_.model.world_from_tip(cell_.arm.state().position).translation();
     const double height = tip.z() - cell_.held->from_m->z();
-    if (cell_.arm.cups().phase == link::VacuumPhase::kLost && height > 0) {
-      cell_.dropped();
-      cell_.strays->dropped(cell_.world.arm, code_, now);
-      begin_retreat(now, {Status::kRetry, "lost while lifting", {}});
-      return {};
-    }
+    if (height > 0 && cell_.loses_load()) return give_up(now, "lost while lifting");
     const double back_to_m = cell_.held->from_m->x() + cell_.belt_travel_m(now);
     cell_.held->ahead_m = std::max(cell_.held->ahead_m, tip.x() - back_to_m);
     if (cell_.world.belt.must_wait_for(back_to_m, cell_.belt_speed_m_s())) cell_.hold_belt(now);
-    bear_at_least(std::min(cell_.world.rules.max_mass_kg, weigh_now(cell_) / (1 + kLifted_m_s2 / kGravity_m_s2)));
-    if (height < kLifted_m) return {};
+    const double felt_kg = weigh_now(cell_), limit = cell_.world.rules.max_mass_kg;
+    // Small things may be heavy: drives that reckon with far less than they lift fall behind, and stop.
+    const double bears_kg = std::min(limit, felt_kg / (1 + kLifted_m_s2 / kGravity_m_s2));
+    if (bears_kg > kHeavier * expected_kg_ + kHeavier_kg) cell_.bears(expected_kg_ = bears_kg);
+    if (height < kLifted_m) {
+      auto never = never_lifted(cell_, felt_kg);
+      return never ? let_go_here(now, *std::move(never)) : Progress{};
+    }
     scale_.add(cell_);
     const std::optional<Weight> weighed = scale_.weigh(cell_, expected_kg_);
     const bool at_rest = now >= lift_end_ + (weighed ? kWeighAtRest : kWeighAtMost);
-    const double limit = cell_.world.rules.max_mass_kg;
     // A neighbour may bear it or drag along: only a reading at rest tells for sure.
     const bool odd = weighed && (weighed->mass_kg > (1 - kNearLimit) * limit || weighed->mass_kg < kLightest_kg);
     const auto hooked = cell_.was_hooked(code_) ? cell_.hooked : std::nullopt;
@@ -418,11 +423,6 @@ class Pick final : public ArmSkill {
     const std::string why = beside ? beside->whose + " hangs on it: its weight is felt beside it"
                                    : fmt::format("{:.2f} kg: another may hang on it", mass);
     return begin_put_back(now, 0, {Status::kRetry, why, {}});
-  }
-
-  // Small things may be heavy: drives that reckon with far less than they lift fall behind, and stop.
-  void bear_at_least(double felt_kg) {
-    if (felt_kg > kHeavier * expected_kg_ + kHeavier_kg) cell_.bears(expected_kg_ = felt_kg);
   }
 
   // Straight up from what is below, or from what stopped the arm: whatever leans on it must not be dragged along. What

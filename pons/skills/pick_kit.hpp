@@ -56,6 +56,7 @@ class PickTest : public ::testing::Test {
       std::ranges::copy(load_n + tool_n, state.wrist_force_n.begin());
       std::ranges::copy(moment_nm, state.wrist_torque_nm.begin());
     }
+    if (cups_lost_) state.vacuum = {.phase = link::VacuumPhase::kLost, .sealed_cups = 0, .open = true};
     cerebellum_.publish(state);
     for (ObjectBelief& object : objects) object.stamp = object.last_seen = now_;
     cell_.refresh(now_, std::move(objects));
@@ -97,7 +98,8 @@ class PickTest : public ::testing::Test {
   bool asked_ = false;
   double belt_m_s_ = 0, belt_travel_m_ = 0;
   std::optional<double> grips_kg_;
-  bool feels_tool_ = false;                   // without a load, too: nothing pushes against it
+  bool feels_tool_ = false;  // without a load, too: nothing pushes against it
+  bool cups_lost_ = false;
   Vector3 hangs_in_tip_m_ = Vector3::Zero();  // where the weight of it does
   link::SafetyState safety_ = link::SafetyState::kOperational;
   const world::World world_ = parcel_cell();

@@ -43,6 +43,39 @@ TEST_F(PickTest, WhatIsWeighedAfterAStopIsToldToTheLoop) {
   EXPECT_EQ(cell_.held->mass_kg, told->payload_kg);
 }
 
+// Lifted free of the belt to be weighed, it fell: nothing hangs there that could be carried.
+TEST_F(PickTest, WhatTheCupsLoseBeforeItIsWeighedHasDropped) {
+  cell_.held = Held{"P1", {.size_m = {0.2, 0.15, 0.1}}, 0};
+  grips_kg_ = 0.4;
+  tick_with({});
+  const auto skill = start("P1");
+  EXPECT_EQ(skill->tick(now_).status, Status::kRunning);
+  grips_kg_.reset();
+  cups_lost_ = true;
+  Progress progress;
+  for (int i = 0; i < 600 && progress.status == Status::kRunning; ++i) {
+    tick_with({});
+    progress = skill->tick(now_);
+    EXPECT_FALSE(cell_.held);
+  }
+  EXPECT_EQ(progress.status, Status::kFailed);
+  EXPECT_THAT(progress.reason, HasSubstr("lost from sight"));
+}
+
+TEST_F(PickTest, WhatHangsThereAndWeighsNothingIsBorneBySomething) {
+  cell_.held = Held{"P1", {.size_m = {0.2, 0.15, 0.1}}, 0};
+  grips_kg_ = 0;
+  tick_with({});
+  const auto skill = start("P1");
+  Progress progress;
+  for (int i = 0; i < 600 && cell_.held && progress.status == Status::kRunning; ++i) {
+    progress = skill->tick(now_);
+    tick_with({});
+  }
+  EXPECT_NE(progress.status, Status::kSucceeded);
+  EXPECT_FALSE(cell_.held) << "it is laid down";
+}
+
 // Nor does a pause keep it from being weighed first: unweighed it would be carried as if it were nothing.
 TEST_F(PickTest, WhatIsPausedBeforeItIsWeighedIsWeighedAllTheSame) {
   for (const int paused_at : {0, 3}) {

@@ -35,8 +35,11 @@ double height_over(const world::Place& region) { return 0.5 * region.size_m.z() 
 
 Expected<Vector3> over_region(const world::World& world, const std::string& name) {
   const world::Place* const place = world.place(name);
-  if (place == nullptr || place->kind != world::PlaceKind::kRegion)
-    return fail("'" + name + "' is no region of this world", {}, "name a place of kind region");
+  if (place == nullptr || place->kind != world::PlaceKind::kRegion) {
+    const bool any = std::ranges::count(world.places, world::PlaceKind::kRegion, &world::Place::kind) > 0;
+    return fail("'" + name + "' is no region", {},
+                any ? "name a place of kind region" : "this world has no place of kind region; draw one in world.yaml");
+  }
   return Vector3(place->center_m + Vector3(0, 0, height_over(*place)));
 }
 

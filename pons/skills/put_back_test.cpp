@@ -285,6 +285,39 @@ TEST_F(PickTest, WhatNobodyAsksForIsLaidOnTheBelt) {
   EXPECT_LT(lowest.z() - 0.1, world_.belt.surface_z_m + 0.05);
 }
 
+// A stop broke off its lift; it stands on the belt yet, and pulls as nothing does that is sorted.
+TEST_F(PickTest, WhatPullsTooHardIsLetGoOfWhereItStandsByAPickAndByAnArmAtRest) {
+  const double height_m = tip().z() - world_.belt.surface_z_m;
+  for (const bool picks : {true, false}) {
+    const std::string code = picks ? "P1" : "P2";
+    cell_.held = Held{code, {.size_m = {0.2, 0.15, height_m}}, 0};
+    grips_kg_ = 20;
+    tick_with({});
+    const auto skill = start("P1");
+    Rest rest(cell_);
+    for (int i = 0; i < 600 && cell_.held; ++i) {
+      picks ? (void)skill->tick(now_) : rest.tick(now_);
+      tick_with({});
+    }
+    EXPECT_FALSE(cell_.held);
+    EXPECT_NEAR(tip().z() - world_.belt.surface_z_m, height_m, 0.02) << picks;
+    ASSERT_FALSE(cell_.left().empty());
+    EXPECT_EQ(cell_.left().back().code, code);
+    if (picks) continue;
+    // What nobody wants afterwards is laid down, not let go of where it hangs.
+    cell_.held = Held{"P9", {.size_m = {0.2, 0.15, 0.1}}, 1.0};
+    grips_kg_ = 1;
+    double lowest_m = tip().z();
+    for (int i = 0; i < 600 && cell_.held; ++i) {
+      rest.tick(now_);
+      tick_with({});
+      lowest_m = std::min(lowest_m, tip().z());
+    }
+    EXPECT_FALSE(cell_.held);
+    EXPECT_LT(lowest_m - 0.1, world_.belt.surface_z_m + 0.05);
+  }
+}
+
 // Leaning on a taller neighbour it held the tool off its way, and the next try held the arm until a person was needed.
 using HeldOffTest = ObedientArmTest;
 TEST_F(HeldOffTest, WhatWasPutBackAndHoldsTheArmOffItsWayIsStruck) {

@@ -10,9 +10,15 @@ constexpr Duration kLeftAlone = std::chrono::milliseconds(500);  // then nobody 
 }  // namespace
 
 void Rest::tick(Time now) {
-  if (now > last_ + kPeriod) since_ = now, laying_ = false, parked_ = false;
+  const bool skill_ran = now > last_ + kPeriod;
+  if (skill_ran) since_ = now, laying_ = false, parked_ = false;
   last_ = now;
+  if (skill_ran || !weighing_ || !cell_.arm.operational()) weighing_.emplace(cell_);
   if (!cell_.arm.operational()) return;
+  if (weighing_->lets_go()) {
+    (void)weighing_->tick(now);
+    return;
+  }
   laying_ = laying_ && cell_.held;  // lost in a stop
   if (laying_) {
     const auto laid = set_down_.tick(now);
@@ -26,7 +32,7 @@ void Rest::tick(Time now) {
     if (now > cell_.arm.motion_end()) cell_.arm.control(link::Controller::kTracking);
     return;
   }
-  if (cell_.held && now >= since_ + kLeftAlone && !weighing_.tick(now)) return;
+  if (now >= since_ + kLeftAlone && !weighing_->tick(now)) return;
   cell_.keep_clear(now);
   if (!cell_.held || now < since_ + kLeftAlone) return;
   since_ = now;

@@ -1,7 +1,7 @@
 // What the arm does while no skill moves it.
 #pragma once
 
-#include "pons/skills/scale.hpp"
+#include "pons/skills/late_weighing.hpp"
 #include "pons/skills/set_down.hpp"
 
 namespace pons::skills {
@@ -9,7 +9,7 @@ namespace pons::skills {
 // Keeps clear of what comes along, and lays down what was left on the cups.
 class Rest {
  public:
-  explicit Rest(Cell& cell) : cell_(cell), weighing_(cell), set_down_(cell) {}
+  explicit Rest(Cell& cell) : cell_(cell), set_down_(cell) {}
   // Once a period while no skill runs.
   void tick(Time now);
   // Likewise, and with empty cups it stands out of the cameras' view: what they show then, when they show anything
@@ -18,7 +18,7 @@ class Rest {
 
  private:
   Cell& cell_;
-  LateWeighing weighing_;
+  std::optional<LateWeighing> weighing_;
   SetDown set_down_;
   Time last_, since_, tried_;
   bool laying_ = false;

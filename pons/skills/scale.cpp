@@ -54,10 +54,6 @@ Eigen::Vector2d moment_nm(Cell& cell) {
 
 constexpr double kBoth = 1.3, kSame = 0.9;  // of the mass of one of them
 
-constexpr double kFree_m = 0.06;     // between a load and the belt: it may hang lower than its size says
-constexpr double kFreed_m_s2 = 2.5;  // lifted so softly, it hardly swings
-constexpr Duration kWeighAtMost = std::chrono::milliseconds(600);
-
 }  // namespace
 
 bool may_be_who_hung(double mass_kg, double top_m, const Hooked& before) {
@@ -171,34 +167,6 @@ std::optional<Weight> Scale::weigh(const Cell& cell, double expected_kg) const {
   if (pull_ns <= 0) return Weight{whole_kg};
   const Eigen::Vector2d moment_nms = impulse(&Reading::moment_nm, since_then, last);
   return Weight{whole_kg, Eigen::Vector2d(-moment_nms.y(), moment_nms.x()) / pull_ns};
-}
-
-bool LateWeighing::tick(Time now) {
-  if (cell_.held->mass_kg > 0) return true;
-  cell_.hold_belt(now);  // or what rides along comes against it, and bears a part of it
-  const Time from = cell_.arm.splice_time(now);
-  const AxisState state = cell_.arm.planned(from);
-  const Pose tip = cell_.model.world_from_tip(state.position);
-  const double free_m = tip.translation().z() - cell_.held->load.size_m.z() - cell_.world.belt.surface_z_m;
-  const double most_kg = cell_.world.rules.max_mass_kg;
-  if (!rested_) {
-    rested_ = now;
-    scale_ = {};
-    if (free_m < kFree_m) {
-      const auto up =
-          lift(cell_, state, from, tip.linear(), lift_offset(cell_, held_at(*cell_.held, tip)), kFreed_m_s2);
-      if (up && cell_.arm.stream(up->trajectory)) rested_ = up->top;
-    }
-  }
-  if (now < *rested_) return false;
-  scale_.add(cell_);
-  const std::optional<Weight> weighed = scale_.weigh(cell_, most_kg);
-  if (!weighed && now < *rested_ + kWeighAtMost) return false;
-  Held& held = *cell_.held;
-  held.alone = held.alone || (weighed && !hangs_beside(held.load, *weighed, held.company, std::nullopt));
-  cell_.weighs(weighed && free_m >= kFree_m / 2 ? std::max(kLightest_kg, weighed->mass_kg) : most_kg);
-  rested_.reset();
-  return true;
 }
 
 }  // namespace pons::skills

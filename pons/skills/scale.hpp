@@ -71,19 +71,4 @@ class Scale {
 // One reading at standstill, kg, tool taken off.
 [[nodiscard]] double weigh_now(Cell& cell);
 
-// What is held and was never weighed, because a stop broke off its lift. What may still stand on the belt is lifted
-// free of it first, softly, for it may be heavy. The belt waits meanwhile.
-class LateWeighing {
- public:
-  explicit LateWeighing(Cell& cell) : cell_(cell) {}
-  // Once a tick while something is held and nothing else moves the arm, until it is true: then its mass is known, as
-  // the most that is carried where it could not be lifted.
-  [[nodiscard]] bool tick(Time now);
-
- private:
-  Cell& cell_;
-  Scale scale_;
-  std::optional<Time> rested_;  // hangs still by then
-};
-
 }  // namespace pons::skills

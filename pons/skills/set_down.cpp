@@ -72,6 +72,14 @@ Expected<void> SetDown::begin_back(Time now, const Vector3& tip_m, const Eigen::
   return {};
 }
 
+void SetDown::begin_here(Time now, double top_z_m) {
+  back_.reset();
+  top_z_m_ = top_z_m;
+  beside_others_ = false;
+  (void)cell_.stop(now);  // or it rises on, which does no harm
+  begin_at(now);
+}
+
 Expected<void> SetDown::go_back(Time now) {
   const Time from = cell_.arm.splice_time(now);
   const AxisState start = cell_.arm.planned(from);

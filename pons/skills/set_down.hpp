@@ -25,6 +25,8 @@ class SetDown {
   // known: it may lie on another. Error: out of reach.
   [[nodiscard]] Expected<void> begin_back(Time now, const Vector3& tip_m, const Eigen::Matrix3d& orientation,
                                           std::optional<double> top_z_m = {});
+  // Where it hangs, at once. `top_z_m`: likewise.
+  void begin_here(Time now, double top_z_m);
   // Once a period after that: true when the cups are empty, and off what they pressed on. Error: the arm does not obey,
   // or down is out of reach.
   [[nodiscard]] Expected<bool> tick(Time now);

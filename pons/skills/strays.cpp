@@ -28,6 +28,7 @@ void Strays::lifted(const std::string& arm, const std::string& load, const Compa
   std::erase_if(torn_, [&](const Torn& torn) { return torn.load == load; });
   std::erase_if(doubted_, [&](const Doubted& one) { return one.track == kNoTrack && one.stray.code == load; });
   for (const Companion& companion : company) {
+    if (companion.track == 0) continue;
     std::erase_if(doubted_, [&](const Doubted& one) { return one.put_back && one.stray.code == companion.code; });
     Doubted one;
     one.track = companion.track;

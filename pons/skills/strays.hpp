@@ -28,7 +28,7 @@ struct BeltAt {
 // Of all arms of a belt, which are told apart by their names, as loads are by their codes. One thread.
 class Strays {
  public:
-  // A load with that company hangs on the arm's cups.
+  // A load with that company hangs on the arm's cups. Who has no track is not told from others, nor missed.
   void lifted(const std::string& arm, const std::string& load, const Company& company);
   // One of its company hangs there: its weight is felt.
   void felt(const std::string& load);

@@ -48,6 +48,14 @@ TEST_F(StraysTest, WhoWasCompanyAndIsNotSeenAgainWentTheSameWay) {
   EXPECT_EQ(place_of(""), "");
 }
 
+// No track tells whether what was seen in part has stayed.
+TEST_F(StraysTest, WhoHasNoTrackIsMissedByNobody) {
+  carry({{0, "", {0.2, 0}}});
+  look({box(0, "", -0.2)});
+  look({});
+  EXPECT_TRUE(strays_.take_found_gone().empty());
+}
+
 // A track may be lost and found again under another number.
 TEST_F(StraysTest, WhoWasCompanyTwiceWentWithTheLast) {
   carry();
