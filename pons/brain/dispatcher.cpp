@@ -227,14 +227,16 @@ bool Dispatcher::is_to_be_read(const ObjectBelief& belief, const std::vector<Obj
   const bool unread = belief.code.empty() && belief.disputed.empty() && belief.label_attempts < kLooks;
   if (!(unread || belief.half_seen) || decided_.contains(belief.track)) return false;
   if (will_be_bare(belief, all, now, set_aside)) to_be_read_.try_emplace(belief.track);
-  const auto found = to_be_read_.find(belief.track);
-  if (found == to_be_read_.end()) return false;
+  // Half seen and bare, it was beside something taller or the arm: the next look shows all of it.
+  const bool bare =
+      belief.half_seen && std::ranges::none_of(all, [&](const ObjectBelief& other) { return covers(other, belief); });
+  if (!bare && !to_be_read_.contains(belief.track)) return false;
   const Eigen::Vector2d along = belief.world_from_top.linear().row(0).head<2>().cwiseAbs();
   const double front_m = belief.world_from_top.translation().x() + 0.5 * along.dot(belief.size_m.head<2>());
   const double stops_m = belt_.stops_within_m(std::max(belief.velocity_m_s.x(), 0.0));
   const double end_m = label_view_end_m_ - kNearBorder_m;
   if (front_m > end_m || front_m + stops_m < end_m - kStopsShort_m) return false;
-  std::optional<Time>& since = found->second;
+  std::optional<Time>& since = to_be_read_[belief.track];
   if (!since) since = now;
   return now - *since < kWaitsToRead;
 }

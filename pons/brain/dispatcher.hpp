@@ -86,7 +86,8 @@ class Dispatcher final : public Brain {
   // What lies on it is waited for.
   [[nodiscard]] bool will_be_bare(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                                   const std::set<std::string>& set_aside) const;
-  // Unread, since its label lies or lay below what is asked for, and about to leave the view of whoever could read it.
+  // Unread, since its label lies or lay below what is asked for, or half seen and bare; and about to leave the view of
+  // whoever could read it.
   [[nodiscard]] bool is_to_be_read(const ObjectBelief& belief, const std::vector<ObjectBelief>& all, Time now,
                                    const std::set<std::string>& set_aside);
   [[nodiscard]] bool past_label_view(const ObjectBelief& belief) const;
@@ -101,7 +102,8 @@ class Dispatcher final : public Brain {
   std::map<std::string, Known, std::less<>> known_;        // codes seen on some track
   std::map<std::string, std::string, std::less<>> asked_;  // code by task id
   std::set<std::uint32_t> decided_;                        // tracks
-  // By track, what lay unread below what is asked for; and since when the belt waits for it at the end of the view.
+  // By track, what lay unread below what is asked for, or was waited for bare; and since when the belt waits for it at
+  // the end of the view.
   std::map<std::uint32_t, std::optional<Time>> to_be_read_;
   Tally tally_;
 };

@@ -408,6 +408,20 @@ TEST_F(DispatcherTest, TheBeltWaitsForWhatIsHalfSeenOnceTheUpperOneIsTaken) {
   EXPECT_FALSE(dispatcher_.observe({lower}, at(0.3)).belt_waits);
 }
 
+// The arm hid an end of it until it came to the view's end: a tenth of a second later it would be cut there.
+TEST_F(DispatcherTest, TheBeltWaitsForWhatIsHalfSeenAndBare) {
+  ObjectBelief half = parcel(1, 0.24, "P1"), upper = parcel(2, 0.1, "P2");
+  half.half_seen = true;
+  half.confidence = 0.3;
+  upper.world_from_top.translation().z() = 0.7;
+  ObjectBelief upstream = half;
+  upstream.world_from_top.translation().x() = -0.2;
+  EXPECT_FALSE(dispatcher_.observe({upstream}, at(0)).belt_waits) << "there is time";
+  EXPECT_FALSE(dispatcher_.observe({half, upper}, at(3), {"P2"}).belt_waits) << "nobody takes what covers it now";
+  EXPECT_TRUE(dispatcher_.observe({half}, at(3.1)).belt_waits);
+  EXPECT_FALSE(dispatcher_.observe({half}, at(12)).belt_waits) << "it has waited long enough";
+}
+
 TEST_F(DispatcherTest, WhatLiesUnderOneThatIsGivenUpRides) {
   ObjectBelief lower = parcel(1, world_.belt.waits_at_m() + 0.001, "P1");
   ObjectBelief upper = parcel(2, lower.world_from_top.translation().x() - 0.1, "P2");

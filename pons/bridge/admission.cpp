@@ -144,6 +144,7 @@ Expected<Admission> Bridge::take(Candidate candidate, Time now) {
   unkept_ = true;
   Open& open = add_open(std::move(candidate.task), std::move(candidate.program), now, journal_.newest());
   enqueue(open, now);
+  tell_held(open, now);
   if (!candidate.asked.empty()) ask(open, std::move(candidate.asked), now);
   return admission;
 }

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -74,15 +75,16 @@ Expected<void> Bridge::approve(std::string_view id, std::string_view tier, std::
 
 void Bridge::expire_asked(Time now) {
   if (held()) return;
-  std::vector<const Open*> late;
-  for (const std::string& id : asking_) {
+  const auto is_late = [&](const std::string& id) {
     const Open& open = *open_.find(id)->second;
-    if (now - held_for_ >= open.asked_since + patience(open.asked)) late.push_back(&open);
-  }
-  for (const Open* const open : late) {
-    arbiter_.remove(open->task.id);
-    finish(open->task.id, task::Outcome::kFailed, fmt::format("nobody has allowed it in time: {}", names(open->asked)),
-           Json::object(), now);
+    return now - held_for_ >= open.asked_since + patience(open.asked);
+  };
+  std::vector<std::string> late;
+  std::ranges::copy_if(asking_, std::back_inserter(late), is_late);
+  for (std::string& id : late) {
+    Open& open = *open_.find(id)->second;
+    leave(open, task::Outcome::kFailed, fmt::format("nobody has allowed it in time: {}", names(open.asked)));
+    leaving_.push_back(std::move(id));
   }
 }
 

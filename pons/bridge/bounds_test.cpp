@@ -215,6 +215,77 @@ TEST_F(BoundsTest, RestartsAloneDoNotMakeItGrow) {
   EXPECT_GT(left_out_of("T1"), 0);
 }
 
+// ---- what comes to many at once ----
+
+// A thousand that wait, none of which may begin.
+class ManyWait : public BoundsTest {
+ protected:
+  static constexpr int kMany = 1000;
+  ManyWait() {
+    bridge_.reset();
+    journal_ = std::move(*Journal::open(":memory:"));
+    open();
+    bridge_->hold(Bridge::Hold::kOn);
+  }
+  void open() { bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_); }
+  void submit_all(const std::string& rest = "") {
+    for (int i = 0; i < kMany; ++i) ASSERT_TRUE(submit(fmt::format("t{:04}", i), "pick", rest));
+  }
+};
+
+TEST_F(ManyWait, DeadlinesThatPassAtOnceAreWrittenAFewATickAndNoneOfThemBegins) {
+  bridge_->hold(Bridge::Hold::kOff);
+  ASSERT_TRUE(submit("first", "slow"));
+  tick();
+  submit_all(R"(,"deadline_s":1)");
+  now_ += from_s(2);
+  ASSERT_TRUE(bridge_->cancel("first", now_, "the arm is free"));
+  tick(5);
+  EXPECT_EQ(bridge_->state("t0999"), "ending");
+  EXPECT_TRUE(bridge_->cancel("t0999", now_, "as it ends"));
+  EXPECT_FALSE(bridge_->pause("t0999", now_, "lunch"));
+  EXPECT_TRUE(bridge_->queue().empty());
+  tick(20);
+  EXPECT_TRUE(bridge_->idle());
+  EXPECT_TRUE(pick_.log.started.empty());
+  EXPECT_EQ(recorded("t0999")->outcome, Outcome::kFailed);
+  EXPECT_EQ(recorded("t0999")->reason, "its deadline passed before it could start");
+}
+
+// The next bridge must not begin what was told to end, whenever this one dies.
+TEST_F(ManyWait, WhatIsToldToEndIsWrittenAtOnceHoweverMany) {
+  world_.schedule.on_emergency_stop = world::OnEmergencyStop::kCancel;
+  open();
+  bridge_->hold(Bridge::Hold::kOn);
+  submit_all();
+  bridge_->emergency_stop(now_, "stop input");
+  EXPECT_TRUE(bridge_->idle());
+  ASSERT_TRUE(bridge_->commit(now_));
+  EXPECT_THAT(bridge_->take_outcomes(), SizeIs(kMany));
+  EXPECT_EQ(recorded("t0500")->reason, "stopped: stop input");
+}
+
+// Who is told late that all is held may be told before that it was released.
+TEST_F(ManyWait, OfAnEmergencyStopEachHearsOnceHoweverMany) {
+  submit_all();
+  bridge_->emergency_stop(now_, "stop input");
+  const auto told = [&](std::string_view kind) {
+    std::ptrdiff_t all = 0;
+    for (int i = 0; i < kMany; ++i) all += std::ranges::count(kinds(fmt::format("t{:04}", i)), kind);
+    return all;
+  };
+  EXPECT_EQ(told(kHeldEvent), 64);
+  tick(5);
+  EXPECT_EQ(told(kHeldEvent), 6 * 64);
+  bridge_->released(now_);
+  tick(20);
+  EXPECT_EQ(told(kHeldEvent), 6 * 64);
+  EXPECT_EQ(told(kReleasedEvent), 6 * 64);
+  bridge_->emergency_stop(now_, "stop input");
+  tick(20);
+  EXPECT_EQ(told(kHeldEvent), 6 * 64 + kMany);
+}
+
 // ---- what is told of them ----
 
 TEST_F(BoundsTest, OpenOnesAreToldPageByPageInTheOrderOfAcceptance) {

@@ -132,6 +132,7 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
   open.done = story.done();
   open.allowed = story.allowed();
   open.paused = story.paused();
+  open.paused_for = story.paused_for();
   // Who has begun has not waited all the time.
   enqueue(open, begun ? now : record.accepted);
   if (!asked.empty()) {
@@ -164,6 +165,7 @@ Expected<void> Bridge::go_on(const TaskRecord& record, const Story& story, const
   open.begun = true;
   open.allowed = story.allowed();
   if (!open.resources.empty()) open.priority = Arbiter::kFirst;  // it may hold what the next one would need
+  open.paused_for = story.paused_for();
   if (story.paused()) open.told = Open::Told::kPause;
   enqueue(open, now);
   return {};
@@ -207,6 +209,7 @@ Expected<void> Bridge::go_on_in_tree(const TaskRecord& record, std::shared_ptr<c
   open.begun = true;
   open.allowed = story.allowed();
   open.events = story.length();
+  open.paused_for = story.paused_for();
   checkpoint(open, now);
   if (!story.handed_over() && !open.resources.empty()) open.priority = Arbiter::kFirst;  // as in go_on()
   enqueue(open, now);
@@ -231,14 +234,6 @@ std::unique_ptr<tree::Tree> Bridge::tree_of(const task::Task& task, std::shared_
   return tree;
 }
 
-void Bridge::finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now,
-                             Json detail) {
-  const auto written = journal_.outcome(id, outcome, reason, now, detail);
-  keep(written);
-  review_.contradictions().release(id);
-  if (written) ended_.push_back({id, outcome, reason, std::move(detail)});
-}
-
 // ---- a tick ----
 
 void Bridge::tick(Time now) {
@@ -249,6 +244,8 @@ void Bridge::tick(Time now) {
   tick_trees(in_turn(), now);
   expire(now);
   expire_asked(now);
+  close_some(now);
+  tell_held(now);
   take_orders(now);
   tick_trees(start_granted(now), now);
   preempt(now);
@@ -257,6 +254,7 @@ void Bridge::tick(Time now) {
   for (const auto& [id, open] : running_)
     end_running(*open, Ending::kCancel, now, "the bridge has stopped: " + fault_->what);
   // What waits stays open in the journal.
+  leaving_.clear();
   std::erase_if(open_, [&](const auto& entry) {
     arbiter_.remove(entry.first);
     asking_.erase(entry.first);
@@ -269,12 +267,6 @@ void Bridge::stand_still(Time now) {
   if (held() && last_tick_ > Time{}) held_for_ += now - last_tick_;
   for (const auto& [id, open] : running_) {
     if (is_held(open->robot)) open->tree->stand_still();
-  }
-}
-
-void Bridge::expire(Time now) {
-  for (const std::string& id : arbiter_.take_expired(now)) {
-    finish(id, task::Outcome::kFailed, "its deadline passed before it could start", Json::object(), now);
   }
 }
 
@@ -373,38 +365,6 @@ bool Bridge::give_up(const Open& open) {
       {fmt::format("a skill of task '{}' did not end within {} s of being cancelled", open.task.id, to_s(kCancelGrace)),
        "bridge", "stop the robot and mend the skill"});
   return true;
-}
-
-void Bridge::conclude(const std::string& id, Open& open, const task::Progress& progress, Time now) {
-  auto outcome = task::Outcome::kFailed;
-  std::string reason = progress.reason;
-  if (progress.status == task::Status::kSucceeded) {
-    outcome = task::Outcome::kSucceeded;
-    reason.clear();
-  } else if (progress.status == task::Status::kException) {
-    outcome = task::Outcome::kException;
-  } else if (open.cancelled) {
-    outcome = task::Outcome::kCancelled;
-    reason = fmt::format("{} ({})", open.cancel_reason, progress.reason);
-  }
-  Json detail{{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
-  if (progress.stop) detail["stop"] = task::name(*progress.stop);
-  if (open.program) detail["blackboard"] = open.tree->blackboard();
-  arbiter_.release(id);
-  running_.erase(id);
-  finish(id, outcome, std::move(reason), std::move(detail), now);
-}
-
-void Bridge::finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now) {
-  parked_.erase(id);
-  asking_.erase(id);
-  review_.contradictions().release(id);
-  const auto closed = open_.extract(open_.find(id));  // until the end of this: `id` may live in it
-  const std::string& name = closed.key();
-  const auto written = journal_.outcome(name, outcome, reason, now, detail);
-  keep(written);
-  unkept_ = true;
-  if (written) ended_.push_back({name, outcome, std::move(reason), std::move(detail)});
 }
 
 Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attempt& attempt, Time now) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -115,6 +116,15 @@ class Bridge {
   [[nodiscard]] Expected<void> cancel(std::string_view id, Time now, std::string_view reason);
   // Likewise, but what moves stops now, wherever it is.
   [[nodiscard]] Expected<void> halt(std::string_view id, Time now, std::string_view reason);
+  // All that run, and what waits and may hold something that an earlier bridge began with, are paused for that reason,
+  // but for those that are paused, or ending, already; whether there were any. Nobody looks after tasks that are told
+  // so one by one: what is to begin must be withheld.
+  bool pause_all(Time now, std::string_view reason);
+  // Those that are paused for that reason go on. One that somebody has had go on meanwhile, and paused again, is paused
+  // for another.
+  void resume_all(Time now, std::string_view reason);
+  // Whether all stand so that use resources and run, and none waits that an earlier bridge has begun.
+  [[nodiscard]] bool all_paused() const;
   // Cancels everything and refuses what comes; tick() on until idle().
   void stop(Time now, std::string_view reason);
   // That robot has had an emergency stop, for that cause: open tasks are held or cancelled as the world says, but for
@@ -128,6 +138,9 @@ class Bridge {
   // the others do not wait for it.
   enum class Hold : std::uint8_t { kOff, kOn, kGone };
   void hold(Hold hold, std::size_t robot = 0) { robots_[robot].hold = hold; }
+  // Whether something hangs on that robot. What carries it makes way for no other task, but where a skill of it that
+  // runs says that it may.
+  void load(bool carries, std::size_t robot = 0) { robots_[robot].carries = carries; }
 
   // What keeps new tasks from being taken, as their senders are told, and orders from being claimed; nothing: they are.
   // Those that are open go on.
@@ -162,8 +175,8 @@ class Bridge {
   [[nodiscard]] std::string_view state(std::string_view id) const;
   // Waiting ones that a person has paused, or is asked about.
   [[nodiscard]] const std::set<std::string>& parked() const { return parked_; }
-  // Those, the ones that a robot has begun which is gone, and the ones that wait for what it keeps: nobody need wait
-  // for what they are about.
+  // Those, the ones that a robot has begun which is gone, and the ones that wait for it or for what it keeps: nobody
+  // need wait for what they are about.
   [[nodiscard]] std::set<std::string> set_aside() const;
   // Whether any of those that run needs some: else nothing moves for a task.
   [[nodiscard]] bool uses_resources(std::size_t robot = 0) const;
@@ -236,6 +249,13 @@ class Bridge {
   [[nodiscard]] Expected<void> permit(const std::string& id, const task::Step& use, Time now);
 
   void expire(Time now);
+  void leave(Open& open, task::Outcome outcome, std::string reason);
+  void close(Open& open, Time now);
+  void close_some(Time now);
+  void tell_held(Time now);
+  void tell_held(Open& open, Time now);
+  [[nodiscard]] bool is_to_be_held(const Open& open) const;
+  [[nodiscard]] bool is_stopped(const Open& open) const;
   void take_orders(Time now);
   void take_order(const Order& order, Time now);
   [[nodiscard]] std::vector<std::string> start_granted(Time now);
@@ -243,6 +263,7 @@ class Bridge {
   void regain(Open& open, Time now);
   void stand_still(Time now);
   void preempt(Time now);
+  [[nodiscard]] bool carries_between_skills(const Open& open) const;
   void stands(Open& open, Time now);
   void tick_trees(const std::vector<std::string>& ids, Time now);
   [[nodiscard]] std::vector<std::string> in_turn();
@@ -254,7 +275,6 @@ class Bridge {
   [[nodiscard]] Expected<void> end(std::string_view id, Ending ending, Time now, std::string_view reason);
   void end_those(const std::function<bool(const Open&)>& concerned, Time now, std::string_view reason);
   void end_running(Open& open, Ending ending, Time now, std::string_view reason);
-  void end_waiting(Open& open, Time now, std::string_view reason);
   void finish(const std::string& id, task::Outcome outcome, std::string reason, Json detail, Time now);
   void finish_unopened(const std::string& id, task::Outcome outcome, const std::string& reason, Time now,
                        Json detail = Json::object());
@@ -267,7 +287,8 @@ class Bridge {
     std::string name;
     const task::SkillRegistry* skills;
     Hold hold = Hold::kOff;
-    bool emergency = false;
+    bool carries = false;
+    std::optional<std::string> emergency;  // its cause
   };
   const world::World& world_;
   std::vector<Robot> robots_;
@@ -280,6 +301,8 @@ class Bridge {
   std::map<std::string, Open*, std::less<>> running_;
   std::set<std::string> parked_;
   std::set<std::string> asking_;                 // a person
+  std::deque<std::string> leaving_;              // out of the queue, and their ends to be written
+  std::optional<std::string> held_to_;           // whether tasks are held is to be told from this one on
   std::vector<OutcomeReport> ended_, outcomes_;  // written; and durable
   std::optional<Error> fault_, closed_;
   std::size_t shared_work_ = 0;  // of this tick, by those that need no resource

@@ -8,12 +8,17 @@
 
 namespace pons::bridge {
 
+// Deadlines that pass at once, and that tasks are held or released, are written by so many a tick: about a fifth of its
+// time. A bridge that dies meanwhile leaves to the next what that one finds by itself.
+inline constexpr std::size_t kWrittenATick = 64;
+
 struct Bridge::Open {
   // Where it is. Only a task that runs holds resources and is ticked.
   enum class Stage : std::uint8_t {
     kWaits,   // in the arbiter's queue
     kRuns,    // on its way, or paused on it
     kParked,  // paused, or a person is asked about it; out of the queue
+    kLeaves,  // out of the queue for good, as `leaves` says
   };
   // By what an allowed use is known again.
   [[nodiscard]] static std::string key(const Leave& leave) { return leave.rule->name + " " + leave.use; }
@@ -21,7 +26,7 @@ struct Bridge::Open {
   // What a running one was told, beside ending.
   enum class Told : std::uint8_t {
     kNothing,
-    kPause,    // by a person: it keeps its resources
+    kPause,    // by a person, or for the bridge to rest: it keeps its resources
     kPreempt,  // for another task: it waits again as soon as it stands
   };
 
@@ -49,6 +54,8 @@ struct Bridge::Open {
   bool held = false;         // by an emergency stop
   bool cancelled = false, halted = false;
   std::string cancel_reason;
+  std::string paused_for;                            // by which it was paused last
+  task::Outcome leaves = task::Outcome::kCancelled;  // and why, `cancel_reason`
   int attempts = 0;
   std::size_t events = 0;      // in the journal, about
   Json steps = Json::array();  // what each step that ended had to tell

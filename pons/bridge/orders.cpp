@@ -1,5 +1,7 @@
 // What a bridge does with the order book that it shares with others.
 #include <algorithm>
+#include <set>
+#include <string>
 
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/open_task.hpp"
@@ -9,25 +11,31 @@ namespace {
 
 constexpr Duration kLookPeriod = std::chrono::milliseconds(100);
 // What one bridge has claimed no other can run: it takes little more than it can begin, and gathers few that people
-// have to allow.
+// have to allow, or that only a robot may run which waits for a person.
 constexpr std::size_t kAhead = 4, kAskAhead = 64;
 
 }  // namespace
 
 void Bridge::take_orders(Time now) {
-  const bool may = !fault_ && !stopping_ && !closed_ && !std::ranges::all_of(robots_, &Robot::emergency) && !held();
+  const auto stopped = [](const Robot& robot) { return robot.emergency.has_value(); };
+  const bool may = !fault_ && !stopping_ && !closed_ && !std::ranges::all_of(robots_, stopped) && !held();
   if (!may || now < look_at_) return;
   look_at_ = now + kLookPeriod;
   if (asking_.size() >= kAskAhead || open_.size() + kAhead > kMaxOpen) return;
-  std::size_t waiting = arbiter_.queue_length();
-  int least = 0;
-  if (waiting >= kAhead) {
-    // An urgent one overtakes those that wait here already.
-    least = urgent_priority_;
-    waiting = static_cast<std::size_t>(std::ranges::count_if(open_, [least](const auto& entry) {
-      return entry.second->stage == Open::Stage::kWaits && entry.second->task.priority >= least;
-    }));
+  const std::set<std::string> aside = set_aside();
+  std::size_t urgent = 0, others = 0, stuck = 0;
+  for (const auto& [id, open] : open_) {
+    if (open->stage != Open::Stage::kWaits) continue;
+    if (aside.contains(id))
+      ++stuck;
+    else
+      ++(open->task.priority >= urgent_priority_ ? urgent : others);
   }
+  if (stuck >= kAskAhead) return;
+  // An urgent one overtakes those that wait here already.
+  const bool enough = urgent + others >= kAhead;
+  const int least = enough ? urgent_priority_ : 0;
+  const std::size_t waiting = enough ? urgent : others + urgent;
   if (waiting >= kAhead) return;
   const auto orders = journal_.claim(kAhead - waiting, least, ageing_);
   if (!orders) {

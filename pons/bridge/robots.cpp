@@ -32,8 +32,8 @@ std::set<std::string> Bridge::set_aside() const {
   for (const auto& [id, open] : running_) {
     if (robots_[open->robot].hold == Hold::kGone) ids.insert(id);
   }
+  if (std::ranges::none_of(robots_, [](const Robot& robot) { return robot.hold == Hold::kGone; })) return ids;
   const std::vector<std::string> kept = kept_by_gone();
-  if (kept.empty()) return ids;
   for (const auto& [id, open] : open_) {
     if (open->stage != Open::Stage::kWaits) continue;
     const bool waits = std::ranges::all_of(open->robots, [&](std::size_t robot) {
@@ -54,9 +54,12 @@ std::vector<std::string> Bridge::kept_by_gone() const {
 }
 
 bool Bridge::needs_any(const Open& open, std::size_t robot, const std::vector<std::string>& resources) const {
-  return std::ranges::any_of(resources_for(open.task, open.program.get(), robot), [&](const std::string& needed) {
+  if (resources.empty()) return false;
+  const auto is_one = [&](const std::string& needed) {
     return std::ranges::find(resources, needed) != resources.end();
-  });
+  };
+  if (robot == open.robot) return std::ranges::any_of(open.resources, is_one);
+  return std::ranges::any_of(resources_for(open.task, open.program.get(), robot), is_one);
 }
 
 std::vector<std::string> Bridge::resources_for(const task::Task& task, const tree::Program* program,
@@ -121,7 +124,7 @@ Arbiter::Fits Bridge::fits() const {
   return [this, kept = kept_by_gone()](std::string_view id, std::size_t way) {
     const Open& open = *open_.find(id)->second;
     const std::size_t robot = open.robots[way];
-    if (is_held(robot) || (!kept.empty() && needs_any(open, robot, kept))) return false;
+    if (is_held(robot) || needs_any(open, robot, kept)) return false;
     if (open.begun) return true;
     const task::Chance own = chance(open, robot);
     if (own != task::Chance::kGone) return own == task::Chance::kNow;
@@ -134,31 +137,54 @@ Arbiter::Fits Bridge::fits() const {
 // ---- emergency stop ----
 
 void Bridge::emergency_stop(Time now, std::string_view cause, std::size_t robot) {
-  if (std::exchange(robots_[robot].emergency, true)) return;
-  const auto concerned = [&](const Open& open) {
-    return may_run(open, robot) &&
-           std::ranges::all_of(open.robots, [&](std::size_t other) { return robots_[other].emergency; });
-  };
+  if (robots_[robot].emergency) return;
+  robots_[robot].emergency = cause;
   if (on_emergency_stop_ == world::OnEmergencyStop::kCancel) {
-    end_those(concerned, now, fmt::format("stopped: {}", cause));
+    end_those([&](const Open& open) { return may_run(open, robot) && is_stopped(open); }, now,
+              fmt::format("stopped: {}", cause));
     return;
   }
-  for (const auto& [id, open] : open_) {
-    if (!concerned(*open)) continue;
-    open->held = true;
-    unkept_ = true;
-    tell(*open, now, kHeldEvent, {{"cause", cause}});
-  }
+  held_to_ = "";
+  tell_held(now);
 }
 
 void Bridge::released(Time now, std::size_t robot) {
-  if (!std::exchange(robots_[robot].emergency, false)) return;
-  for (const auto& [id, open] : open_) {
-    if (!may_run(*open, robot)) continue;
-    if (!std::exchange(open->held, false)) continue;
-    unkept_ = true;
-    tell(*open, now, kReleasedEvent);
+  if (!std::exchange(robots_[robot].emergency, std::nullopt)) return;
+  held_to_ = "";
+  tell_held(now);
+}
+
+// Whether all that may run it have had an emergency stop.
+bool Bridge::is_stopped(const Open& open) const {
+  return std::ranges::all_of(open.robots, [&](std::size_t robot) { return robots_[robot].emergency.has_value(); });
+}
+
+// Of each task once that this has changed; so many at a time.
+void Bridge::tell_held(Time now) {
+  if (!held_to_) return;
+  std::size_t told = 0;
+  for (auto next = open_.lower_bound(*held_to_); next != open_.end(); ++next) {
+    Open& open = *next->second;
+    if (is_to_be_held(open) == open.held || open.stage == Open::Stage::kLeaves) continue;
+    if (++told > kWrittenATick) {
+      held_to_ = next->first;
+      return;
+    }
+    tell_held(open, now);
   }
+  held_to_.reset();
+}
+
+bool Bridge::is_to_be_held(const Open& open) const {
+  return on_emergency_stop_ == world::OnEmergencyStop::kHold && is_stopped(open);
+}
+
+void Bridge::tell_held(Open& open, Time now) {
+  if (is_to_be_held(open) == open.held) return;
+  open.held = !open.held;
+  unkept_ = true;
+  open.held ? tell(open, now, kHeldEvent, {{"cause", *robots_[open.robot].emergency}})
+            : tell(open, now, kReleasedEvent);
 }
 
 }  // namespace pons::bridge

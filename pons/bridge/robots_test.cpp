@@ -165,6 +165,8 @@ TEST_F(Robots, ABegunTaskStaysWhereItIsAlsoForTheNextBridge) {
   ASSERT_TRUE(bridge_->recover(resumes, now_));
   EXPECT_EQ(asked[0], std::vector<std::string>{"a"});
   EXPECT_EQ(asked[1], std::vector<std::string>{"b"});
+  bridge_->hold(Bridge::Hold::kGone, 1);
+  EXPECT_EQ(bridge_->set_aside(), std::set<std::string>{"b"}) << "nobody else can take it";
   bridge_->hold(Bridge::Hold::kOn, 1);
   tick(2);
   EXPECT_EQ(bridge_->running(), std::vector<std::string>{"a"}) << "b waits for the second, free as the first may be";
@@ -210,6 +212,24 @@ TEST_F(Robots, TakeTurnsInTheZoneBetweenThem) {
   EXPECT_TRUE(bridge_->idle());
 }
 
+// It was begun by an earlier bridge, and begins again when a person has come: paused, and till then nothing moves.
+TEST_F(Robots, OneThatWaitsForAPersonRests) {
+  submit("a");
+  tick(5);
+  open();
+  const Resume goes_on = [](const task::Task&, std::size_t done) { return Resumption{.done = done}; };
+  const std::array resumes{goes_on, goes_on};
+  ASSERT_TRUE(bridge_->recover(resumes, now_));
+  EXPECT_TRUE(bridge_->pause_all(now_, "the robot is to rest"));
+  EXPECT_FALSE(bridge_->all_paused());
+  bridge_->hold(Bridge::Hold::kGone, 0);
+  tick();
+  EXPECT_TRUE(bridge_->all_paused());
+  bridge_->hold(Bridge::Hold::kOff, 0);
+  tick(2);
+  EXPECT_EQ(bridge_->state("a"), "paused");
+}
+
 TEST_F(Robots, AnEmergencyStopHoldsWhatItsRobotRuns) {
   submit("a");
   submit("b");
@@ -223,10 +243,29 @@ TEST_F(Robots, AnEmergencyStopHoldsWhatItsRobotRuns) {
   EXPECT_EQ(told("a", kHeldEvent), 1);
   EXPECT_EQ(told("b", kHeldEvent), 1);
   EXPECT_EQ(told("c", kHeldEvent), 1);
+  submit("d");
+  EXPECT_EQ(told("d", kHeldEvent), 1) << "none can begin it now";
   bridge_->released(now_, 1);
   EXPECT_EQ(told("a", kReleasedEvent), 0);
   EXPECT_EQ(told("b", kReleasedEvent), 1);
   EXPECT_EQ(told("c", kReleasedEvent), 1);
+}
+
+// What came after the first one's stop waits for that one, whatever happens to the second.
+TEST_F(Robots, AnEmergencyStopCancelsWhatItsOwnRobotMayRun) {
+  world_.schedule.on_emergency_stop = world::OnEmergencyStop::kCancel;
+  open();
+  const Json tree{{"xml", R"(<root BTCPP_format="4"><BehaviorTree><pick object="a"/></BehaviorTree></root>)"}};
+  bridge_->hold(Bridge::Hold::kOn, 0);
+  bridge_->emergency_stop(now_, "stop input", 0);
+  ASSERT_TRUE(bridge_->submit(Json{{"id", "a"}, {"tree", tree}}.dump(), now_)) << "only the first runs trees";
+  submit("b");
+  tick(2);
+  ASSERT_EQ(robot_of("b"), "arm_2");
+  bridge_->emergency_stop(now_, "stop input", 1);
+  tick(50);
+  EXPECT_EQ(recorded("b")->outcome, task::Outcome::kCancelled);
+  EXPECT_FALSE(recorded("a"));
 }
 
 // An urgent task has taken the second one's place; the first is another's all the time.

@@ -109,7 +109,7 @@ TEST_F(TreesOfTasks, WhatCannotRunIsRefusedWithALineThatHelps) {
   std::string many = R"(<root BTCPP_format="4"><BehaviorTree><Sequence>)";
   for (int i = 0; i < 2000; ++i) many += "<AlwaysSuccess/>";
   EXPECT_EQ(refusal({{"xml", many + "</Sequence></BehaviorTree></root>"}}),
-            "/tree/xml: the tree has 2001 nodes, 2000 are taken; divide it, or give it to the world");
+            "/tree/xml:1: the tree has more than 2000 nodes; divide it");
   world_.resources.clear();
   reopen_with_trees();
   EXPECT_THAT(refusal({{"name", "sort"}}), HasSubstr("needs 'arm', which this world does not have"));
@@ -146,6 +146,69 @@ TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {
   EXPECT_EQ(reports[1].outcome, Outcome::kSucceeded);
   EXPECT_EQ(pick_.log.pauses, std::vector{task::Pause::kHandOver});
   EXPECT_EQ(pick_.log.started.size(), 1u) << "it went on, it did not begin anew";
+}
+
+// It may be thousands of looks, in the tick in which it is asked for.
+TEST_F(TreesOfTasks, WhatASkillOfItCouldDoIsAskedWhenItStarts) {
+  int looks = 0;
+  Actor reach("reach", {{.ticks = 1}});
+  task::SkillType type = reach.type();
+  type.feasible = [&](const Json&, task::Moment) -> Expected<void> {
+    ++looks;
+    return {};
+  };
+  skills_.add(type);
+  reopen_with_trees();
+  std::string uses;
+  for (int i = 0; i < 30; ++i) uses += "<reach/>";
+  ASSERT_TRUE(submit_tree("T1", {{"xml", R"(<root BTCPP_format="4"><BehaviorTree><Sequence>)" + uses +
+                                             "</Sequence></BehaviorTree></root>"}}));
+  EXPECT_EQ(looks, 0);
+  EXPECT_EQ(run().size(), 1u);
+  EXPECT_EQ(looks, 30);
+}
+
+// What hangs on the arm between two skills, the next task's skill would meet.
+TEST_F(TreesOfTasks, ALoadedOneMakesNoWayBetweenItsSkills) {
+  Actor swift("swift", {{.ticks = 3}});
+  skills_.add(swift.type());
+  reopen_with_trees();
+  const auto submit_urgent = [&](const std::string& id) {
+    return bridge_->submit(Json{{"id", id}, {"priority", 99}, {"steps", {{{"skill", "swift"}}}}}.dump(), now_);
+  };
+  ASSERT_TRUE(submit_sort("T1"));
+  tick(10);
+  ASSERT_EQ(pick_.log.ticks, 5) << "it sleeps";
+  bridge_->load(true);
+  ASSERT_TRUE(submit_urgent("U1"));
+  tick(40);
+  EXPECT_EQ(bridge_->state("T1"), "running");
+  EXPECT_THAT(kinds("T1"), testing::Not(testing::Contains(kPreemptingEvent)));
+  bridge_->load(false);
+  tick(2);
+  EXPECT_TRUE(swift.log.started.size() == 1 && !recorded("T1")) << "with empty cups it makes way";
+  EXPECT_EQ(run().size(), 2u);
+  EXPECT_EQ(recorded("T1")->outcome, Outcome::kSucceeded);
+}
+
+// Told while its skill ran, it comes to rest only after that one, and holds what that one took up.
+TEST_F(TreesOfTasks, ALoadedOneThatWasToldToMakeWayGoesOn) {
+  Actor grasp("pick", {{.ticks = 20, .stands_for = task::Pause::kStand}});  // no point in it to make way at
+  skills_ = task::SkillRegistry();
+  for (Actor* actor : {&grasp, &place_, &aside_}) skills_.add(actor->type());
+  reopen_with_trees();
+  ASSERT_TRUE(submit_sort("T1"));
+  tick(5);
+  ASSERT_TRUE(bridge_->submit(R"({"id":"U1","priority":99,"steps":[{"skill":"aside"}]})", now_));
+  tick(5);
+  EXPECT_EQ(bridge_->state("T1"), "making way");
+  bridge_->load(true);
+  tick(30);
+  EXPECT_EQ(bridge_->state("T1"), "running");
+  EXPECT_THAT(kinds("T1"), testing::AllOf(testing::Contains(kPreemptingEvent), testing::Contains(kRegainedEvent),
+                                          testing::Not(testing::Contains(kPreemptedEvent))));
+  EXPECT_EQ(run().size(), 2u);
+  EXPECT_EQ(recorded("T1")->outcome, Outcome::kSucceeded);
 }
 
 TEST_F(TreesOfTasks, WhatGoesRoundForEverTellsTheLastOfIt) {

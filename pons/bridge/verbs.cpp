@@ -1,6 +1,7 @@
 // What a task may be told after it was accepted: pause, resume, preempt, cancel, halt.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ranges>
 #include <utility>
 
@@ -59,6 +60,7 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   unkept_ = true;
   // One that an earlier bridge had begun may hold something: it is paused as soon as it has its resources again.
   const bool may_hold = open.priority == Arbiter::kFirst;
+  open.paused_for = reason;
   if (open.stage != Open::Stage::kRuns && !may_hold) {
     if (open.stage == Open::Stage::kWaits) park(open, now);
     open.paused = true;
@@ -70,6 +72,37 @@ Expected<void> Bridge::pause(std::string_view id, Time now, std::string_view rea
   tell(open, now, kPausingEvent, {{"reason", reason}});
   if (open.tree) open.tree->pause(now, task::Pause::kStand);
   return {};
+}
+
+bool Bridge::pause_all(Time now, std::string_view reason) {
+  bool any = false;
+  for (const auto& [id, open] : open_) {
+    const bool begun = open->stage == Open::Stage::kRuns || open->priority == Arbiter::kFirst;
+    if (!begun || open->told == Open::Told::kPause || open->paused || open->cancelled) continue;
+    any = pause(id, now, reason).has_value() || any;
+  }
+  return any;
+}
+
+void Bridge::resume_all(Time now, std::string_view reason) {
+  for (const auto& [id, open] : open_) {
+    const bool paused = open->told == Open::Told::kPause || open->paused;
+    if (paused && open->paused_for == reason) (void)resume(id, now);
+  }
+}
+
+bool Bridge::all_paused() const {
+  return std::ranges::all_of(open_, [this](const auto& entry) {
+    const Open& open = *entry.second;
+    if (open.resources.empty()) return true;
+    if (open.stage != Open::Stage::kRuns) {
+      // One that was begun by an earlier bridge begins at once, but where its robot waits for a person, who finds it
+      // paused.
+      const bool begins = open.stage == Open::Stage::kWaits && open.priority == Arbiter::kFirst;
+      return !begins || (open.told == Open::Told::kPause && robots_[open.robot].hold == Hold::kGone);
+    }
+    return open.told == Open::Told::kPause && open.stands && !open.cancelled;
+  });
 }
 
 void Bridge::park(Open& open, Time now) {
@@ -111,7 +144,7 @@ void Bridge::preempt(Time now) {
   for (const auto& [id, by] : arbiter_.preemptions(stays, fits())) {
     Open& open = *running_.find(id)->second;
     if (is_held(open.robot)) continue;
-    if (open.told != Open::Told::kNothing || open.cancelled) continue;
+    if (open.told != Open::Told::kNothing || open.cancelled || carries_between_skills(open)) continue;
     open.told = Open::Told::kPreempt;
     open.stands = false;
     tell(open, now, kPreemptingEvent, {{"by", by}});
@@ -119,8 +152,19 @@ void Bridge::preempt(Time now) {
   }
 }
 
+// What it carries, the next task of that robot would meet; a skill that runs sees to that nothing hangs there.
+bool Bridge::carries_between_skills(const Open& open) const {
+  return robots_[open.robot].carries && !open.resources.empty() && open.tree->is_between_skills();
+}
+
 // A running task has come to rest as it was told.
 void Bridge::stands(Open& open, Time now) {
+  if (open.told == Open::Told::kPreempt && carries_between_skills(open)) {
+    open.told = Open::Told::kNothing;
+    tell(open, now, kRegainedEvent);
+    open.tree->resume(now);
+    return;
+  }
   if (std::exchange(open.stands, true)) return;
   const task::Progress& progress = open.tree->result();
   const Json detail{{"stop", task::name(progress.stop.value_or(task::StopResult::kUncertain))}};
@@ -158,19 +202,11 @@ Expected<void> Bridge::end(std::string_view id, Ending ending, Time now, std::st
   if (open.stage == Open::Stage::kRuns) {
     end_running(open, ending, now, reason);
   } else {
-    end_waiting(open, now, reason);
+    if (open.stage == Open::Stage::kLeaves) return {};  // as a running one that was told before
+    leave(open, task::Outcome::kCancelled, std::string(reason));
+    close(open, now);
   }
   return {};
-}
-
-// What it has begun was left at a safe point, with nothing in use; unless an earlier bridge had begun it and was gone.
-void Bridge::end_waiting(Open& open, Time now, std::string_view reason) {
-  const std::string id = open.task.id;
-  arbiter_.remove(id);
-  Json detail = Json::object();
-  if (open.tree) detail = {{"attempts", open.attempts}, {"steps", std::move(open.steps)}};
-  if (open.priority == Arbiter::kFirst) detail["stop"] = task::name(task::StopResult::kUncertain);
-  finish(id, task::Outcome::kCancelled, std::string(reason), std::move(detail), now);
 }
 
 void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view reason) {
@@ -191,17 +227,21 @@ void Bridge::end_running(Open& open, Ending ending, Time now, std::string_view r
   tell(open, now, halts ? kHaltingEvent : kCancellingEvent, {{"reason", open.cancel_reason}});
 }
 
+// All of those that wait at once, however many: what was told to end must not begin with the next bridge.
 void Bridge::end_those(const std::function<bool(const Open&)>& concerned, Time now, std::string_view reason) {
   std::vector<Open*> waiting;
   for (const auto& [id, open] : open_) {
-    if (!concerned(*open)) continue;
+    if (open->stage == Open::Stage::kLeaves || !concerned(*open)) continue;
     if (open->stage == Open::Stage::kRuns) {
       end_running(*open, Ending::kCancel, now, reason);
     } else {
       waiting.push_back(open.get());
     }
   }
-  for (Open* const open : waiting) end_waiting(*open, now, reason);
+  for (Open* const open : waiting) {
+    leave(*open, task::Outcome::kCancelled, std::string(reason));
+    close(*open, now);
+  }
 }
 
 void Bridge::stop(Time now, std::string_view reason) {

@@ -411,5 +411,81 @@ TEST_F(VerbsTest, AnEmergencyStopCancelsWhatIsOpenWhereTheWorldSaysSo) {
   ASSERT_TRUE(submit("d", "pick")) << "what comes later waits for the arm";
 }
 
+// ---- all at once ----
+
+constexpr const char* kRest = "the robot is to rest";
+
+TEST_F(VerbsTest, AllThatRunAreToldToStandAndWhoAPersonHadPausedStaysSo) {
+  ASSERT_TRUE(submit("a", "pick"));
+  ASSERT_TRUE(submit("b", "pick"));
+  tick(2);
+  EXPECT_FALSE(bridge_->all_paused());
+  EXPECT_TRUE(bridge_->pause_all(now_, kRest));
+  EXPECT_FALSE(bridge_->pause_all(now_, kRest)) << "they are told already";
+  EXPECT_FALSE(bridge_->all_paused()) << "told, and not yet standing";
+  tick();
+  EXPECT_TRUE(bridge_->all_paused());
+  EXPECT_EQ(bridge_->state("b"), "waiting") << "it does not run";
+  bridge_->resume_all(now_, kRest);
+  EXPECT_EQ(bridge_->state("a"), "running");
+  EXPECT_EQ(pause("a"), "");
+  EXPECT_FALSE(bridge_->pause_all(now_, kRest));
+  bridge_->resume_all(now_, kRest);
+  tick();
+  EXPECT_EQ(bridge_->state("a"), "paused") << "for lunch";
+  EXPECT_EQ(resume("a"), "");
+  EXPECT_EQ(run().size(), 2u);
+}
+
+TEST_F(VerbsTest, WhoHadOneGoOnMeanwhileAndPausedItAgainHasTheLastWord) {
+  ASSERT_TRUE(submit("a", "pick"));
+  tick(2);
+  EXPECT_TRUE(bridge_->pause_all(now_, kRest));
+  EXPECT_EQ(resume("a"), "");
+  EXPECT_EQ(pause("a"), "");
+  for (const bool another : {false, true}) {
+    if (another) {
+      ASSERT_TRUE(bridge_->commit(now_));
+      reopen();
+      ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+    }
+    bridge_->resume_all(now_, kRest);
+    tick();
+    EXPECT_EQ(bridge_->state("a"), "paused") << another;
+  }
+}
+
+// It stands for the next bridge as soon as it runs there, and goes on from there.
+TEST_F(VerbsTest, AllThatRestGoOnThoughAnotherBridgeHasTakenOver) {
+  ASSERT_TRUE(submit("a", "pick"));
+  tick(2);
+  EXPECT_TRUE(bridge_->pause_all(now_, kRest));
+  tick();
+  ASSERT_TRUE(bridge_->commit(now_));
+  reopen();
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+  tick(50);
+  EXPECT_TRUE(bridge_->all_paused());
+  EXPECT_FALSE(recorded("a"));
+  bridge_->resume_all(now_, kRest);
+  EXPECT_EQ(run().size(), 1u);
+  EXPECT_EQ(recorded("a")->outcome, Outcome::kSucceeded);
+}
+
+// Before it has its resources again nothing of it can stand; it must not begin to move then.
+TEST_F(VerbsTest, WhatAnEarlierBridgeHadBegunIsToldToStandBeforeItRuns) {
+  ASSERT_TRUE(submit("a", "pick"));
+  tick(2);
+  reopen();
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+  EXPECT_TRUE(bridge_->pause_all(now_, kRest));
+  EXPECT_FALSE(bridge_->all_paused()) << "it has to come to rest first";
+  tick(50);
+  EXPECT_EQ(bridge_->state("a"), "paused");
+  EXPECT_TRUE(bridge_->all_paused());
+  bridge_->resume_all(now_, kRest);
+  EXPECT_EQ(run().size(), 1u);
+}
+
 }  // namespace
 }  // namespace pons::bridge

@@ -47,15 +47,6 @@ bool is_taken(int file, SharedMemory::Role role) {
 constexpr const char* kFolder = "/dev/shm";
 std::string path_of(const std::string& name) { return fmt::format("{}/pons.{}", kFolder, name); }
 
-Expected<void> check_name(const std::string& name) {
-  constexpr std::size_t kLongest = 200;
-  const bool plain = std::ranges::all_of(
-      name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; });
-  if (plain && !name.empty() && name.size() <= kLongest) return {};
-  return fail(fmt::format("'{}' is no name for shared memory", name), "shared memory",
-              fmt::format("use 1 to {} letters, digits, '-', '_' and '.'", kLongest));
-}
-
 std::unexpected<Error> system_error(const std::string& path) {
   const bool forbidden = errno == EACCES || errno == EPERM;
   return fail(std::strerror(errno), path,
@@ -162,6 +153,15 @@ Expected<SharedMemory> SharedMemory::open(const std::string& name, const Layout&
   memory.mapped_ = size;
   memory.bytes_ = static_cast<std::byte*>(start) + kPage;
   return memory;
+}
+
+Expected<void> SharedMemory::check_name(const std::string& name) {
+  constexpr std::size_t kLongest = 200;
+  const bool plain = std::ranges::all_of(
+      name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.'; });
+  if (plain && !name.empty() && name.size() <= kLongest) return {};
+  return fail(fmt::format("'{}' is no name for shared memory", name), "shared memory",
+              fmt::format("use 1 to {} letters, digits, '-', '_' and '.'", kLongest));
 }
 
 bool SharedMemory::is_owned(const std::string& name) {

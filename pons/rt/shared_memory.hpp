@@ -42,6 +42,8 @@ class SharedMemory {
   // another version, or not whole.
   [[nodiscard]] static Expected<SharedMemory> open(const std::string& name, const Layout& layout);
 
+  // Error: a bad name.
+  [[nodiscard]] static Expected<void> check_name(const std::string& name);
   // Whether a living owner has published something under that name: open() may still refuse it.
   [[nodiscard]] static bool is_owned(const std::string& name);
 

@@ -16,6 +16,8 @@ using bridge::Json;
 // A track is remembered as gone for this long: a frame taken before the grasp may still arrive.
 constexpr std::size_t kGoneRemembered = 64;
 
+constexpr std::string_view kToRest = "the robot is to rest";
+
 }  // namespace
 
 BridgeSide::BridgeSide(bridge::Bridge& bridge, brain::Brain& brain, std::vector<SkillPort> robots,
@@ -69,7 +71,7 @@ Expected<void> BridgeSide::take_over(const bridge::Journal& journal, Time now) {
 
 void BridgeSide::recall(const bridge::Event& note) {
   if (note.kind == "ride") brain_.recall_ride(task::text_of(note.detail, "code"));
-  if (note.kind == "rest") recall_rest(note.detail);
+  if (note.kind == "rest") resting_ = note.detail.value("rests", false);
   const std::string of = task::text_of(note.detail, "robot");
   for (const auto& robot : robots_) {
     if (!of.empty() && of != robot->skills.name) continue;
@@ -77,13 +79,6 @@ void BridgeSide::recall(const bridge::Event& note) {
     if (note.kind == "person") robot->arming.recall(task::text_of(note.detail, "asks"));
     if (note.kind == bridge::kCarriesEvent) robot->carried = note.detail.value("load", Json{});
   }
-}
-
-void BridgeSide::recall_rest(const Json& noted) {
-  resting_ = noted.value("rests", false);
-  const std::string task = task::text_of(noted, "task");
-  if (!resting_) set_to_rest_.clear();
-  if (resting_ && !task.empty()) set_to_rest_.insert(task);
 }
 
 Expected<void> BridgeSide::tick(Time now, Observer& observer) {
@@ -222,6 +217,10 @@ void BridgeSide::look_after_parts(Time now) {
   vitals_.belt((stays == robots_.end() ? robots_.front() : *stays)->skills.state(), now);
   vitals_.bridge(bridge_.open_count(), now);
   vitals_.journal(bridge_.journal(), now);
+  hold_back();
+}
+
+void BridgeSide::hold_back() {
   // What is begun goes on. A new task would be one more that a camera has to show the way to.
   bridge_.withhold(vitals_.belt_unseen() || resting_ ? bridge::Arbiter::Withheld::kResources
                                                      : bridge::Arbiter::Withheld::kNothing);
@@ -364,6 +363,7 @@ void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBeli
 // Durable at once: a bridge that comes after this one must know what hangs there.
 Expected<void> BridgeSide::note_carried(Robot& robot, Time now) {
   Json carries = robot.skills.carries();
+  bridge_.load(!carries.is_null(), robot.skills.robot);
   if (carries == robot.carried) return {};
   const std::string code = task::text_of(carries.is_object() ? carries : robot.carried, "code");
   robot.carried = std::move(carries);
@@ -381,29 +381,22 @@ void BridgeSide::stop(Time now, const std::string& reason) {
 // Durable at once, as go_on() is: a bridge that comes after this one keeps to it. What cannot be written shows in the
 // bridge's next tick.
 void BridgeSide::rest(Time now) {
-  bool is_news = !std::exchange(resting_, true);
+  const bool is_news = !std::exchange(resting_, true);
+  hold_back();  // else the tick that comes yet would begin what is granted in it
   if (is_news) bridge_.note("rest", {{"rests", true}}, now);
-  for (const std::string& id : bridge_.running()) {
-    if (bridge_.state(id) != "running" || !bridge_.pause(id, now, "the robot is to rest")) continue;
-    set_to_rest_.insert(id);
-    bridge_.note("rest", {{"rests", true}, {"task", id}}, now);
-    is_news = true;
-  }
-  if (is_news) (void)bridge_.commit(now);
+  const bool paused = bridge_.pause_all(now, kToRest);
+  if (is_news || paused) (void)bridge_.commit(now);
 }
 
 void BridgeSide::go_on(Time now) {
   if (!std::exchange(resting_, false)) return;
+  hold_back();
   bridge_.note("rest", {{"rests", false}}, now);
-  // One that has ended meanwhile, or that somebody has resumed before, is not paused any more.
-  for (const std::string& id : std::exchange(set_to_rest_, {})) (void)bridge_.resume(id, now);
+  bridge_.resume_all(now, kToRest);
   (void)bridge_.commit(now);
 }
 
-bool BridgeSide::rests() const {
-  const auto moves = [this](const std::string& id) { return bridge_.state(id) != "paused"; };
-  return resting_ && std::ranges::none_of(bridge_.running(), moves);
-}
+bool BridgeSide::rests() const { return resting_ && bridge_.all_paused(); }
 
 bool BridgeSide::idle() const { return bridge_.idle() && (stopping_ || !brain_.waits()); }
 

@@ -8,7 +8,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -80,9 +79,9 @@ class BridgeSide {
 
  private:
   void recall(const bridge::Event& note);
-  void recall_rest(const bridge::Json& noted);
   void take_in(const Snapshot& snapshot, Time now);
   void look_after_parts(Time now);
+  void hold_back();
   [[nodiscard]] std::vector<ObjectBelief> predicted(const std::vector<ObjectBelief>& seen, Time now,
                                                     double belt_travel_m) const;
   // Whether the belt shall wait for what was asked for.
@@ -136,7 +135,6 @@ class BridgeSide {
   std::int64_t unlabelled_ = 0, retries_before_ = 0;
   bool stopping_ = false;
   bool resting_ = false;
-  std::set<std::string> set_to_rest_;  // tasks that were paused for that
 };
 
 }  // namespace pons::runner

@@ -55,7 +55,11 @@ Expected<void> Story::take(const Event& event) {
   const bool of_running = event.kind == kCancellingEvent || event.kind == kHaltingEvent ||
                           event.kind == kPreemptingEvent || event.kind == kPreemptedEvent;
   if (of_running && !started_) taken = impossible(event, "comes before it was started");
-  if (event.kind == kPausingEvent || event.kind == kPausedEvent) paused_ = event.sequence;
+  // The first of them tells why; that it stands by now, or that another bridge has it stand, is no further pause.
+  if ((event.kind == kPausingEvent || event.kind == kPausedEvent) && paused_ == 0) {
+    paused_ = event.sequence;
+    paused_for_ = task::text_of(event.detail, "reason");
+  }
   if (event.kind == kContinuedEvent) paused_ = 0;
   if (event.kind == kCancellingEvent || event.kind == kHaltingEvent) {
     ending_ = task::text_of(event.detail, "reason");

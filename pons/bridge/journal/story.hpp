@@ -47,7 +47,8 @@ class Story {
   [[nodiscard]] bool started() const { return started_; }
   [[nodiscard]] const std::string& robot() const { return robot_; }  // that it runs on; empty where that was not told
   [[nodiscard]] bool ended() const { return ended_; }
-  [[nodiscard]] bool paused() const { return paused_ > 0; }  // as far as it was asked for
+  [[nodiscard]] bool paused() const { return paused_ > 0; }                    // as far as it was asked for
+  [[nodiscard]] const std::string& paused_for() const { return paused_for_; }  // the reason
   // Why it was told to end, if it was.
   [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
   // What a person was asked for, and has allowed: rule, skill and arguments.
@@ -84,6 +85,7 @@ class Story {
   std::set<std::string> allowed_;
   std::set<std::int64_t> allowances_;  // the events that say so
   std::optional<std::string> ending_;
+  std::string paused_for_;
   std::int64_t sequence_ = 0, run_ = 0;
   std::size_t length_ = 0;
   Time stamp_;

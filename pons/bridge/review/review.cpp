@@ -14,17 +14,10 @@ namespace {
 constexpr std::size_t kMostInReply = 64;
 
 std::string skill_hint(std::string_view wrong, const task::SkillRegistry& skills) {
-  std::string_view nearest;
-  std::size_t fewest = std::max<std::size_t>(2, wrong.size() / 2) + 1;
-  std::vector<std::string_view> names;
-  for (const auto& [name, type] : skills.all()) {
-    names.push_back(name);
-    if (const std::size_t distance = task::edits(wrong, name); distance < fewest) {
-      fewest = distance;
-      nearest = name;
-    }
-  }
-  if (!nearest.empty()) return fmt::format("did you mean '{}'?", nearest);
+  std::vector<std::string> names;
+  for (const auto& [name, type] : skills.all()) names.push_back(name);
+  if (const std::string meant = task::nearest(wrong, names); !meant.empty())
+    return fmt::format("did you mean '{}'?", meant);
   return names.empty() ? "this bridge has no skills" : fmt::format("the skills are {}", fmt::join(names, ", "));
 }
 
@@ -99,7 +92,7 @@ Expected<std::shared_ptr<const tree::Program>> Review::check(const task::Task& t
     if (auto good = check_step(task.steps[i], fmt::format("/steps/{}", i)); !good) return std::unexpected(good.error());
   }
   if (task.deadline && *task.deadline < now) {
-    return fail(fmt::format("the deadline of {} s has passed, it is {} s now", task.deadline->s(), now.s()),
+    return fail(fmt::format("the deadline of {:.3f} s has passed, it is {:.3f} s now", task.deadline->s(), now.s()),
                 "/deadline_s", "name a later one, or none");
   }
   auto program = this->program(task);
@@ -137,7 +130,9 @@ Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, tas
 Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& uses) const {
   Asked all;
   for (const UseOf& use : uses) {
-    auto asked = judge(task, use.use, task::Moment::kAdmission, skills_);
+    // A tree may not come by what it could not do, and has so many uses that looking at each would take too long.
+    auto asked = task.tree ? rules_.check(task, use.use, task::Moment::kAdmission)
+                           : judge(task, use.use, task::Moment::kAdmission, skills_);
     if (!asked && task.tree) continue;
     if (!asked) {
       asked.error().where = use.where;

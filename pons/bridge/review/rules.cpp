@@ -71,6 +71,10 @@ class Rules::Compiler {
       if (!script->is_condition())
         return fail(fmt::format("'{}' is no condition", task::excerpt(when)), rule.where,
                     "write one comparison or several joined by && and ||, as in place == 'chute_1'");
+      for (const auto& [slot, text] : script->equated()) {
+        if (auto good = check_word(condition.names[static_cast<std::size_t>(slot)], text, rule); !good)
+          return std::unexpected(good.error());
+      }
       condition.script = *std::move(script);
       compiled.conditions.push_back(std::move(condition));
     }
@@ -98,6 +102,27 @@ class Rules::Compiler {
     if (name.fact.empty() || std::ranges::find(facts_.names, name.fact) != facts_.names.end()) return {};
     return fail(fmt::format("nothing has a '{}'", name.fact), rule.where,
                 fmt::format("of things may be known: {}", fmt::join(facts_.names, ", ")));
+  }
+
+  // A condition about a word that can never come would never hold, or always, and nobody would know.
+  Expected<void> check_word(const Name& name, const std::string& text, const world::Rule& rule) const {
+    if (name.argument == kTask) return {};
+    std::vector<std::string> words;
+    if (!name.fact.empty()) {
+      const auto known = facts_.words.find(name.fact);
+      if (known == facts_.words.end()) return {};
+      words = known->second;
+    } else {
+      for (const auto& [skill, type] : skills_.all()) {
+        if (!rule.skills.empty() && std::ranges::find(rule.skills, skill) == rule.skills.end()) continue;
+        const Json& argument = type.schema.at("properties").at(name.argument);
+        if (!argument.contains("enum")) return {};
+        for (const Json& word : argument.at("enum")) words.push_back(word.is_string() ? word.get<std::string>() : "");
+      }
+    }
+    if (words.empty() || std::ranges::find(words, text) != words.end()) return {};
+    return fail(fmt::format("{}{}{} is never '{}'", name.argument, name.fact.empty() ? "" : ".", name.fact, text),
+                rule.where, fmt::format("it is one of {}", fmt::join(words, ", ")));
   }
 
   const task::SkillRegistry& skills_;

@@ -56,6 +56,23 @@ TEST_F(RulesTest, AreAboutArgumentsAndWhatIsKnownOfThings) {
   EXPECT_THAT(says({}, "{}"), HasSubstr("no")) << "always";
 }
 
+TEST_F(RulesTest, WordsThatCanNeverComeAreRefused) {
+  facts_.words["destination"] = {"chute_1", "chute_2"};
+  EXPECT_EQ(says({"object.destination == 'chute_2'"}, R"({"object":"P1"})"), "");
+  EXPECT_THAT(says({"object.mass_kg > 2 && 'chut_1' != object.destination"}, R"({"object":"P1"})"),
+              HasSubstr("object.destination is never 'chut_1'; it is one of chute_1, chute_2"));
+  Actor look{"look", {{}}};
+  task::SkillType type = look.type();
+  type.schema = Json::parse(R"({"type":"object","properties":{"at":{"enum":["belt","tray"]}}})");
+  skills_.add(type);
+  const auto about = [&](const char* when) {
+    const auto rules = compile({{.name = "r", .skills = {"look"}, .when = {when}, .refuse = "no"}});
+    return rules ? "" : rules.error().line();
+  };
+  EXPECT_EQ(about("at == 'belt' || at == 'tray'"), "");
+  EXPECT_THAT(about("at == 'trai'"), HasSubstr("at is never 'trai'; it is one of belt, tray"));
+}
+
 TEST_F(RulesTest, LeaveOpenWhatNobodyKnowsUntilTheSkillStarts) {
   const std::vector<std::string> elsewhere{"place != object.destination"};
   const std::string use = R"({"object":"P9","place":"chute_1"})";

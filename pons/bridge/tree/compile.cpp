@@ -36,7 +36,8 @@ std::string shortened(std::string path) {
 
 class Compiler {
  public:
-  Compiler(const Document& document, const task::SkillRegistry& skills) : document_(document), skills_(skills) {}
+  Compiler(const Document& document, const task::SkillRegistry& skills, const TreeSize& most)
+      : document_(document), skills_(skills), most_(most) {}
 
   Expected<std::shared_ptr<const Program>> compile(std::string_view main);
 
@@ -60,6 +61,7 @@ class Compiler {
                       const KindInfo& info, Node& node);
   Expected<void> conditions(const Element& element, std::int32_t scope, Node& node);
   Expected<void> skill(const Element& element, std::int32_t scope, const task::SkillType& type, Node& node);
+  Expected<task::Schema> schema_of(const task::SkillType& type, const std::string& where);
   Expected<void> claim(SkillUse& use, const std::string& where);
   Expected<std::int32_t> script(const std::string& text, std::int32_t scope, const std::string& where);
   Expected<std::int32_t> slot(std::int32_t scope, std::string_view name);
@@ -71,6 +73,7 @@ class Compiler {
 
   const Document& document_;
   const task::SkillRegistry& skills_;
+  const TreeSize most_;
   Program program_;
   std::vector<Scope> scopes_;
   std::vector<std::string> within_;  // the trees that this one stands in
@@ -78,6 +81,7 @@ class Compiler {
   Differences::Above above_;
   Differences differences_;
   EntryUses uses_;
+  std::map<const task::SkillType*, task::Schema> schemas_;
   std::size_t bytes_ = 0;
 };
 
@@ -113,8 +117,8 @@ Expected<void> Compiler::tree(std::string_view id, std::int32_t scope, const std
 // A long text in a tree that is there a thousand times is a thousand long texts.
 Expected<void> Compiler::charge(std::size_t bytes, const std::string& where) {
   bytes_ += bytes;
-  if (bytes_ <= kMaxTreeBytes) return {};
-  return fail(fmt::format("the tree's attributes have more than {} bytes, SubTrees in full", kMaxTreeBytes), where,
+  if (bytes_ <= most_.bytes) return {};
+  return fail(fmt::format("the tree's attributes have more than {} bytes, SubTrees in full", most_.bytes), where,
               "divide it");
 }
 
@@ -126,13 +130,14 @@ std::unexpected<Error> Compiler::unknown(const Element& element) const {
 }
 
 Expected<void> Compiler::node(const Element& element, std::int32_t scope) {
-  if (program_.nodes.size() >= kMaxNodes)
-    return fail(fmt::format("the tree has more than {} nodes", kMaxNodes), element.where, "divide it");
+  if (program_.nodes.size() >= most_.nodes)
+    return fail(fmt::format("the tree has more than {} nodes", most_.nodes), element.where, "divide it");
   if (depth_ >= kMostDepth)
     return fail(fmt::format("more than {} nodes inside one another", kMostDepth), element.where, "flatten them");
   ++depth_;
   stir(program_.fingerprint, element.tag);
   stir(program_.fingerprint, element.id);
+  if (auto fits = charge(element.id.size(), element.where); !fits) return fits;
   for (const auto& [name, value] : element.attributes) {
     stir(program_.fingerprint, name);
     stir(program_.fingerprint, value);
@@ -251,7 +256,7 @@ Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
         return fail(fmt::format("the port '{}' of '{}' is not given", excerpt(port.name), excerpt(element.id)),
                     element.where, "give it, or give it a default in <TreeNodesModel>");
       }
-      if (auto fits = charge(port.value->size(), element.where); !fits) return fits;
+      if (auto fits = charge(port.name.size() + port.value->size(), element.where); !fits) return fits;
       if (auto given = give(inner, port.name, *port.value); !given) return given;
     }
   }
@@ -403,12 +408,11 @@ Expected<void> Compiler::skill(const Element& element, std::int32_t scope, const
   SkillUse use;
   use.type = &type;
   use.name = program_.names.back();
-  auto schema = task::Schema::compile(type.schema);
-  if (!schema) {
-    return fail(fmt::format("the skill '{}' cannot be used: {}", type.name, schema.error().line()), element.where,
-                "mend the skill");
-  }
-  const Json properties = type.schema.value("properties", Json::object());
+  const auto schema = schema_of(type, element.where);
+  if (!schema) return std::unexpected(schema.error());
+  static const Json kNone = Json::object();
+  const auto given = type.schema.find("properties");
+  const Json& properties = given == type.schema.end() ? kNone : *given;
   for (const auto& [name, text] : element.attributes) {
     if (name == "name" || name.starts_with('_')) continue;
     const std::string_view entry = entry_in(text, name);
@@ -444,12 +448,24 @@ Expected<void> Compiler::skill(const Element& element, std::int32_t scope, const
     if (auto fits = schema->check(use.arguments); !fits)
       return fail(fits.error().line(), element.where, fmt::format("pons skills {} shows its ports", type.name));
   } else {
-    use.schema = *std::move(schema);
+    use.schema = *schema;
   }
   if (auto claimed = claim(use, element.where); !claimed) return claimed;
   node.index = static_cast<std::int32_t>(program_.uses.size());
   program_.uses.push_back(std::move(use));
   return {};
+}
+
+// Compiled once for a tree that uses it a thousand times.
+Expected<task::Schema> Compiler::schema_of(const task::SkillType& type, const std::string& where) {
+  const auto known = schemas_.find(&type);
+  if (known != schemas_.end()) return known->second;
+  auto schema = task::Schema::compile(type.schema);
+  if (!schema) {
+    return fail(fmt::format("the skill '{}' cannot be used: {}", type.name, schema.error().line()), where,
+                "mend the skill");
+  }
+  return schemas_.emplace(&type, *std::move(schema)).first->second;
 }
 
 Expected<void> Compiler::claim(SkillUse& use, const std::string& where) {
@@ -466,8 +482,8 @@ Expected<void> Compiler::claim(SkillUse& use, const std::string& where) {
 }  // namespace
 
 Expected<std::shared_ptr<const Program>> compile(const Document& document, std::string_view main,
-                                                 const task::SkillRegistry& skills) {
-  return Compiler(document, skills).compile(main);
+                                                 const task::SkillRegistry& skills, const TreeSize& most) {
+  return Compiler(document, skills, most).compile(main);
 }
 
 }  // namespace pons::bridge::tree

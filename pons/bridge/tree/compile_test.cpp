@@ -289,7 +289,7 @@ TEST_F(Compiling, ATreeOfABillionNodesIsRefusedAtOnce) {
 
 TEST_F(Compiling, TwentyThousandNodesAreATree) {
   std::string children;
-  for (std::size_t i = 1; i < kMaxNodes; ++i) children += "<AlwaysSuccess/>";
+  for (std::size_t i = 1; i < TreeSize{}.nodes; ++i) children += "<AlwaysSuccess/>";
   const auto of = [](const std::string& nodes) { return in_document("<Sequence>" + nodes + "</Sequence>"); };
   EXPECT_EQ(refusal(of(children)), "taken");
   EXPECT_EQ(refusal(of(children + "<AlwaysSuccess/>")), "test:1: the tree has more than 20000 nodes; divide it");

@@ -192,7 +192,7 @@ NodeStatus Tree::loop(std::int32_t index) {
   if (!state.on) {
     if (!fill_queue(index)) return NodeStatus::kBroken;
     const auto& queue = loop.fixed ? *loop.fixed : queues_[static_cast<std::size_t>(node.index)].values;
-    if (state.other == 0 || static_cast<std::size_t>(state.count) >= queue.size()) {
+    if (static_cast<std::size_t>(state.count) >= queue.size()) {
       (void)queue_up(static_cast<std::size_t>(node.index), {});
       return static_cast<NodeStatus>(std::get<std::int64_t>(port(node, 1).literal));
     }
@@ -210,7 +210,7 @@ NodeStatus Tree::loop(std::int32_t index) {
   return status == NodeStatus::kFailure ? status : NodeStatus::kRunning;
 }
 
-// From the blackboard: a list, or a text of values apart by ';'. False: it is something else.
+// From the blackboard: a list, or a text of values apart by ';'. False: it is something else, or not set.
 bool Tree::fill_queue(std::int32_t index) {
   const Node& node = this->node(index);
   const Loop& loop = program_->loops[static_cast<std::size_t>(node.index)];
@@ -219,7 +219,13 @@ bool Tree::fill_queue(std::int32_t index) {
   const Value* const given = value(port(node, 0));
   if (loop.fixed || state.other != 0) return true;
   (void)queue_up(at, {});
-  if (given == nullptr) return true;
+  if (given == nullptr) {
+    (void)broken(
+        {fmt::format("the entry that {} goes over is not set", program_->names[static_cast<std::size_t>(index)]),
+         {},
+         "write it before, or send it as an input"});
+    return false;
+  }
   state.other = 1;
   const auto* const json = std::get_if<Json>(given);
   std::optional<std::vector<Value>> read;

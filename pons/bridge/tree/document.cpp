@@ -106,6 +106,7 @@ Expected<void> Reader::read(std::string_view text, const std::string& where) {
   if (text.size() > kMaxXmlBytes)
     return fail(fmt::format("the text has {} bytes, {} are read", text.size(), kMaxXmlBytes), where, "divide it");
   if (!is_utf8(text)) return fail("this is no UTF-8", where, "save it as UTF-8");
+  if (text.find_first_not_of(" \t\r\n") == text.npos) return fail("there is nothing in it", where, "write a tree");
   tinyxml2::XMLDocument xml;
   if (xml.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     return fail(fmt::format("this is no XML: {}", task::excerpt(xml.ErrorStr(), 200)),

@@ -37,6 +37,7 @@ TEST(TreeDocument, WhatIsNoXmlIsRefusedWithItsLine) {
   const std::string line = refusal_of("<root BTCPP_format=\"4\">\n<BehaviorTree>\n</root>");
   EXPECT_TRUE(line.starts_with("sent:2: this is no XML: Error=XML_ERROR_MISMATCHED_ELEMENT")) << line;
   EXPECT_TRUE(line.ends_with("; write it with Groot2, or look at that line")) << line;
+  EXPECT_EQ(refusal_of(" \n"), "sent: there is nothing in it; write a tree");
   for (const char* text : {"", " ", "steps", "{\"tree\":{}}", "<", "<root", "<root>", "<root a=b/>", "<a/><b/>"})
     EXPECT_NE(refusal_of(text), "taken") << text;
 }

@@ -63,13 +63,9 @@ Expected<std::shared_ptr<const Program>> Library::program(const task::TreeReques
   } else {
     const auto document = read_document(request.xml, "/tree/xml");
     if (!document) return std::unexpected(document.error());
-    auto compiled = compile(*document, request.name, *skills_);
+    auto compiled = compile(*document, request.name, *skills_, kMaxSent);
     if (!compiled) return compiled;
     program = *std::move(compiled);
-    if (program->nodes.size() > kMaxSentNodes) {
-      return fail(fmt::format("the tree has {} nodes, {} are taken", program->nodes.size(), kMaxSentNodes), "/tree/xml",
-                  "divide it, or give it to the world");
-    }
   }
   std::size_t bytes = 0;
   for (const auto& [name, value] : request.inputs.items()) {

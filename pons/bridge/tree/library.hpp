@@ -14,7 +14,8 @@
 
 namespace pons::bridge::tree {
 
-inline constexpr std::size_t kMaxSentNodes = 2'000;  // of a tree that a task brings along, SubTrees in full
+// Of a tree that a task brings along: it is compiled in the tick in which it is asked for.
+inline constexpr TreeSize kMaxSent{.nodes = 2'000, .bytes = 256UL * 1024};
 
 class Library {
  public:

@@ -20,9 +20,13 @@
 
 namespace pons::bridge::tree {
 
-inline constexpr std::size_t kMaxNodes = 20'000;  // SubTrees in full
 inline constexpr std::size_t kMaxSlots = 10'000;
-inline constexpr std::size_t kMaxTreeBytes = 2 * kMaxXmlBytes;  // of its attributes, SubTrees in full
+
+// How large a tree may be, SubTrees in full.
+struct TreeSize {
+  std::size_t nodes = 20'000;
+  std::size_t bytes = 2 * kMaxXmlBytes;  // of its attributes, its elements' ids and its models' ports
+};
 
 enum class NodeStatus : std::uint8_t {
   kIdle,
@@ -160,7 +164,8 @@ struct Program {
 // a cycle of SubTrees, too large, a tag that is neither a node nor a skill, children that a node cannot have, ports
 // that do not exist or are missing, values and scripts that cannot be read, what BehaviorTree.CPP has and Pons has not.
 [[nodiscard]] Expected<std::shared_ptr<const Program>> compile(const Document& document, std::string_view main,
-                                                               const task::SkillRegistry& skills);
+                                                               const task::SkillRegistry& skills,
+                                                               const TreeSize& most = {});
 // A Sequence of them. Every step's skill must be in `skills`, its arguments must fit.
 [[nodiscard]] std::shared_ptr<const Program> program_of(const std::vector<task::Step>& steps,
                                                         const task::SkillRegistry& skills);

@@ -227,6 +227,27 @@ std::vector<std::int32_t> Script::writes() const {
   return slots;
 }
 
+std::vector<Script::Equated> Script::equated() const {
+  const auto at = [this](std::int32_t index) -> const Expression& {
+    return expressions_[static_cast<std::size_t>(index)];
+  };
+  std::vector<Equated> all;
+  for (const Expression& each : expressions_) {
+    if (each.op != Operator::kCompare) continue;
+    const Expression* left = &at(each.left);
+    for (std::int32_t next = each.right; next >= 0; next = at(next).third) {
+      const Expression& link = at(next);
+      const Expression* const right = &at(link.left);
+      const bool equates = link.op == Operator::kEqual || link.op == Operator::kUnequal;
+      const auto [variable, word] = left->op == Operator::kVariable ? std::pair(left, right) : std::pair(right, left);
+      if (equates && variable->op == Operator::kVariable && word->op == Operator::kLiteral && is_text(word->literal))
+        all.push_back({variable->slot, std::get<std::string>(word->literal)});
+      left = right;
+    }
+  }
+  return all;
+}
+
 Expected<Value> Script::assign(const Expression& expression, Blackboard& board) const {
   const Slot& slot = board[expression.slot];
   const std::string& name = names_[static_cast<std::size_t>(expression.left)];

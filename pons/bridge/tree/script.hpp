@@ -80,6 +80,12 @@ class Script {
   // The slots that it reads, but for what an assignment adds to and the like; and those that it assigns to.
   [[nodiscard]] std::vector<std::int32_t> reads() const;
   [[nodiscard]] std::vector<std::int32_t> writes() const;
+  // Each variable that is held against a text, whether it is that or not.
+  struct Equated {
+    std::int32_t slot;
+    std::string text;
+  };
+  [[nodiscard]] std::vector<Equated> equated() const;
   // How much there is to do.
   [[nodiscard]] std::size_t size() const { return expressions_.size(); }
 

@@ -69,6 +69,7 @@ class Tree {
   // Those that run hear it; nothing new is started. A last skill that nevertheless succeeds counts as done.
   void cancel(Time now);
   void halt(Time now);
+  [[nodiscard]] bool is_between_skills() const { return active_.empty(); }
   // Before a tick: the time since the one before does not count.
   void stand_still() { stood_still_ = true; }
   // Of the last tick, in nodes and operators; what the blackboard has handled counts as so many as take as long.

@@ -260,6 +260,22 @@ TEST_F(SkillsInATree, NothingFollowsWhatWasToldToStopAndMoves) {
   EXPECT_TRUE(good_.log.started.empty());
 }
 
+// Done without having done anything is the worst answer to who forgot an input.
+TEST_F(SkillsInATree, ALoopOverWhatIsNoListOrNotSetBreaksTheTree) {
+  const std::string loop = R"(<LoopString queue="{places}" value="{place}"><good/></LoopString>)";
+  const auto unset = tree_of(loop);
+  EXPECT_EQ(run(*unset), Status::kFailed);
+  EXPECT_EQ(unset->result().reason,
+            "the entry that LoopString goes over is not set; write it before, or send it as an input");
+  const auto number = tree_of("<Sequence><Script code=\"places := 1\"/>" + loop + "</Sequence>");
+  EXPECT_EQ(run(*number), Status::kFailed);
+  EXPECT_EQ(number->result().reason,
+            "LoopString is given a number where a list is needed; a list, or values apart by ';'");
+  const auto empty = tree_of("<Sequence><Script code=\"places := ''\"/>" + loop + "</Sequence>");
+  EXPECT_EQ(run(*empty), Status::kSucceeded);
+  EXPECT_TRUE(good_.log.started.empty());
+}
+
 TEST_F(SkillsInATree, AScriptThatGoesWrongWhileItIsHaltedBreaksTheTree) {
   const auto tree = tree_of(R"(<Fallback><Timeout msec="50"><Sleep msec="90" _onHalted="x = 1"/></Timeout>
       <good/></Fallback>)");
