@@ -256,6 +256,7 @@ class Judge {
     if (parcel.label != LabelTruth::kReadable || parcel.overweight || parcel.oversize) {
       ++verdict_.deserved;
       ++verdict_.reasons[kind_of(entry.last_reason)].deserved;
+      verdict_.excepted.push_back(line_of(parcel, entry, "deserved exception"));
     } else {
       undeserved(entry);
       find(parcel, entry, "undeserved exception");
@@ -294,15 +295,15 @@ class Judge {
   enum Order : std::uint8_t { kFirst, kLast };
   void find(const ParcelTruth& parcel, const Entry& entry, std::string_view what, Order order = kLast) {
     const auto where = order == kFirst ? verdict_.findings.begin() + first_++ : verdict_.findings.end();
-    verdict_.findings.insert(
-        where,
-        fmt::format(
-            "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; "
-            "journal: {}",
-            parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(),
-            parcel.size_m.y(), parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "",
-            parcel.picks, parcel.drops,
-            entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason)));
+    verdict_.findings.insert(where, line_of(parcel, entry, what));
+  }
+  static std::string line_of(const ParcelTruth& parcel, const Entry& entry, std::string_view what) {
+    return fmt::format(
+        "{}: {}; ordered {}, really {}, {:.2f} kg, {:.2f} x {:.2f} x {:.2f} m, label {}{}, picks {}, drops {}; "
+        "journal: {}",
+        parcel.parcel_id, what, parcel.destination, parcel.place, parcel.mass_kg, parcel.size_m.x(), parcel.size_m.y(),
+        parcel.size_m.z(), sim::name(parcel.label), parcel.touching ? ", touching" : "", parcel.picks, parcel.drops,
+        entry.succeeded ? "sorted" : (entry.last_reason.empty() ? "nothing" : entry.last_reason));
   }
 
   Verdict& verdict_;

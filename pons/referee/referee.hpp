@@ -39,9 +39,10 @@ struct Verdict {
   int unfinished = 0;            // still on the belt or in the hand when the run was broken off
   std::uint64_t violations = 0;  // axis-steps beyond a limit, as the simulator saw the arm
   double worst_ratio = 0;        // of measured speed or commanded torque to its limit
-  // One line for each parcel that is not sorted or deservedly excepted, lost and missorted ones before all others, and
-  // for each breach of a limit.
+  // One line for each parcel that is not sorted or deservedly excepted, lost and missorted ones before all others, for
+  // each that was damaged, and for each breach of a limit.
   std::vector<std::string> findings;
+  std::vector<std::string> excepted;  // likewise, one for each exception that was deserved
 };
 
 enum class RunEnd : std::uint8_t { kComplete, kBrokenOff };

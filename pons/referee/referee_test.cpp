@@ -83,6 +83,7 @@ TEST_F(RefereeTest, CountsExceptionsByTheKindOfTheirReason) {
   EXPECT_EQ(verdict.reasons.at("r").deserved, 1);
   EXPECT_EQ(verdict.reasons.at("r").undeserved, 1);
   EXPECT_EQ(verdict.reasons.at("why").undeserved, 1);
+  EXPECT_THAT(verdict.excepted, ::testing::ElementsAre(::testing::HasSubstr("A: deserved exception; ordered chute_1")));
 }
 
 TEST_F(RefereeTest, WhatIsLostOrMissortedIsTheFirstFinding) {

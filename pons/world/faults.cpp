@@ -167,6 +167,12 @@ std::optional<fs::path> faults_file(const World& world, const std::string& named
   return known != plans.end() ? known->second : fs::path(named);
 }
 
+std::vector<std::string> fault_plans(const World& world) {
+  std::vector<std::string> names;
+  for (const auto& [plan, file] : plans_of(world)) names.push_back(plan);
+  return names;
+}
+
 Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
   const auto found = faults_file(world, named);
   if (!found) return FaultPlan{};
@@ -176,9 +182,11 @@ Expected<FaultPlan> load_faults(const World& world, const std::string& named) {
   if (!fs::is_regular_file(file, code)) {
     std::string names = "none";
     for (const std::string& other : std::views::keys(plans)) names += ", " + other;
-    const std::string what = fs::is_directory(file, code) ? "this is a folder: " : "there is no plan ";
-    return fail(fmt::format("{}'{}'", what, printable(named)), (world.folder.parent_path() / "faults").string(),
-                fmt::format("the plans are {}; or name a file", names));
+    const std::string mend = fmt::format("the plans are {}; or name a file", names);
+    if (fs::is_directory(file, code)) return fail("this is a folder", printable(named), mend);
+    if (file.has_parent_path() || file.has_extension()) return fail("there is no such file", printable(named), mend);
+    return fail(fmt::format("there is no plan '{}'", printable(named)),
+                (world.folder.parent_path() / "faults").string(), mend);
   }
   try {
     return read_plan(file, plans);

@@ -76,6 +76,9 @@ struct FaultCounts {
 // What load_faults would read: `named`'s file, whether or not there is one. Nothing: none is needed.
 [[nodiscard]] std::optional<std::filesystem::path> faults_file(const World& world, const std::string& named);
 
+// Of the plans that a world has.
+[[nodiscard]] std::vector<std::string> fault_plans(const World& world);
+
 // `named` is "none", a plan by its name, of the world's folder faults/ or else of the one beside the worlds, or a
 // file's path. Errors name file, line and key as those of world.yaml; no such plan, with the names that exist; a file
 // none.yaml, whose runs nobody could tell from those without faults.
