@@ -29,7 +29,7 @@ Expected<sim::Visit> visit_of(std::string_view text, const world::World& world) 
   if (plus == std::string_view::npos) return bad();
   const auto from_time = number(text.substr(at + 1, plus - at - 1), 0, kLongest_s);
   const auto stays = number(text.substr(plus + 1), 0, kLongest_s);
-  if (!from_time || !stays) return bad();
+  if (!from_time || !stays || *stays == 0) return bad();
   const auto zone = std::ranges::find(world.zones, text.substr(0, at), &world::Zone::name);
   if (zone == world.zones.end()) {
     std::vector<std::string> names;
@@ -68,7 +68,9 @@ void add_body_setup_options(CLI::App& command, BodySetupOptions& options) {
 }
 
 void add_faults_option(CLI::App& command, std::string& faults) {
-  command.add_option("--faults", faults, "What goes wrong: a plan in the world's folder faults, or a file (none)");
+  command.add_option("--faults", faults,
+                     "What goes wrong: none, a plan of a folder faults (of the world's own or the one beside the "
+                     "worlds), or a file (none)");
 }
 
 Expected<BodySetup> body_setup(const BodySetupOptions& options, std::uint64_t seed, const world::World& world) {

@@ -200,6 +200,7 @@ int bridge(const BridgeCommandOptions& options) {
   if (!identity) return bad_input(identity.error());
 
   const std::string name = options.link.empty() ? default_link(world->name) : options.link;
+  if (auto good = rt::SharedMemory::check_name(name); !good) return bad_input(good.error());
   if (!rt::SharedMemory::is_owned(name) && !options.quiet)
     say(stderr,
         fmt::format("{}: waiting up to {:.0f} s for a body: pons body {}\n", name, options.wait_s, world->name));

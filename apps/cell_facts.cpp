@@ -1,6 +1,7 @@
 #include "apps/cell_facts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace pons::apps {
@@ -13,6 +14,9 @@ void add_size(const Vector3& size_m, Json& known) {
   known["width_m"] = std::min(size_m.x(), size_m.y());
   known["height_m"] = size_m.z();
 }
+
+constexpr std::array kPlaceKinds{world::PlaceKind::kChute, world::PlaceKind::kException, world::PlaceKind::kTray,
+                                 world::PlaceKind::kRegion, world::PlaceKind::kObstacle};
 
 }  // namespace
 
@@ -34,7 +38,11 @@ task::Facts facts_of(std::vector<const skills::Cell*> cells, brain::Orders order
     }
     return known;
   };
-  return {{"kind", "destination", "priority", "length_m", "width_m", "height_m", "mass_kg"}, std::move(of)};
+  std::vector<std::string> kinds{"home"};
+  for (const world::PlaceKind kind : kPlaceKinds) kinds.emplace_back(world::name(kind));
+  return {{"kind", "destination", "priority", "length_m", "width_m", "height_m", "mass_kg"},
+          std::move(of),
+          {{"kind", std::move(kinds)}}};
 }
 
 }  // namespace pons::apps

@@ -8,6 +8,7 @@
 #include <memory>
 #include <numbers>
 
+#include "apps/assembly.hpp"
 #include "apps/commands.hpp"
 #include "apps/doctor.hpp"
 #include "apps/outside.hpp"
@@ -19,6 +20,7 @@
 #include "pons/sim/simulation.hpp"
 #include "pons/skills/base/way.hpp"
 #include "pons/skills/cell.hpp"
+#include "pons/world/faults.hpp"
 #include "pons/world/manifest.hpp"
 #include "pons/world/world.hpp"
 
@@ -26,7 +28,7 @@ namespace pons::apps {
 
 Finding say(Finding finding, std::string_view what, std::string_view how) {
   constexpr const char* kWords[] = {"good", "slow", "bad"};
-  say(stdout, fmt::format("{:<5} {:<22} {}\n", kWords[static_cast<int>(finding)], what, how));
+  say(stdout, fmt::format("{:<5} {:<26} {}\n", kWords[static_cast<int>(finding)], what, how));
   std::fflush(stdout);  // a minute passes before the last line
   return finding;
 }
@@ -70,6 +72,22 @@ std::string no_way_to(const world::World& world) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+// All that a run reads of its files. Of a base there is no manifest.
+Expected<void> try_files(const world::World& world, const world::Manifest* manifest) {
+  for (const std::string& plan : world::fault_plans(world)) {
+    if (auto read = world::load_faults(world, plan); !read) return std::unexpected(read.error());
+  }
+  const TemporaryFolder folder;
+  const auto journal = folder.file("journal.db"), speech = folder.file(".");
+  if (!journal || !speech) return std::unexpected((journal ? speech : journal).error());
+  if (manifest == nullptr) {
+    auto built = Rounds::build(world, {}, {.journal = *journal, .speech = *speech});
+    return built ? Expected<void>() : std::unexpected(built.error());
+  }
+  auto built = Assembly::build(world, *manifest, {.journal = *journal});
+  return built ? Expected<void>() : std::unexpected(built.error());
+}
+
 Finding try_base(const std::string& what, const world::World& world) {
   const auto model = model::RobotModel::load(world.robot);
   if (!model) return say(Finding::kBad, what, model.error().line());
@@ -87,6 +105,7 @@ Finding try_base(const std::string& what, const world::World& world) {
     return say(Finding::kBad, what, fmt::format("{:.0f} % of a scan is on the map; draw it anew", 100 * matched));
   if (const std::string names = no_way_to(world); !names.empty())
     return say(Finding::kBad, what, fmt::format("no way leads to {}; move it, or mend the map", names));
+  if (auto read = try_files(world, nullptr); !read) return say(Finding::kBad, what, read.error().line());
   return say(Finding::kGood, what,
              fmt::format("composes, its scan fits the map, and ways lead to {} stations", world.base->stations.size()));
 }
@@ -127,6 +146,7 @@ Finding try_world(const std::string& name) {
       return say(Finding::kBad, what,
                  fmt::format("the tool of '{}' does not reach {}; move it, or the robot", station.arm, far));
   }
+  if (auto read = try_files(*world, &*manifest); !read) return say(Finding::kBad, what, read.error().line());
   return say(Finding::kGood, what,
              fmt::format("composes, {}, and {} cameras render",
                          stations.size() == 1 ? "the arm reaches" : fmt::format("{} arms reach", stations.size()),

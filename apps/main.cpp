@@ -1,6 +1,7 @@
 // The command line: composes, parses, and runs what was chosen.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -12,33 +13,59 @@
 
 #include "apps/commands.hpp"
 #include "apps/memory.hpp"
+#include "pons/task/spelling.hpp"
 
 namespace pons::apps {
 namespace {
 
-// Where the options of what was asked for stand.
-std::string help_of(const CLI::App& app) {
-  const auto chosen = app.get_subcommands();
-  return fmt::format("pons {}{}--help shows what there is", chosen.empty() ? "" : chosen.front()->get_name(),
-                     chosen.empty() ? "" : " ");
+// What was asked for: the last command among the words, and all of its name.
+struct Asked {
+  const CLI::App* command;
+  std::string name = "pons";
+};
+Asked asked_for(const CLI::App& app) {
+  Asked asked{&app};
+  while (!asked.command->get_subcommands().empty()) {
+    asked.command = asked.command->get_subcommands().front();
+    asked.name += " " + asked.command->get_name();
+  }
+  return asked;
+}
+
+std::string help_of(const Asked& asked) { return asked.name + " --help shows what there is"; }
+
+std::string hint(const std::string& word, const std::vector<std::string>& known) {
+  const std::string meant = task::nearest(word, known);
+  return meant.empty() ? "" : fmt::format("; did you mean {}?", meant);
 }
 
 // CLI11 says no more than that a command is missing where it knows none of the words.
 Error without_command(const CLI::App& app, const CLI::RequiredError& error) {
-  const CLI::App* at = &app;
-  std::string where = "pons";
-  while (!at->get_subcommands().empty()) {
-    at = at->get_subcommands().front();
-    where += " " + at->get_name();
+  const Asked asked = asked_for(app);
+  if (asked.command->get_require_subcommand_min() == 0) return {error.what(), "", help_of(asked)};
+  std::vector<std::string> names;
+  for (const CLI::App* each : asked.command->get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(each->get_name());
+  const std::vector<std::string> words = asked.command->remaining();
+  const std::string what = words.empty() ? "no command is named"
+                                         : fmt::format("no command '{}'{}", words.front(), hint(words.front(), names));
+  if (asked.command == &app) return {what, "", help_of(asked)};
+  return {what, asked.name, fmt::format("there are {}: {} --help", fmt::join(names, ", "), asked.name)};
+}
+
+// It lists words that it does not know last to first, with the values that it takes for words of their own.
+Error with_unknown_words(const CLI::App& app) {
+  const Asked asked = asked_for(app);
+  std::vector<std::string> words = app.remaining(true);
+  const auto option = std::ranges::find_if(words, [](const std::string& word) { return word.starts_with("-"); });
+  if (option == words.end())
+    return {fmt::format("'{}' is one word too many", words.empty() ? "" : words.front()), "", help_of(asked)};
+  const std::string name = option->substr(0, option->find('='));
+  std::vector<std::string> known;
+  for (const CLI::Option* each : asked.command->get_options()) {
+    for (const std::string& longer : each->get_lnames()) known.push_back("--" + longer);
   }
-  if (at->get_require_subcommand_min() == 0) return {error.what(), "", help_of(app)};
-  const std::vector<std::string> words = at->remaining();
-  const std::string what = words.empty() ? "no command is named" : fmt::format("no command '{}'", words.front());
-  if (at == &app) return {what, "", help_of(app)};
-  std::string names;
-  for (const CLI::App* each : at->get_subcommands([](const CLI::App*) { return true; }))
-    names += (names.empty() ? "" : ", ") + each->get_name();
-  return {what, where, fmt::format("there are {}: {} --help", names, where)};
+  return {"there is no such option" + hint(name, known), name, help_of(asked)};
 }
 
 // Of pons sweep, what stands after -- is for its runs: taken out of `words`.
@@ -84,8 +111,10 @@ int run_command_line(int argc, char** argv) {
     return app.exit(version);
   } catch (const CLI::RequiredError& error) {
     return bad_input(without_command(app, error));
+  } catch (const CLI::ExtrasError&) {
+    return bad_input(with_unknown_words(app));
   } catch (const CLI::ParseError& error) {
-    return bad_input({error.what(), "", help_of(app)});
+    return bad_input({error.what(), "", help_of(asked_for(app))});
   }
   return chosen();
 }

@@ -196,7 +196,7 @@ int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world)
       options.speech.empty() ? temporary.file("speech") : Expected<std::string>(options.speech.string());
   if (!speech) return bad_input(speech.error());
   std::error_code error;
-  fs::create_directories(*speech, error);
+  const bool made = fs::create_directories(*speech, error);
   if (error) return bad_input({error.message(), *speech, "name a folder that can be written for --speech"});
 
   RoundsSetup setup{.seed = options.seed,
@@ -224,6 +224,7 @@ int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world)
   auto rounds = Rounds::build(std::move(world), *errands, setup);
   if (!rounds) {
     along->withdraw();
+    if (made) fs::remove(*speech, error);
     return bad_input(rounds.error());
   }
   return Run(options, *along, **rounds).go();

@@ -293,11 +293,17 @@ Expected<Reckoning> reckon(const world::World& world, BodyHalf& body, const brid
   return Reckoning{std::move(*verdict), std::move(report)};
 }
 
-Expected<void> tell(const record::Report& report, const std::vector<std::string>& findings, Explain explain,
+Expected<void> tell(const Reckoning& reckoning, Explain explain, const fs::path& file) {
+  std::vector<std::string> lines = reckoning.verdict.findings;
+  std::ranges::copy(reckoning.verdict.excepted, std::back_inserter(lines));
+  return tell(reckoning.report, lines, explain, file);
+}
+
+Expected<void> tell(const record::Report& report, const std::vector<std::string>& lines, Explain explain,
                     const fs::path& file) {
   say(stdout, record::summary(report));
   if (explain == Explain::kFindings) {
-    for (const std::string& finding : findings) say(stdout, fmt::format("  {}\n", finding));
+    for (const std::string& line : lines) say(stdout, fmt::format("  {}\n", line));
   }
   if (file.empty()) return {};
   if (auto written = record::write(report, file); !written) return written;

@@ -148,13 +148,11 @@ struct Reckoning {
 // What the loop and the bridge were like, for the report.
 void put_loop(const runner::RunResult& result, record::Report& report);
 
-// Prints the summary and, explained, a line for each parcel that was not sorted; writes the report unless `file` is
-// empty. Error: it cannot be written.
-[[nodiscard]] Expected<void> tell(const record::Report& report, const std::vector<std::string>& findings,
-                                  Explain explain, const std::filesystem::path& file);
-[[nodiscard]] inline Expected<void> tell(const Reckoning& reckoning, Explain explain,
-                                         const std::filesystem::path& file) {
-  return tell(reckoning.report, reckoning.verdict.findings, explain, file);
-}
+// Prints the summary and, explained, those lines; writes the report unless `file` is empty. Error: it cannot be
+// written.
+[[nodiscard]] Expected<void> tell(const record::Report& report, const std::vector<std::string>& lines, Explain explain,
+                                  const std::filesystem::path& file);
+// Explained by a line for each parcel that was not sorted, those that deserved it last.
+[[nodiscard]] Expected<void> tell(const Reckoning& reckoning, Explain explain, const std::filesystem::path& file);
 
 }  // namespace pons::apps

@@ -37,8 +37,7 @@ Expected<task::Json> read_task(const std::string& file) {
   if (!text) return std::unexpected(text.error());
   auto task = task::parse_json(*text);
   if (task) return task;
-  return fail(task.error().line(), file,
-              "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}, a reply {\"tasks\":[…]}");
+  return fail(task.error().line(), file, "a task is {\"id\":…,\"steps\":[{\"skill\":…,\"arguments\":{…}}]}");
 }
 
 }  // namespace pons::apps

@@ -54,13 +54,15 @@ function(pons_module name)
   endif()
 endfunction()
 
-# pons_test(NAME SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, its cases known to ctest.
+# pons_test(NAME SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s] [BY_THE_CLOCK]): one GoogleTest program, its cases known
+# to ctest. BY_THE_CLOCK: its runs are in real time, so each of its cases counts as two, and none runs beside another such
+# one: of two CPUs it has one for itself. They begin first, for they last long together, and all others run beside them.
 # Without PONS_BUILD_TESTS it does nothing.
 function(pons_test name)
   if(NOT PONS_BUILD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "ALONE" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "BY_THE_CLOCK" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
@@ -68,6 +70,10 @@ function(pons_test name)
   target_link_libraries(${name} PRIVATE pons_flags ${ARG_LIBRARIES} GTest::gmock GTest::gtest_main)
   # A quarter of compiling a test is optimising it; what it tests is as optimised as ever.
   target_compile_options(${name} PRIVATE $<$<NOT:$<CONFIG:Debug>>:-O1>)
+  set(clock "")
+  if(ARG_BY_THE_CLOCK)
+    set(clock PROCESSORS 2 RESOURCE_LOCK clock COST 100)
+  endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST WORKING_DIRECTORY "${PROJECT_SOURCE_DIR}"
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} RUN_SERIAL ${ARG_ALONE} LABELS "${ARG_LABELS}")
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" ${clock})
 endfunction()

@@ -149,7 +149,7 @@ TEST_F(Settings, ThatTheKernelHidesAreSaidToBeUnknown) {
     testing::internal::CaptureStdout();
     EXPECT_EQ(read_settings(root_.path()), Finding::kDegraded);
     EXPECT_THAT(testing::internal::GetCapturedStdout(),
-                HasSubstr(fmt::format("slow  {:<22} unknown: the kernel does not tell\n", what)));
+                HasSubstr(fmt::format("slow  {:<26} unknown: the kernel does not tell\n", what)));
     tests::write_text(root_ / file, before);
   }
 }

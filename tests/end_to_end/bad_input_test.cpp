@@ -85,6 +85,15 @@ TEST_F(BadInput, NamesAndNumbers) {
   expect_refused({"run", "parcel_cell", "--manifest", folder_ / "none.csv"}, {"none.csv"});
   expect_refused({"skills", "fly"}, {"fly"});
   expect_refused({"no_such_command"}, {"no_such_command"});
+  expect_refused({"runn", "parcel_cell"}, {"no command 'runn'; did you mean run?"});
+  expect_refused({"run", "parcel_cell", "--parcel", "3"},
+                 {"pons: --parcel: there is no such option; did you mean --parcels?; pons run --help"});
+  expect_refused({"run", "parcel_cell", "small_cell"}, {"'small_cell' is one word too many", "pons run --help"});
+  expect_refused({"task", "approve", "P1"}, {"--as", "pons task approve --help"});
+  expect_refused({"run", "parcel_cell", "--parcels", "1", "--faults", folder_ / "none.yaml"},
+                 {"none.yaml: there is no such file", "robin"});
+  expect_refused({"bridge", "small_cell", "--journal", folder_ / "j.db", "--link", "a/b"},
+                 {"'a/b' is no name for shared memory"});
   expect_refused({"run", "parcel_cell", "--lockstep", "--realtime"}, {"--lockstep"});
 }
 
@@ -164,7 +173,8 @@ TEST_F(BadInput, WorldsWhoseFilesDisagree) {
 }
 
 TEST_F(BadInput, VisitsAndPlacesOfTheArmThatAreNone) {
-  for (const char* visit : {"aisle", "aisle@", "aisle@1", "aisle@1+", "aisle@-1+2", "aisle@1+nan", "aisle@one+2"})
+  for (const char* visit :
+       {"aisle", "aisle@", "aisle@1", "aisle@1+", "aisle@-1+2", "aisle@1+0", "aisle@1+nan", "aisle@one+2"})
     expect_refused({"run", "parcel_cell", "--parcels", "1", "--visit", visit}, {visit, "ZONE@FROM+FOR"});
   expect_refused({"run", "parcel_cell", "--parcels", "1", "--visit", "roof@1+2"}, {"roof", "aisle, gate"});
   expect_refused({"run", "small_cell", "--parcels", "1", "--visit", "aisle@1+2"}, {"aisle", "has no zones"});

@@ -62,7 +62,7 @@ TEST(Faults, WhatHangsOnAnotherIsPutBack) {
 
 // In this run some come along unfelt.
 TEST(Faults, WhatCameAlongUnfeltIsNamedWhereItFell) {
-  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 24);
+  const Faulty run = run_with("double_pick: {a_pick: 0.3}\n", 30, 30);
   const json reasons = run.report["parcels"]["exceptions"]["reasons"];
   EXPECT_GE(reasons.value("came along with another, into chute_#", json::object()).value("undeserved", 0), 1)
       << run.said;

@@ -109,6 +109,24 @@ TEST(Sorting, WhatIsTooLargePassesARestingArm) {
   EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
 }
 
+// Of three to thirty times what may be sorted: hardly off the belt it is let go of, and rides; nothing throws the arm
+// up.
+TEST(Sorting, WhatIsFarTooHeavyIsLeftOnTheBelt) {
+  const Folder folder;
+  write_text(folder / "heavy.csv",
+             "parcel_id,destination,kind,length_m,width_m,height_m,mass_kg,priority\n"
+             "M-16,chute_2,box,0.25,0.2,0.1,16,50\nM-2,chute_3,box,0.25,0.2,0.1,2,50\n"
+             "M-20,chute_2,box,0.25,0.2,0.1,20,50\nM-100,chute_2,box,0.25,0.2,0.1,100,50\n");
+  const Finished run = run_pons({"run", "parcel_cell", "--manifest", folder / "heavy.csv", "--quiet", "--explain",
+                                 "--report", folder / "report.json", "--journal", folder / "day.db"});
+  EXPECT_EQ(run.code, 0) << run.out << run.err;
+  const json report = read_json(folder / "report.json");
+  EXPECT_EQ(report["parcels"]["sorted"], 1) << run.out;
+  EXPECT_EQ(report["parcels"]["exceptions"]["reasons"]["overweight"]["deserved"], 3) << run.out;
+  EXPECT_NE(run.out.find("M-16: deserved exception; ordered chute_2"), std::string::npos) << run.out;
+  EXPECT_EQ(report["limits"]["violations"], 0) << run.out;
+}
+
 // What cannot be placed does not stay on the cups: it rides into the exception chute, and the journal says why.
 TEST(Sorting, APlaceOutOfReachStopsNothing) {
   const Folder folder;
@@ -140,11 +158,30 @@ TEST(Sorting, APlaceOutOfReachStopsNothing) {
   EXPECT_EQ(run.out.find("picks 1"), std::string::npos) << run.out;
 }
 
+// What a run would refuse.
+TEST(Doctor, ReadsAllFilesOfAWorld) {
+  const Folder folder;
+  const auto worlds = folder / "worlds";
+  std::filesystem::copy(PONS_WORLDS_SOURCE, worlds, std::filesystem::copy_options::recursive);
+  const auto says = [&] { return run_pons({"doctor", "--jitter", "0"}, {"PONS_WORLDS=" + worlds.string()}); };
+  for (const auto& [odd, world] : {std::pair{"small_cell/trees/odd.xml", "small_cell"},
+                                   {"rounds/trees/odd.xml", "rounds"},
+                                   {"faults/odd.yaml", "small_cell"}}) {
+    std::filesystem::create_directories((worlds / odd).parent_path());
+    write_text(worlds / odd, "<pik/>");
+    const Finished doctor = says();
+    EXPECT_EQ(doctor.code, 2);
+    EXPECT_NE(doctor.out.find(std::string("bad   world ") + world), std::string::npos) << doctor.out;
+    EXPECT_NE(doctor.out.find(std::filesystem::path(odd).filename()), std::string::npos) << doctor.out;
+    std::filesystem::remove(worlds / odd);
+  }
+}
+
 TEST(Doctor, MeasuresAndJudgesTheLoop) {
   const Finished doctor = run_pons({"doctor", "--jitter", "0.3"});
   EXPECT_EQ(doctor.code, 0) << doctor.out << doctor.err;
   for (const char* line : {"real-time priority", "locked memory", "CPUs kept awake", "a CPU for the loop", "kernel",
-                           "jitter                 ticks begin late by ", " ticks"})
+                           "jitter                     ticks begin late by ", " ticks"})
     EXPECT_NE(doctor.out.find(line), std::string::npos) << line << "\n" << doctor.out;
 }
 

@@ -59,7 +59,7 @@ class TakeOverTest : public testing::Test {
             .halt = [] {},
             .raise_emergency = [] {},
             .release_emergency = [] {},
-            .carries = [] { return bridge::Json{}; },
+            .carries = [this] { return carries_; },
             .takes_until_m = world_.belt.pick_x_max_m,
             .restore = [this](const bridge::Json&) { ++restores_; },
             .resume = [](const task::Task&, std::size_t done) { return bridge::Resumption{.done = done}; },
@@ -88,6 +88,7 @@ class TakeOverTest : public testing::Test {
   link::State state_;
   std::optional<link::Belt> belt_;
   std::vector<ObjectBelief> left_;
+  bridge::Json carries_;
   int rests_ = 0, restores_ = 0;
   bool settled_ = false;
   Time now_;
@@ -226,6 +227,38 @@ TEST_F(TakeOverTest, AtRestNothingBeginsWhatRunsStandsAndTheBeltWaits) {
   EXPECT_EQ(bridge_.state("a"), "running");
   EXPECT_EQ(belt_, link::Belt::kRuns);
   EXPECT_TRUE(bridge_.submit(R"({"id":"c","steps":[{"skill":"pick"}]})", now_));
+}
+
+// The period is not over yet: its tick would begin what is next.
+TEST_F(TakeOverTest, AtRestNothingBeginsInTheSamePeriodEither) {
+  state_.safety = link::SafetyState::kOperational;
+  for (int i = 0; i < 3; ++i) tick();
+  ASSERT_TRUE(bridge_.submit(R"({"id":"a","steps":[{"skill":"pick"}]})", now_));
+  side_.rest(now_);
+  EXPECT_TRUE(side_.rests());
+  for (int i = 0; i < 20; ++i) tick();
+  EXPECT_TRUE(side_.rests());
+  EXPECT_EQ(bridge_.state("a"), "waiting");
+  side_.go_on(now_);
+  tick();
+  EXPECT_EQ(bridge_.state("a"), "running");
+}
+
+TEST_F(TakeOverTest, WithSomethingOnItTheRobotMakesNoWayBetweenTwoSkills) {
+  state_.safety = link::SafetyState::kOperational;
+  const bridge::Json waits{{"xml", R"(<root BTCPP_format="4"><BehaviorTree><Sequence><Sleep msec="60000"/><pick/>
+      </Sequence></BehaviorTree></root>)"}};
+  ASSERT_TRUE(bridge_.submit(bridge::Json{{"id", "a"}, {"tree", waits}}.dump(), now_));
+  for (int i = 0; i < 3; ++i) tick();
+  carries_ = {{"code", "P1"}};
+  tick();
+  ASSERT_TRUE(bridge_.submit(R"({"id":"u","priority":99,"steps":[{"skill":"pick"}]})", now_));
+  for (int i = 0; i < 10; ++i) tick();
+  EXPECT_EQ(bridge_.state("a"), "running");
+  carries_ = {};
+  for (int i = 0; i < 5; ++i) tick();
+  EXPECT_EQ(bridge_.state("a"), "preempted");
+  EXPECT_EQ(bridge_.state("u"), "running");
 }
 
 // As a bridge does that finds one killed.
