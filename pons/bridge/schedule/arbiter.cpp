@@ -93,8 +93,8 @@ void Arbiter::take_rank(Entry& entry) const {
   const int counts = claim.priority + gained;
   entry.counts_more.reset();
   if (gained < missing) entry.counts_more = entry.ages_from + (gained + 1) * schedule_.ageing;
-  // Who stood up comes after all who count as much: a seat that it gave to one of them must not be its own again.
-  const bool again = entry.needs() == 0 && entry.started;
+  // Who gave up a turn comes after all who count as much: what it gave to one of them must not be its own again.
+  const bool again = entry.started && (entry.needs() == 0 || counts == kAged);
   const Time deadline = counts == kAged || again ? kNever : claim.deadline.value_or(kNever);
   entry.rank = {-counts, deadline, again ? entry.since : claim.accepted, entry.number};
 }
@@ -286,13 +286,19 @@ void Arbiter::free_seats(const Lane& lane, const Stays& stays, std::map<std::str
   }
 }
 
-// Whether all who hold any of it count less.
-bool Arbiter::gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const {
+// Whether all who hold any of it make way, where they count less: at once for what is urgent by its own priority; for
+// what is by its age, once they had their turn, for they may never end. Who can grow no older takes turns with its
+// like.
+bool Arbiter::gives_way(const Entry& waits, Mask needs, std::vector<std::string>& holders) const {
+  const bool urgent = waits.claim.priority >= schedule_.urgent_priority;
   holders.clear();
   for (const auto& [id, entry] : running_) {
     if ((entry.needs() & needs) == 0) continue;
     holders.push_back(id);
-    if (std::get<int>(entry.rank) <= std::get<int>(urgent.rank)) return false;
+    const int more = std::get<int>(entry.rank) - std::get<int>(waits.rank);  // that the waiting one counts
+    const bool over = now_ - entry.since >= schedule_.ageing && now_ - waits.since >= schedule_.ageing;
+    const bool alike = more == 0 && std::get<int>(waits.rank) == -kAged;
+    if (!(more > 0 && (urgent || over)) && !(alike && over)) return false;
   }
   return true;
 }
@@ -305,7 +311,7 @@ void Arbiter::make_way(const Entry& waits, const std::vector<std::size_t>& fit, 
     const bool alone = (claimed & needs) == 0;
     claimed |= needs;
     std::vector<std::string> holders;
-    if (!alone || waits.claim.priority < schedule_.urgent_priority || !gives_way(waits, needs, holders)) continue;
+    if (!alone || !gives_way(waits, needs, holders)) continue;
     for (std::string& id : holders) by.emplace(std::move(id), waits.claim.id);
     return;
   }
@@ -319,7 +325,7 @@ std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays, const 
   while (const Entry* const entry = next(passed, looked)) {
     const Ways& ways = entry->ways;
     if (ways == Ways{0}) free_seats(lanes_.find(ways)->second, stays, by);
-    // Who counts less than an urgent task is not one, nor is anybody behind it.
+    // Who counts less than an urgent task, aged or not, takes nothing from anybody, nor does who is behind it.
     if (ways == Ways{0} || withheld_ != 0 || -std::get<int>(entry->rank) < schedule_.urgent_priority) {
       passed.insert(ways);
       continue;

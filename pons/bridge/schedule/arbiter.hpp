@@ -80,8 +80,9 @@ class Arbiter {
   [[nodiscard]] std::vector<std::string> take_expired(Time now);
 
   // Running tasks that stand in the way of others, and of which: of a waiting task whose own priority is urgent, where
-  // all who hold what it needs count less than it, aged or not; of a seat, the one that counts least, also where its
-  // turn is over. Of who sits, `stays` says who cannot give way. After grant().
+  // all who hold what it needs count less than it, aged or not; of one that is urgent by its age, where they have held
+  // it for `ageing` besides; of a seat, the one that counts least, also where its turn is over. Of who sits, `stays`
+  // says who cannot give way. After grant().
   struct Preemption {
     std::string running, by;
   };
@@ -97,7 +98,7 @@ class Arbiter {
 
  private:
   using Mask = std::uint64_t;
-  // Priority negated, aged; deadline, or the end of time; acceptance, or since when for a seat again; what came first.
+  // Priority negated, aged; deadline, or the end of time; acceptance, or since when after a turn; what came first.
   using Rank = std::tuple<int, Time, Time, std::uint64_t>;
   using Ways = std::vector<Mask>;
   struct Entry {
@@ -136,7 +137,7 @@ class Arbiter {
   [[nodiscard]] bool look_on(const Ways& ways, Looked& looked);
   [[nodiscard]] std::vector<std::size_t> fitting(const Entry& entry, const Fits& fits) const;
   void give(const Entry& entry, std::size_t way, std::vector<std::string>& granted);
-  [[nodiscard]] bool gives_way(const Entry& urgent, Mask needs, std::vector<std::string>& holders) const;
+  [[nodiscard]] bool gives_way(const Entry& waits, Mask needs, std::vector<std::string>& holders) const;
   [[nodiscard]] bool is_free(Mask needs, Mask taken) const;
   [[nodiscard]] bool has_left(Mask needs, Mask taken) const;
   void give_back(const Entry& entry);

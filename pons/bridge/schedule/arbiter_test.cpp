@@ -234,6 +234,32 @@ TEST(Arbiter, NobodyGivesWayToOneThatCountsLessOrCouldNotStartAllTheSame) {
   EXPECT_EQ(arbiter.preemptions().size(), 2u);
 }
 
+// A patrol that goes round for ever, and another one.
+TEST(Arbiter, WhoCountsAsUrgentByItsAgeHasItsTurnAfterOneThatMayNeverEnd) {
+  Arbiter arbiter({"arm"}, {.ageing = from_s(1), .urgent_priority = 90});
+  arbiter.add(claim("round", 50, {"arm"}));
+  EXPECT_EQ(arbiter.grant(at(0)), Ids{"round"});
+  arbiter.add(claim("ordinary", 50, {"arm"}, {}, at(0)));
+  EXPECT_TRUE(arbiter.grant(at(39.9)).empty());
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "it counts 89";
+  EXPECT_TRUE(arbiter.grant(at(40)).empty());
+  EXPECT_EQ(arbiter.preemptions().size(), 1u);
+  arbiter.hand_over("round");
+  EXPECT_EQ(arbiter.grant(at(40)), Ids{"ordinary"});
+  // Nor does that one end. They take turns, also when neither can count more any longer.
+  std::string holds = "ordinary", waits = "round";
+  int turns = 0;
+  for (int s = 41; s < 400; ++s) {
+    EXPECT_TRUE(arbiter.grant(at(s)).empty());
+    if (arbiter.preemptions().empty()) continue;
+    arbiter.hand_over(holds);
+    std::swap(holds, waits);
+    EXPECT_EQ(arbiter.grant(at(s)), Ids{holds});
+    ++turns;
+  }
+  EXPECT_GT(turns, 100);
+}
+
 TEST(Arbiter, WhoHasRunForLongDoesNotComeBeforeTheOneItMadeWayFor) {
   Arbiter arbiter({"arm"}, {.ageing = from_s(1)});
   arbiter.add(claim("patrol", 50, {"arm"}));
