@@ -401,6 +401,7 @@ Expected<void> Bridge::journal_attempt(const std::string& id, const tree::Attemp
   detail["detail"] = attempt.ended->detail;
   tell(open, now, kAttemptEndedEvent, detail);
   open.unwritten = true;
+  unkept_ = true;  // or a bridge that comes after this one could not know that it was done
   return {};
 }
 

@@ -122,8 +122,8 @@ TEST_F(BridgeTest, AnotherBridgeGoesOnWithWhatWasLeftOpen) {
   };
   ASSERT_TRUE(bridge_->submit(task("begun"), now_));
   for (int i = 0; i < 20; ++i) bridge_->tick(now_ += from_s(0.01));
-  ASSERT_TRUE(bridge_->commit(now_));
   ASSERT_TRUE(submit("waits", "pick"));
+  ASSERT_TRUE(bridge_->commit(now_));
   reopen();
   std::vector<std::pair<std::string, std::size_t>> asked;
   ASSERT_TRUE(bridge_->recover(

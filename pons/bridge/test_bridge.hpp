@@ -25,8 +25,10 @@ class BridgeTest : public testing::Test {
     skills_.add(heavy_.type());
     reopen();
   }
+  // As after a kill: what was not made durable is not there.
   void reopen() {
     bridge_.reset();
+    if (journal_) journal_->abandon();
     journal_.reset();
     journal_ = std::move(*Journal::open(folder_ / "day.db"));
     bridge_ = std::make_unique<Bridge>(*journal_, skills_, world_);
