@@ -21,6 +21,7 @@ void add(std::vector<std::string>& resources, const task::SkillType& type, const
 
 void Bridge::add_robot(const task::SkillRegistry& skills) {
   robots_.push_back({world_.arms()[robots_.size()].arm, &skills});
+  review_.add_robot(skills);
 }
 
 bool Bridge::held() const {
@@ -92,17 +93,18 @@ bool Bridge::may_run(const Open& open, std::size_t robot) {
   return std::ranges::find(open.robots, robot) != open.robots.end();
 }
 
-// The first one's the review has seen to be there.
+// One of them the review has seen to be able.
 std::vector<std::size_t> Bridge::robots_for(const task::Task& task, const tree::Program* program) const {
-  std::vector<std::size_t> robots{0};
-  if (task.tree || resources_for(task, program, 0).empty()) return robots;
-  for (std::size_t robot = 1; robot < robots_.size(); ++robot) {
+  if (robots_.size() == 1 || task.tree || resources_for(task, program, 0).empty()) return {0};
+  std::vector<std::size_t> robots;
+  for (std::size_t robot = 0; robot < robots_.size(); ++robot) {
     const bool can = std::ranges::all_of(task.steps, [&](const task::Step& step) {
       const task::SkillType* const type = robots_[robot].skills->find(step.skill);
       return type != nullptr && (!type->feasible || type->feasible(step.arguments, task::Moment::kAdmission));
     });
     if (can) robots.push_back(robot);
   }
+  if (robots.empty()) robots.push_back(0);  // by now no robot can: its start says so
   return robots;
 }
 

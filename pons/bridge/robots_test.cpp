@@ -26,6 +26,10 @@ class Robots : public testing::Test {
                                                               : std::vector<std::string>{};
       };
       type.chance = [this, robot](const Json&) { return chance_[robot]; };
+      type.feasible = [this, robot](const Json& arguments, task::Moment) -> Expected<void> {
+        if (!cannot_[robot].contains(arguments.value("object", ""))) return {};
+        return fail(fmt::format("out of reach of {}", robot), {}, "ask for something nearer");
+      };
       skills_[robot].add(type);
     }
     open();
@@ -72,6 +76,7 @@ class Robots : public testing::Test {
   std::array<task::SkillRegistry, 2> skills_;
   std::array<Chance, 2> chance_{Chance::kNow, Chance::kNow};
   std::array<std::string, 2> zoned_;  // what holds the zone, too
+  std::array<std::set<std::string>, 2> cannot_;
   std::unique_ptr<Journal> journal_ = std::move(*Journal::open(folder_ / "day.db"));
   std::optional<Bridge> bridge_;
   Time now_;
@@ -91,6 +96,17 @@ TEST_F(Robots, EachTaskRunsOnOneThatIsFree) {
   tick(60);
   EXPECT_TRUE(bridge_->idle());
   EXPECT_EQ(actors_[0].log.started.size() + actors_[1].log.started.size(), 3U);
+}
+
+TEST_F(Robots, WhatOnlyTheSecondCanDoIsItsAlone) {
+  cannot_ = {{{"a", "c"}, {"c"}}};
+  submit("a");
+  submit("b");
+  tick(2);
+  EXPECT_EQ(robot_of("a"), "arm_2");
+  EXPECT_EQ(robot_of("b"), "arm_1");
+  const auto refused = bridge_->submit(R"({"id":"c","steps":[{"skill":"pick","arguments":{"object":"c"}}]})", now_);
+  EXPECT_EQ(refused.error().line(), "/steps/0: the robot cannot do that: out of reach of 0; ask for something nearer");
 }
 
 TEST_F(Robots, WhatRidesByOneIsTheOthers) {

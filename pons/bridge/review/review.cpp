@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <ranges>
 
 #include "pons/task/json_text.hpp"
 #include "pons/task/spelling.hpp"
@@ -19,6 +20,24 @@ std::string skill_hint(std::string_view wrong, const task::SkillRegistry& skills
   if (const std::string meant = task::nearest(wrong, names); !meant.empty())
     return fmt::format("did you mean '{}'?", meant);
   return names.empty() ? "this bridge has no skills" : fmt::format("the skills are {}", fmt::join(names, ", "));
+}
+
+Expected<void> feasible(const task::Step& use, task::Moment moment, const task::SkillRegistry& skills) {
+  const task::SkillType* const type = skills.find(use.skill);
+  if (type == nullptr || !type->feasible) return {};
+  auto good = type->feasible(use.arguments, moment);
+  if (!good) good.error().what = fmt::format("the robot cannot do that: {}", good.error().what);
+  return good;
+}
+
+Expected<void> able_to(const std::vector<UseOf>& uses, const task::SkillRegistry& skills) {
+  for (const UseOf& use : uses) {
+    auto good = feasible(use.use, task::Moment::kAdmission, skills);
+    if (good) continue;
+    good.error().where = use.where;
+    return good;
+  }
+  return {};
 }
 
 }  // namespace
@@ -115,24 +134,10 @@ std::vector<UseOf> Review::uses(const task::Task& task, const tree::Program* pro
   return uses;
 }
 
-Expected<Asked> Review::judge(const task::Task& task, const task::Step& use, task::Moment moment,
-                              const task::SkillRegistry& skills) const {
-  auto asked = rules_.check(task, use, moment);
-  const task::SkillType* const type = skills.find(use.skill);
-  if (!asked || type == nullptr || !type->feasible) return asked;
-  if (auto good = type->feasible(use.arguments, moment); !good) {
-    good.error().what = fmt::format("the robot cannot do that: {}", good.error().what);
-    return std::unexpected(good.error());
-  }
-  return asked;
-}
-
 Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& uses) const {
   Asked all;
   for (const UseOf& use : uses) {
-    // A tree may not come by what it could not do, and has so many uses that looking at each would take too long.
-    auto asked = task.tree ? rules_.check(task, use.use, task::Moment::kAdmission)
-                           : judge(task, use.use, task::Moment::kAdmission, skills_);
+    auto asked = rules_.check(task, use.use, task::Moment::kAdmission);
     if (!asked && task.tree) continue;
     if (!asked) {
       asked.error().where = use.where;
@@ -140,12 +145,20 @@ Expected<Asked> Review::judge(const task::Task& task, const std::vector<UseOf>& 
     }
     std::ranges::move(*asked, std::back_inserter(all));
   }
-  return all;
+  // A tree may not come by what it could not do, and has so many uses that looking at each would take too long.
+  if (task.tree) return all;
+  const auto able = able_to(uses, *robots_.front());
+  const auto others = std::views::drop(robots_, 1);
+  if (able || std::ranges::any_of(others, [&](const auto* skills) { return able_to(uses, *skills).has_value(); }))
+    return all;
+  return std::unexpected(able.error());
 }
 
 Expected<Asked> Review::judge_start(const task::Task& task, const task::Step& use, const task::SkillRegistry& skills) {
-  auto asked = judge(task, use, task::Moment::kStart, skills);
-  if (!asked || !task.tree) return asked;  // steps were claimed when the task was taken
+  auto asked = rules_.check(task, use, task::Moment::kStart);
+  if (!asked) return asked;
+  if (auto good = feasible(use, task::Moment::kStart, skills); !good) return std::unexpected(good.error());
+  if (!task.tree) return asked;  // steps were claimed when the task was taken
   const UseOf started{use, {}};
   if (auto claimed = contradictions_.claim(task, {&started, 1}); !claimed) return std::unexpected(claimed.error());
   return asked;

@@ -26,6 +26,8 @@ class Review {
   // `skills` must outlive it and must not change. `resources` are those of the world.
   Review(const task::SkillRegistry& skills, std::vector<std::string> resources);
 
+  // One more robot, which may do what the first cannot; likewise.
+  void add_robot(const task::SkillRegistry& skills) { robots_.push_back(&skills); }
   // The trees that tasks may name.
   void use_trees(tree::Library trees) { trees_ = std::move(trees); }
   // Before the first task.
@@ -43,8 +45,8 @@ class Review {
   // The uses of skills whose arguments are known before it runs: all of steps; of a tree those that take none from its
   // blackboard.
   [[nodiscard]] static std::vector<UseOf> uses(const task::Task& task, const tree::Program* program);
-  // Whether it may be done, and by the robot. Not all leaves of a tree come to pass: what of them may not be done is
-  // found out when it starts. Error: the first step that may not be.
+  // Whether it may be done, and all of it by one of the robots. Not all leaves of a tree come to pass: what of them may
+  // not be done is found out when it starts. Error: the first step that may not be, or that the first robot cannot do.
   [[nodiscard]] Expected<Asked> judge(const task::Task& task, const std::vector<UseOf>& uses) const;
   // Likewise of a use that starts now, of a robot with those skills, and whether it contradicts another task.
   [[nodiscard]] Expected<Asked> judge_start(const task::Task& task, const task::Step& use,
@@ -56,10 +58,9 @@ class Review {
  private:
   [[nodiscard]] Expected<void> check_resources(const task::SkillType& type, const std::string& where) const;
   [[nodiscard]] Expected<void> check_step(const task::Step& step, const std::string& where) const;
-  [[nodiscard]] Expected<Asked> judge(const task::Task& task, const task::Step& use, task::Moment moment,
-                                      const task::SkillRegistry& skills) const;
 
   const task::SkillRegistry& skills_;
+  std::vector<const task::SkillRegistry*> robots_{&skills_};
   std::vector<std::string> resources_;
   std::map<std::string, Expected<task::Schema>, std::less<>> schemas_;
   tree::Library trees_;
