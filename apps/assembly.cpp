@@ -47,6 +47,12 @@ Expected<task::Json> body_in(const bridge::Journal& journal) {
   return body;
 }
 
+// Empty: there is none.
+std::string link_that_lives(const task::Json& body) {
+  std::string link = task::text_of(body, "link");
+  return !link.empty() && rt::SharedMemory::is_owned(link) ? link : "";
+}
+
 task::Json json_of(const skills::Stray& stray) {
   task::Json json{{"code", stray.code}, {"fell_into", stray.place}};
   if (!stray.counted) json["counted"] = false;
@@ -54,6 +60,12 @@ task::Json json_of(const skills::Stray& stray) {
 }
 
 }  // namespace
+
+Expected<std::string> link_that_lives(const bridge::Journal& journal) {
+  const auto body = body_in(journal);
+  if (!body) return std::unexpected(body.error());
+  return link_that_lives(*body);
+}
 
 bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done) {
   using Fate = skills::TakeUp::Fate;
@@ -305,8 +317,7 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
   if (used && !may_follow) return refused("holds an earlier run");
   if (used && !bridge::in_database(options.journal)) return refused("holds a run of another body");
   // Whoever has a link's name now follows on a body that had it; of another name, that one may live.
-  const std::string link = task::text_of(*earlier, "link");
-  if (used && !link.empty() && link != options.link && rt::SharedMemory::is_owned(link))
+  if (const std::string link = link_that_lives(*earlier); used && !link.empty() && link != options.link)
     return refused(fmt::format("holds the run of a body that lives (--link {})", link));
   journal = std::move(*opened);
   if (!options.body) return {};

@@ -237,4 +237,7 @@ class Assembly {
 // What becomes of a task that a bridge which is no more had begun, of whose steps so many were done.
 [[nodiscard]] bridge::Resumption resumption(const skills::TakeUp& take_up, const task::Task& task, std::size_t done);
 
+// Where a body that lives meets its bridges, one of which wrote this journal last; empty: there is no such body.
+[[nodiscard]] Expected<std::string> link_that_lives(const bridge::Journal& journal);
+
 }  // namespace pons::apps

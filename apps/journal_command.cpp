@@ -1,8 +1,10 @@
-// pons journal: whether one is whole, what was refused, less of it, and one of an older version.
+// pons journal: whether one is whole, what was refused, less of it, one of an older version, and one that nobody goes
+// on with.
 
 #include <fmt/format.h>
 #include <filesystem>
 
+#include "apps/assembly.hpp"
 #include "apps/commands.hpp"
 #include "apps/story_text.hpp"
 #include "pons/bridge/bridge.hpp"
@@ -84,11 +86,33 @@ int upgrade(const JournalOptions& options) {
   return kExitGood;
 }
 
+// What a run that was killed with its robot left open stays so, for no other run goes on with its journal.
+int end(const JournalOptions& options) {
+  if (auto there = existing(options.file); !there) return bad_input(there.error());
+  const auto journal = Journal::open(options.file);
+  if (!journal) return bad_input(journal.error());
+  const auto link = link_that_lives(**journal);
+  if (!link) return bad_run(link.error());
+  if (!link->empty())
+    return bad_input({fmt::format("its robot lives (--link {})", *link), bridge::shown(options.file),
+                      "start `pons bridge` to go on with it, or end the body first"});
+  const auto before = (*journal)->counts();
+  if (!before) return bad_run(before.error());
+  auto ended = bridge::end_with_body(**journal, Time{});
+  if (ended) ended = (*journal)->commit();
+  if (!ended) return bad_run(ended.error());
+  const auto after = (*journal)->counts();
+  if (!after) return bad_run(after.error());
+  say(stdout, fmt::format("{} tasks ended as FAILED, for their robot is gone; {} open\n", before->open - after->open,
+                          after->open));
+  return kExitGood;
+}
+
 }  // namespace
 
 void add_journal(CLI::App& app, Chosen& chosen) {
   auto options = std::make_shared<JournalOptions>();
-  CLI::App* journal = app.add_subcommand("journal", "Check, read, shorten, or upgrade a journal that no run owns");
+  CLI::App* journal = app.add_subcommand("journal", "Check, read, shorten, upgrade, or end a journal that no run owns");
   journal->require_subcommand(1);
   const auto add = [&](const char* name, const char* what, int (*run)(const JournalOptions&)) {
     CLI::App* command = journal->add_subcommand(name, what);
@@ -103,6 +127,7 @@ void add_journal(CLI::App& app, Chosen& chosen) {
       ->add_option("--keep", options->keep, "All of so many tasks that ended last (0)")
       ->check(whole_number(1'000'000'000'000));
   add("upgrade", "Bring one of an older version to this program's", upgrade);
+  add("end", "End what a run that was killed with its robot left open in it", end);
 }
 
 }  // namespace pons::apps

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <map>
+#include <ranges>
 #include <regex>
 #include <string>
 #include <vector>
@@ -169,7 +171,37 @@ TEST_F(Processes, ABridgeThatIsKilledWithAParcelInTheHandIsFollowedByOneThatPlac
   expect_nothing_left();
 }
 
-// Who stopped the arm is waited for, whichever bridge was told.
+// It waits when its bridge dies: what it had done by then is not done again.
+TEST_F(Processes, ATreeGoesOnAtTheLastNodeThatWasDoneBeforeItsBridgeWasKilled) {
+  Running body_process(folder_.path(), "body", body(3));
+  const nlohmann::json task{
+      {"id", "T"}, {"priority", 99}, {"tree", {{"xml", R"(<root BTCPP_format="4"><BehaviorTree ID="t">
+      <Sequence><move_to place="home"/><Sleep msec="3000"/><move_to place="home"/></Sequence></BehaviorTree></root>)"}}}};
+  const auto told = [&](const char* kind) {
+    const auto shown = gate::ask(folder_ / "s", {{"op", "show"}, {"id", "T"}});
+    if (!shown || !shown->value("ok", false)) return false;
+    return std::ranges::any_of(shown->at("events"), [&](const auto& event) { return event.at("kind") == kind; });
+  };
+  {
+    Running first(folder_.path(), "first", bridge(3));
+    ASSERT_TRUE(eventually([&] {
+      const auto answer = gate::ask(folder_ / "s", {{"op", "submit"}, {"task", task}});
+      return answer && answer->value("ok", false);
+    })) << first.err();
+    ASSERT_TRUE(eventually([&] { return told("attempt_ended"); })) << first.err();
+    first.signal(SIGKILL);
+    EXPECT_EQ(first.wait().code, -SIGKILL);
+  }
+  Running second(folder_.path(), "second", bridge(3));
+  EXPECT_EQ(second.wait().code, 0) << second.err();
+  EXPECT_EQ(body_process.wait().code, 0);
+  EXPECT_EQ(outcomes(folder_ / "j.db").at("T"), "SUCCEEDED");
+  const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
+  ASSERT_TRUE(journal) << journal.error().line();
+  EXPECT_EQ(std::ranges::count((*journal)->history("T").value(), "attempt", &bridge::Event::kind), 2);
+  expect_nothing_left();
+}
+
 // Of one plan the body does what strikes it, and the bridge what strikes its brain; each names the rest.
 TEST_F(Processes, EachDoesItsPartOfAPlanOfFaults) {
   write_text(folder_ / "plan.yaml",
@@ -188,6 +220,7 @@ TEST_F(Processes, EachDoesItsPartOfAPlanOfFaults) {
   EXPECT_EQ(report["faults_left_out"], nlohmann::json::array({"brain_lie", "loop_crash"}));
 }
 
+// Who stopped the arm is waited for, whichever bridge was told.
 TEST_F(Processes, APersonsStopOutlivesTheBridgeThatWasTold) {
   constexpr int kParcels = 3;
   nlohmann::json robot;
@@ -238,6 +271,33 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   const Finished refused = run_pons(bridge(6));
   EXPECT_EQ(refused.code, kBadInput) << refused.err;
   EXPECT_THAT(refused.err, HasSubstr("holds a run of another body"));
+  next_body.signal(SIGINT);
+  EXPECT_EQ(next_body.wait().code, kInterrupted);
+  expect_nothing_left();
+}
+
+TEST_F(Processes, WhatBothLeftOpenAsTheyWereKilledIsEndedWhenThatIsAskedFor) {
+  const std::string journal = folder_ / "j.db";
+  Running body_process(folder_.path(), "body", body(6));
+  Running bridge_process(folder_.path(), "bridge", bridge(6));
+  ASSERT_TRUE(eventually([&] { return !task_at("attempt", "pick").empty(); })) << bridge_process.err();
+  bridge_process.signal(SIGKILL);
+  EXPECT_EQ(bridge_process.wait().code, -SIGKILL);
+  const Finished refused = run_pons({"journal", "end", journal});
+  EXPECT_EQ(refused.code, kBadInput) << refused.out;
+  EXPECT_THAT(refused.err, HasSubstr("its robot lives"));
+  body_process.signal(SIGKILL);
+  EXPECT_EQ(body_process.wait().code, -SIGKILL);
+  const auto open = [&] { return std::ranges::count(std::views::values(outcomes(journal)), "none"); };
+  EXPECT_GT(open(), 0);
+  const Finished ended = run_pons({"journal", "end", journal});
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("ended as FAILED, for their robot is gone; 0 open"));
+  EXPECT_EQ(open(), 0);
+  EXPECT_THAT(run_pons({"journal", "end", journal}).out, HasSubstr("0 tasks ended"));
+  EXPECT_EQ(run_pons({"journal", "check", journal}).code, 0);
+  Running next_body(folder_.path(), "next", body(6, "next"));  // which clears away what that one left
+  EXPECT_THAT(run_pons(bridge(6)).err, HasSubstr("holds a run of another body"));
   next_body.signal(SIGINT);
   EXPECT_EQ(next_body.wait().code, kInterrupted);
   expect_nothing_left();
