@@ -103,6 +103,11 @@ class Layers(Checkers):
                         "pons/bridge/bridge.hpp:3:")
         self.passes("check_layers", {"pons/bridge/bridge.hpp": '#pragma once\nauto s = "std::thread"; int runtime(int);\n'})
 
+    def test_the_bridge_knows_no_world(self):
+        for text in ("if (world.base) return;", "int parcels = 0;", "double f(const world::Belt& b);"):
+            self.layers({"pons/bridge/bridge.hpp": f"#pragma once\n{text}\n"}, "pons/bridge/bridge.hpp:2:")
+        self.passes("check_layers", {"pons/bridge/bridge.hpp": '#pragma once\n// a parcel\nauto r = world.resources;\n'})
+
     def test_tests_start_threads_but_read_no_clock(self):
         self.passes("check_layers", {"pons/sim/CMakeLists.txt": "pons_module(sim SOURCES sim.cpp TESTS a_test.cpp USES core)",
                                      "pons/sim/a_test.cpp": "std::jthread t;\n"})

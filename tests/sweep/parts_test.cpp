@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pty.h>
 #include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,6 +11,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <string>
 
@@ -249,6 +251,33 @@ TEST(SweepFolder, ARunIsKeptUntilTheProcessEnds) {
   EXPECT_EQ(flock(log, LOCK_EX | LOCK_NB), 0);
   close(log);
   EXPECT_THAT(keep_run(folder / "none", [] { return false; }).error().line(), HasSubstr("its folder can be written"));
+}
+
+// Whatever else is written to a terminal, a bar is: of runs that there are, and those that go on.
+TEST(SweepProgress, IsABarOnATerminalAndALineARunElsewhere) {
+  int terminal = -1, here = -1;
+  ASSERT_EQ(openpty(&terminal, &here, nullptr, nullptr, nullptr), 0);
+  std::FILE* const out = fdopen(here, "w");
+  ASSERT_NE(out, nullptr);
+  SweepProgress bar(out, SweepProgress::Talk::kUsual, 4, 1, 2);
+  bar.going_on(2);
+  bar.finish();
+  std::string shown(1000, '\0');
+  shown.resize(static_cast<std::size_t>(std::max<ssize_t>(0, read(terminal, shown.data(), shown.size()))));
+  EXPECT_THAT(shown,
+              HasSubstr("[#######.......................] 1/4 runs  0 bad  0 without a result  2 of 2 going on"));
+  std::fclose(out);
+  close(terminal);
+
+  const Folder folder;
+  std::FILE* const file = std::fopen((folder / "told").c_str(), "w");
+  ASSERT_NE(file, nullptr);
+  SweepProgress lines(file, SweepProgress::Talk::kUsual, 4, 1, 2);
+  lines.going_on(2);
+  lines.ended({.name = "parcel_cell/none/seed-0001"});
+  lines.finish();
+  std::fclose(file);
+  EXPECT_THAT(read_text(folder / "told"), testing::StartsWith("     2 of 4  parcel_cell/none/seed-0001: "));
 }
 
 TEST(SweepFolder, ClockAndLastLines) {
