@@ -224,6 +224,28 @@ TEST_F(TreesOfTasks, WhatGoesRoundForEverTellsTheLastOfIt) {
   EXPECT_EQ(reports[0].detail.at("steps").size(), 64u);
 }
 
+// Nobody else would ever come to the arm.
+TEST_F(TreesOfTasks, OneThatGoesRoundForEverMakesWayForWhoHasWaitedForLong) {
+  world_.schedule.ageing = from_s(1);
+  reopen_with_trees();
+  const std::string xml = R"(<root BTCPP_format="4"><BehaviorTree><Repeat num_cycles="-1">
+      <Sequence><pick/><Sleep msec="200"/></Sequence></Repeat></BehaviorTree></root>)";
+  ASSERT_TRUE(submit_tree("round", {{"xml", xml}}));
+  tick();
+  ASSERT_TRUE(submit("ordinary", "place"));
+  tick(4000);
+  EXPECT_FALSE(recorded("ordinary")) << "it is not urgent, and may have to wait";
+  tick(1000);
+  ASSERT_TRUE(recorded("ordinary"));
+  EXPECT_EQ(recorded("ordinary")->outcome, Outcome::kSucceeded);
+  const auto rounds = pick_.log.started.size();
+  tick(100);
+  EXPECT_GT(pick_.log.started.size(), rounds) << "and goes on by itself";
+  EXPECT_TRUE(bridge_->cancel("round", now_, "enough"));
+  (void)run();
+  EXPECT_EQ(recorded("round")->outcome, Outcome::kCancelled);
+}
+
 // ---- after a crash ----
 
 TEST_F(TreesOfTasks, AfterACrashItGoesOnAtTheLastCompletedNode) {

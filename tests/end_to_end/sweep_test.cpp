@@ -288,17 +288,22 @@ TEST_F(SweepTest, MergesAroundReportsThatAreCutOrOfAnotherForm) {
 
 // A base, and worlds beside one another.
 TEST_F(SweepTest, SumsUpCellsAndBases) {
-  const Finished finished =
-      run_pons({"sweep", "rounds", "small_cell", "--seeds", "1-2", "--parcels", "3", "--out", out()});
-  EXPECT_EQ(finished.code, 0) << finished.out << finished.err;
+  const Finished base = run_pons({"sweep", "rounds", "--seeds", "1-2", "--out", out()});
+  EXPECT_EQ(base.code, 0) << base.out << base.err;
+  expect_schema();
+  EXPECT_EQ(report()["totals"]["rounds"]["tasks"], 2);
+  EXPECT_FALSE(report()["totals"].contains("parcels"));
+
+  std::filesystem::remove_all(out());
+  const Finished cells =
+      run_pons({"sweep", "small_cell", "parcel_cell", "--seeds", "1", "--parcels", "3", "--out", out()});
+  EXPECT_EQ(cells.code, 0) << cells.out << cells.err;
   expect_schema();
   const nlohmann::json groups = report()["groups"];
   ASSERT_EQ(groups.size(), 2U);
-  EXPECT_EQ(groups[0]["rounds"]["tasks"], 2);
-  EXPECT_FALSE(groups[0].contains("parcels"));
-  EXPECT_EQ(groups[1]["parcels"]["offered"], 6);
-  EXPECT_EQ(report()["totals"]["runs"]["good"], 4);
-  EXPECT_EQ(report()["totals"]["rounds"]["tasks"], 2);
+  EXPECT_EQ(groups[0]["world"], "small_cell");
+  EXPECT_EQ(groups[1]["world"], "parcel_cell");
+  for (const nlohmann::json& group : groups) EXPECT_EQ(group["parcels"]["offered"], 3);
   EXPECT_EQ(report()["totals"]["parcels"]["offered"], 6);
 }
 

@@ -123,6 +123,25 @@ TEST_F(CommandLine, WhatABodyHadClaimedAndNotBegunIsDoneWithTheNextUnderItsName)
   EXPECT_EQ(pons({"journal", "check", journal}).code, 0);
 }
 
+// In the middle of a run, which can keep no promise any more.
+TEST_F(CommandLine, ADatabaseThatVanishesEndsTheRunAndWhatWasToldIsThereAfterwards) {
+  write_text(folder_ / "home.json", R"({"id":"home","steps":[{"skill":"move_to","arguments":{"place":"home"}}]})");
+  const std::string journal = place_ + "#small_cell";
+  const Finished run = run_pons_and(
+      {"run", "small_cell", "--parcels", "20", "--lockstep", "--stay", "--socket", folder_ / "s", "--journal", place_},
+      1, [&](pid_t) {
+        EXPECT_EQ(pons({"task", "submit", folder_ / "home.json", "--socket", folder_ / "s"}).out, "home: accepted\n");
+        server_.stop();
+      });
+  EXPECT_EQ(run.code, 1) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("#small_cell: "));
+  EXPECT_THAT(run.err, Not(HasSubstr(PostgresServer::kPassword)));
+  server_.start();
+  EXPECT_THAT(pons({"journal", "check", journal}).out, HasSubstr("whole: "));
+  EXPECT_EQ(pons({"task", "show", "home", "--journal", journal}).code, 0);
+  EXPECT_THAT(pons({"journal", "end", journal}).out, HasSubstr("; 0 open"));
+}
+
 TEST_F(CommandLine, WhatCannotBeIsSaid) {
   EXPECT_THAT(pons({"journal", "check", place_ + "#nobody"}).err, HasSubstr("there is no such journal"));
   EXPECT_THAT(pons({"journal", "compact", place_ + "#nobody"}).err, HasSubstr("there is no such journal"));
