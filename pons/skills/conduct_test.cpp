@@ -39,7 +39,8 @@ class ConductTest : public testing::Test {
     const AxisState at = asked_ ? cell_.arm.planned(now_) : at_rest(world_.robot.home);
     link::State state;
     state.stamp = now_;
-    state.safety = link::SafetyState::kOperational;
+    state.safety = safety_;
+    state.cause = cause_;
     state.epoch = 1;
     state.commanded = at;
     state.position = at.position, state.speed = at.speed;
@@ -68,6 +69,8 @@ class ConductTest : public testing::Test {
   Time now_ = Time(from_s(5));
   bool asked_ = false;
   std::uint32_t vacuum_on_ = 0;
+  link::SafetyState safety_ = link::SafetyState::kOperational;
+  link::StopCause cause_ = link::StopCause::kNone;
   const world::World world_ = parcel_cell();
   const std::unique_ptr<link::Link> link_ = std::make_unique<link::Link>();
   link::BridgeEnd bridge_{*link_};
@@ -122,6 +125,33 @@ TEST_F(ConductTest, WhoIsToldToGoOnBeforeItRestedHearsItToo) {
   skill->resume(now_);
   EXPECT_EQ(idle.went_on, 1);
   EXPECT_EQ(skill->tick(now_).status, Status::kRunning);
+}
+
+// Each time once, while it lasts.
+TEST_F(ConductTest, WhyTheControlLoopStandsIsToldInTheTasksStory) {
+  const auto skill = conduct(cell_, std::make_unique<Idle>());
+  const auto told = [&](link::SafetyState safety, link::StopCause cause) {
+    safety_ = safety;
+    cause_ = cause;
+    tick();
+    const Progress progress = skill->tick(now_);
+    EXPECT_EQ(progress.status, Status::kRunning);
+    std::vector<task::Json> notes;
+    for (const task::Note& note : progress.notes) {
+      if (note.kind == "stopped") notes.push_back(note.detail);
+    }
+    return notes;
+  };
+  using enum link::SafetyState;
+  const std::vector<task::Json> nothing;
+  EXPECT_EQ(told(kOperational, link::StopCause::kNone), nothing);
+  EXPECT_EQ(told(kProtectiveStop, link::StopCause::kBadCommand),
+            (std::vector<task::Json>{{{"by", "the control loop"}, {"cause", "bad command"}}}));
+  EXPECT_EQ(told(kProtectiveStop, link::StopCause::kBadCommand), nothing);
+  EXPECT_EQ(told(kDisarmed, link::StopCause::kNone), nothing);
+  EXPECT_EQ(told(kOperational, link::StopCause::kNone), nothing);
+  EXPECT_EQ(told(kProtectiveStop, link::StopCause::kLimit),
+            (std::vector<task::Json>{{{"by", "the control loop"}, {"cause", "limit"}}}));
 }
 
 // At the drives' limits a heavy load would come off.

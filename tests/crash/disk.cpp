@@ -230,6 +230,8 @@ std::string Disk::after_power_off(const File& file) {
       const bool kept = mood == 1 || (mood == 2 && random_.below(2) == 0);
       const bool torn = kept && mood == 2 && random_.below(kTornSectors) == 0;
       const std::size_t whole = torn ? at + random_.below(end - at) : end;
+      losses_.lost += kept ? 0 : 1;
+      losses_.torn += torn ? 1 : 0;
       if (kept) apply(content, {change.offset + at, change.bytes.substr(at, whole - at), std::nullopt});
       at = end;
     }

@@ -10,6 +10,7 @@
 
 #include <sqlite3.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -31,6 +32,11 @@ class Disk {
   // calls fail.
   using Watch = std::function<bool(Operation operation, Moment moment, const std::string& file)>;
 
+  // What became of the sectors that were written and not synced when the power went.
+  struct Losses {
+    std::size_t lost = 0, torn = 0;
+  };
+
   // A disk that lies says that it has synced.
   enum class Syncs : std::uint8_t { kTruly, kNever };
 
@@ -44,6 +50,7 @@ class Disk {
 
   // Writes, cuts, syncs and removals so far.
   [[nodiscard]] std::int64_t operations() const { return operations_; }
+  [[nodiscard]] const Losses& losses() const { return losses_; }
   // With the n-th from now on (the first is 1) the power goes: that one may still have happened, and all later calls
   // fail.
   void power_off_at(std::int64_t n) { off_at_ = operations_ + n; }
@@ -92,6 +99,7 @@ class Disk {
   std::map<std::string, File> removed_;  // and may be there again
   std::set<std::string> named_;          // that the folder keeps
   std::int64_t operations_ = 0;
+  Losses losses_;
   std::optional<std::int64_t> off_at_;
   std::int64_t unnamed_ = 0;
   bool off_ = false;

@@ -16,18 +16,24 @@ struct Faulty {
   [[nodiscard]] int injected(const char* fault) const { return report["faults"].value(fault, 0); }
 };
 
-Faulty run_with(const std::string& plan, int parcels, int seed) {
+// Of a plan that has that name, or is that file.
+Faulty run_on(const std::string& faults, int parcels, int seed) {
   const Folder folder;
-  write_text(folder / "plan.yaml", plan);
   const Finished run =
       run_pons({"run", "parcel_cell", "--parcels", std::to_string(parcels), "--seed", std::to_string(seed), "--quiet",
-                "--explain", "--faults", folder / "plan.yaml", "--report", folder / "report.json"});
+                "--explain", "--faults", faults, "--report", folder / "report.json"});
   EXPECT_EQ(run.code, 0) << run.out << run.err;
   Faulty faulty{read_json(folder / "report.json"), run.out};
   expect_accounted_for(faulty.report);
   EXPECT_EQ(faulty.report["parcels"]["offered"], parcels) << run.out;
   EXPECT_EQ(faulty.report["parcels"]["missorted"], 0) << run.out;
   return faulty;
+}
+
+Faulty run_with(const std::string& plan, int parcels, int seed) {
+  const Folder folder;
+  write_text(folder / "plan.yaml", plan);
+  return run_on(folder / "plan.yaml", parcels, seed);
 }
 
 TEST(Faults, WhatIsMissedIsTriedAgain) {
@@ -155,14 +161,29 @@ TEST(Faults, OverANetworkThatLosesAndRepeatsNothingIsLostAndNothingDoneTwice) {
   EXPECT_GE(run.report["health"]["parts"]["brain"]["alerts"], 1) << "for a while nothing comes";
 }
 
+// An ordinary day, of which nobody need hear.
+TEST(Faults, OfAnOrdinaryDayNothingIsLostAndNobodyIsCalled) {
+  const Faulty run = run_on("robin", 60, 2);
+  EXPECT_EQ(run.report["interventions"], 0) << run.said;
+  EXPECT_EQ(run.report["limits"]["violations"], 0) << run.said;
+  EXPECT_GE(run.injected("missed_grasp"), 1);
+  int injected = 0;
+  for (const json& times : run.report["faults"]) injected += times.get<int>();
+  EXPECT_GE(injected, 3) << run.said;
+}
+
 // All of them at once, and the same again by the same seed.
 TEST(Faults, AStormOfOneSeedIsOneResult) {
   const Folder folder;
   const auto storm = [&](const std::string& name) {
     const Finished run = run_pons({"run", "parcel_cell", "--parcels", "20", "--seed", "4", "--quiet", "--explain",
                                    "--faults", "storm", "--report", folder / name});
+    EXPECT_EQ(run.code, 0) << run.out << run.err;
     EXPECT_NE(run.out.find("storm: "), std::string::npos) << run.out;
-    return read_json(folder / name);
+    const json report = read_json(folder / name);
+    expect_accounted_for(report);
+    EXPECT_EQ(report["parcels"]["missorted"], 0) << run.out;
+    return report;
   };
   const json one = storm("one.json"), two = storm("two.json");
   EXPECT_EQ(one["state_hash"], two["state_hash"]);

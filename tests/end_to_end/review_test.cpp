@@ -1,12 +1,19 @@
-// A brain that lies, contradicts itself, asks for what people must allow, and asks too often, beside a run's own work.
+// A brain that lies, contradicts itself, asks for what people must allow, and asks too often, beside a run's own work;
+// and senders of more than a run takes.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "pons/bridge/bridge.hpp"
+#include "pons/gate/local_socket.hpp"
 #include "tests/end_to_end/run_pons.hpp"
 
 namespace pons::tests {
@@ -143,6 +150,104 @@ TEST_F(HostileBrain, RulesThatMeanNothingAreErrorsOfTheFile) {
   EXPECT_THAT(run.err, AllOf(HasSubstr("world.yaml:"), HasSubstr("review.rules[0]: nothing has a 'desitnation'"),
                              HasSubstr("of things may be known: kind, destination")));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "none.db"));
+}
+
+// What is sent to an arm that somebody has stopped waits.
+class SendersReview : public ::testing::Test {
+ protected:
+  static constexpr int kAtOnce = 64;  // tasks in a reply, at most
+  static constexpr const char* kLimit = "  limits:\n    - {name: senders, at_most: 200, per_s: 1}\n";
+
+  void during_a_run(const std::function<void()>& visit, const std::vector<std::string>& environment = {}) {
+    const Finished run = run_pons_and(
+        {"run", "small_cell", "--parcels", "1", "--lockstep", "--stay", "--socket", folder_ / "s", "--journal",
+         folder_ / "j.db"},
+        1,
+        [&](pid_t run_id) {
+          EXPECT_EQ(ask({{"op", "stop"}}).value("ok", false), true);
+          visit();
+          kill(run_id, SIGINT);
+        },
+        environment);
+    EXPECT_EQ(run.code, 130) << run.err;
+    EXPECT_EQ(run_pons({"journal", "check", folder_ / "j.db"}).code, 0);
+  }
+  nlohmann::json ask(const nlohmann::json& question) {
+    const auto answer = gate::ask(folder_ / "s", question);
+    EXPECT_TRUE(answer) << answer.error().line();
+    return answer.value_or(nlohmann::json::object());
+  }
+  // So many tasks in one reply, under names of their own.
+  nlohmann::json send(int tasks, int priority = 50) {
+    nlohmann::json reply = nlohmann::json::array();
+    for (int i = 0; i < tasks; ++i) {
+      reply.push_back({{"id", fmt::format("t{}", ++sent_)},
+                       {"priority", priority},
+                       {"steps", {{{"skill", "move_to"}, {"arguments", {{"place", "home"}}}}}}});
+    }
+    return ask({{"op", "submit"}, {"task", {{"tasks", reply}}}});
+  }
+  static bool taken(const nlohmann::json& answer) { return answer.value("ok", false); }
+
+  Folder folder_;
+  int sent_ = 0;
+};
+
+TEST_F(SendersReview, ToldThatEnoughIsOpenTheyAreTakenAgainWhenSomethingHasEnded) {
+  std::filesystem::copy(PONS_WORLDS_SOURCE, folder_ / "worlds", std::filesystem::copy_options::recursive);
+  const auto file = folder_ / "worlds" / "small_cell" / "world.yaml";
+  std::string text = read_text(file);
+  ASSERT_NE(text.find(kLimit), std::string::npos);
+  write_text(file, text.replace(text.find(kLimit), std::string_view(kLimit).size(), ""));
+  constexpr int kMost = bridge::kMaxOpen;
+  during_a_run(
+      [&] {
+        while (sent_ + kAtOnce <= kMost && !HasFailure()) EXPECT_TRUE(taken(send(kAtOnce))) << sent_;
+        EXPECT_TRUE(taken(send(kMost - sent_))) << "as many as may be, and not one less";
+        const std::string told = "10000 tasks are open already; submit it again later";
+        EXPECT_EQ(send(1).value("error", ""), told);
+        EXPECT_EQ(send(2).value("error", ""), "/tasks/0: " + told) << "nor part of a reply";
+        EXPECT_EQ(run_pons({"task", "cancel", "t7", "--socket", folder_ / "s"}).code, 0);
+        EXPECT_EQ(send(2).value("error", ""), "/tasks/1: 10000 tasks are open already; submit it again later");
+        EXPECT_TRUE(taken(send(1)));
+        EXPECT_EQ(send(1).value("error", ""), told);
+        EXPECT_TRUE(taken(send(1, 95))) << "no crowd keeps out what is urgent";
+      },
+      {"PONS_WORLDS=" + (folder_ / "worlds").string()});
+}
+
+// In the run's time, which each answer tells.
+TEST_F(SendersReview, AreKeptToTheRateOfTheWorldAsItComes) {
+  constexpr int kRate = 200;
+  std::vector<std::pair<double, int>> sent;  // and taken
+  const auto lately = [&](double now_s) {
+    int tasks = 0;
+    for (const auto& [at_s, some] : sent) tasks += at_s > now_s - 0.995 ? some : 0;
+    return tasks;
+  };
+  const auto until = [&](bool wanted) {
+    nlohmann::json answer;
+    for (int i = 0; i < 150 && !HasFailure() && (i == 0 || taken(answer) != wanted); ++i) {
+      answer = send(kAtOnce);
+      const double now_s = answer.value("time_s", 0.0);
+      if (taken(answer)) sent.emplace_back(now_s, kAtOnce);
+      EXPECT_LE(lately(now_s), kRate);
+    }
+    EXPECT_EQ(taken(answer), wanted) << answer;
+    return answer;
+  };
+  during_a_run([&] {
+    const nlohmann::json refused = until(false);
+    const double at_s = refused.value("time_s", 0.0);
+    EXPECT_GT(lately(at_s) + kAtOnce, kRate) << "not sooner than it must be";
+    const std::string told = refused.value("error", "");
+    const std::string words = "against the rules of this world (senders): at most 200 in 1 s; ask again in ";
+    ASSERT_EQ(told.substr(0, words.size()), words) << told;
+    const double wait_s = std::stod(told.substr(words.size()));
+    EXPECT_GT(wait_s, 0);
+    const nlohmann::json again = until(true);
+    EXPECT_GE(again.value("time_s", 0.0), at_s + wait_s - 0.01);
+  });
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/end_to_end/rounds_kit.hpp"
@@ -270,6 +273,27 @@ TEST_F(RoundsTest, AScanTellsWhatTheMapDoesNotShow) {
   EXPECT_NEAR(seen.at("things").at(0).at(0).get<double>(), 3.37, 0.08);
   EXPECT_NEAR(seen.at("things").at(0).at(1).get<double>(), 0.25, 0.08);
   EXPECT_NEAR(seen.at("nearest_m").get<double>(), 1.1, 0.25) << "to the rack";
+}
+
+// Base and voice at once, as the journal has their attempts.
+TEST_F(RoundsTest, OfATreeWhatIsParallelGoesOnAtTheSameTime) {
+  begin();
+  constexpr const char* kTree = R"(<root BTCPP_format="4"><BehaviorTree ID="warn"><Parallel>
+      <navigate x="1.5" y="0.5" yaw="0"/><speak text="Mind the robot, please."/>
+      </Parallel></BehaviorTree></root>)";
+  submit(Json{{"id", "warn"}, {"tree", {{"xml", kTree}}}}.dump());
+  await("warn");
+  EXPECT_EQ(outcome("warn"), Outcome::kSucceeded) << reason("warn");
+  expect_at({1.5, 0.5, 0});
+  std::map<std::string, std::pair<Time, Time>> uses;  // from when to when
+  for (const bridge::Event& event : history("warn").events) {
+    if (event.kind == "attempt") uses[event.detail.at("skill")].first = event.stamp;
+    if (event.kind == "attempt_ended") uses[event.detail.at("skill")].second = event.stamp;
+  }
+  ASSERT_EQ(uses.size(), 2U);
+  const auto [drives, stands] = uses.at("navigate");
+  const auto [speaks, silent] = uses.at("speak");
+  EXPECT_GT(to_s(std::min(stands, silent) - std::max(drives, speaks)), 0.8) << "as long as that takes to say";
 }
 
 TEST_F(RoundsTest, WhatIsSaidIsHeardForAsLongAsItTakes) {

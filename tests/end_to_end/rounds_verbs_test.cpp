@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <ostream>
 #include <string>
+#include <string_view>
 
 #include "tests/end_to_end/rounds_kit.hpp"
 
@@ -22,15 +23,19 @@ constexpr const char* kTask = "one";
 struct Use {
   const char* skill;
   const char* steps;
+  const char* urgent;  // a step of somebody who needs the same
 };
 
 std::ostream& operator<<(std::ostream& out, const Use& use) { return out << use.skill; }
 
+constexpr const char* kOffTheWay = R"({"skill":"navigate","params":{"x":0.3,"y":0,"yaw":0,"frame_id":"map"}})";
+
 constexpr Use kUses[] = {
-    {"dock", R"([{"skill":"navigate","params":{"x":0.4,"y":0,"yaw":0}},{"skill":"dock"}])"},
-    {"navigate", R"([{"skill":"navigate","params":{"x":1.2,"y":0,"yaw":0}}])"},
-    {"scan", R"([{"skill":"scan","params":{"seconds":2}}])"},
-    {"speak", R"([{"skill":"speak","params":{"text":"Aisle three is clear, and so is aisle four."}}])"},
+    {"dock", R"([{"skill":"navigate","params":{"x":0.4,"y":0,"yaw":0}},{"skill":"dock"}])", kOffTheWay},
+    {"navigate", R"([{"skill":"navigate","params":{"x":1.2,"y":0,"yaw":0}}])", kOffTheWay},
+    {"scan", R"([{"skill":"scan","params":{"seconds":2}}])", kOffTheWay},
+    {"speak", R"([{"skill":"speak","params":{"text":"Aisle three is clear, and so is aisle four."}}])",
+     R"({"skill":"speak","params":{"text":"Look out."}})"},
 };
 
 class VerbsOfABasesSkill : public RoundsTest, public testing::WithParamInterface<Use> {
@@ -56,7 +61,8 @@ class VerbsOfABasesSkill : public RoundsTest, public testing::WithParamInterface
       SCOPED_TRACE(fmt::format("after {:.2f} s of {:.2f} s", to_s(passed), to_s(all)));
       begin_task();
       run_for(to_s(passed));
-      if (!ended(kTask)) check();
+      ASSERT_FALSE(ended(kTask)) << "so far it went as it did undisturbed";
+      check();
       expect_good();
       if (HasFatalFailure()) return;
     }
@@ -65,14 +71,33 @@ class VerbsOfABasesSkill : public RoundsTest, public testing::WithParamInterface
     const auto all = history(kTask).events;
     return static_cast<int>(std::ranges::count(all, kind, &bridge::Event::kind));
   }
+  // Likewise, while the skill itself was at work, and not the step before it; each time it stood.
+  [[nodiscard]] int stood(std::string_view kind) {
+    int times = 0;
+    bool at_work = false;
+    for (const bridge::Event& event : history(kTask).events) {
+      if (event.kind == "attempt") at_work = event.detail.at("skill") == GetParam().skill;
+      if (event.kind != kind) continue;
+      EXPECT_EQ(event.detail.at("stop"), "CONFIRMED");
+      times += at_work ? 1 : 0;
+    }
+    return times;
+  }
+  void await_paused() {
+    run_until([&] { return ended(kTask) || rounds_->bridge->state(kTask) == "paused"; }, 20);
+  }
   [[nodiscard]] Json stop() { return history(kTask).record.outcome->detail.value("stop", Json()); }
 };
 
 TEST_P(VerbsOfABasesSkill, PausedItStandsAndThenGoesOnToItsEnd) {
+  int paused = 0;
   at_each_moment([&] {
     ASSERT_TRUE(rounds_->bridge->pause(kTask, now_, "test"));
-    run_until([&] { return ended(kTask) || rounds_->bridge->state(kTask) == "paused"; }, 20);
+    await_paused();
+    EXPECT_EQ(rounds_->bridge_side->stops(), 0) << "a pause is no protective stop";
     if (!ended(kTask)) {
+      EXPECT_EQ(count("paused"), 1);
+      paused += stood("paused");
       EXPECT_LT(speed_m_s(), kStill_m_s);
       const Pose2 stands = place();
       run_for(3);
@@ -82,17 +107,35 @@ TEST_P(VerbsOfABasesSkill, PausedItStandsAndThenGoesOnToItsEnd) {
     }
     EXPECT_EQ(outcome(kTask), Outcome::kSucceeded) << reason(kTask);
   });
+  EXPECT_GT(paused, 0) << "it has no safe point";
+}
+
+TEST_P(VerbsOfABasesSkill, PausedAndResumedBeforeItStandsItGoesOn) {
+  int on_its_way = 0;
+  at_each_moment([&] {
+    ASSERT_TRUE(rounds_->bridge->pause(kTask, now_, "test"));
+    run_for(0.02);
+    on_its_way += rounds_->bridge->state(kTask) == "pausing" ? 1 : 0;
+    ASSERT_TRUE(rounds_->bridge->resume(kTask, now_));
+    await(kTask);
+    EXPECT_EQ(outcome(kTask), Outcome::kSucceeded) << reason(kTask);
+    EXPECT_EQ(rounds_->bridge_side->stops(), 0);
+  });
+  EXPECT_EQ(on_its_way > 0, std::string_view(GetParam().steps).contains("navigate")) << "what drives takes its time";
 }
 
 TEST_P(VerbsOfABasesSkill, ItMakesWayForAnUrgentTaskAndGoesOnByItself) {
+  int made_way = 0;
   at_each_moment([&] {
-    drive("urgent", R"({"x":0.3,"y":0,"yaw":0,"frame_id":"map"})", 95);
+    submit(fmt::format(R"({{"id":"urgent","priority":95,"steps":[{}]}})", GetParam().urgent));
     await("urgent");
     EXPECT_EQ(outcome("urgent"), Outcome::kSucceeded) << reason("urgent");
     if (!ended(kTask)) await(kTask);
     EXPECT_EQ(outcome(kTask), Outcome::kSucceeded) << reason(kTask);
     EXPECT_EQ(count("preempted"), count("regained"));
+    made_way += stood("preempted");
   });
+  EXPECT_GT(made_way, 0) << "it keeps what others need";
 }
 
 TEST_P(VerbsOfABasesSkill, CancelledItSaysThatItStands) {
@@ -104,6 +147,23 @@ TEST_P(VerbsOfABasesSkill, CancelledItSaysThatItStands) {
     EXPECT_LT(speed_m_s(), kStill_m_s);
     EXPECT_EQ(rounds_->bridge_side->stops(), 0);
   });
+}
+
+TEST_P(VerbsOfABasesSkill, PausedItMayStillBeCancelled) {
+  int paused = 0;
+  at_each_moment([&] {
+    ASSERT_TRUE(rounds_->bridge->pause(kTask, now_, "test"));
+    await_paused();
+    if (ended(kTask)) return;
+    ++paused;
+    ASSERT_TRUE(rounds_->bridge->cancel(kTask, now_, "test"));
+    await(kTask, 12);
+    EXPECT_EQ(outcome(kTask), Outcome::kCancelled) << reason(kTask);
+    EXPECT_EQ(stop(), "CONFIRMED");
+    EXPECT_LT(speed_m_s(), kStill_m_s);
+    EXPECT_EQ(rounds_->bridge_side->stops(), 0);
+  });
+  EXPECT_GT(paused, 0) << "it has no safe point";
 }
 
 TEST_P(VerbsOfABasesSkill, HaltedItStandsAtOnceAndTheNextTaskGoesOn) {

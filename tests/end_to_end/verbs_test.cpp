@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <ostream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/run_kit.hpp"
@@ -49,6 +50,13 @@ constexpr Use kUses[] = {
     {"servo", R"([{"skill":"servo","arguments":{"positions":[0.5,-0.2067,0,-2.3596,0,2.1529,0.3]}}])"},
     {"yield", R"([{"skill":"yield","arguments":{"seconds":3}}])"},
 };
+
+// Why it does not; empty: it does.
+constexpr std::string_view never_makes_way(std::string_view name) {
+  if (name == "detect") return "it needs nothing that others could";
+  if (name == "servo") return "it ends as soon as a task waits for the arm";
+  return {};
+}
 
 class VerbsOfASkill : public testing::TestWithParam<Use> {
  protected:
@@ -139,6 +147,7 @@ TEST_P(VerbsOfASkill, PausedAndResumedBeforeItStandsItGoesOn) {
 }
 
 TEST_P(VerbsOfASkill, ItMakesWayForAnUrgentTaskAndGoesOnByItself) {
+  std::size_t made_way = 0;
   at_each_moment([&](TaskRun& cell) {
     ASSERT_TRUE(cell.bridge().submit(
         R"({"id":"urgent","priority":95,"steps":[{"skill":"move_to","arguments":{"place":"home"}}]})", cell.now()));
@@ -147,8 +156,13 @@ TEST_P(VerbsOfASkill, ItMakesWayForAnUrgentTaskAndGoesOnByItself) {
     if (is_open(cell)) cell.await(id(), kLongest, [](Time) {});
     EXPECT_EQ(cell.journal().task(id()).value()->record.outcome->outcome, Outcome::kSucceeded) << cell.reason;
     EXPECT_EQ(cell.cerebellum().statistics().stops, 0u);
-    for (const bridge::Event& event : events(cell, "preempted")) EXPECT_EQ(event.detail.at("stop"), "CONFIRMED");
+    const std::vector<bridge::Event> preempted = events(cell, "preempted");
+    for (const bridge::Event& event : preempted) EXPECT_EQ(event.detail.at("stop"), "CONFIRMED");
+    EXPECT_EQ(events(cell, "regained").size(), preempted.size());
+    made_way += preempted.size();
   });
+  const std::string_view why = never_makes_way(GetParam().name);
+  EXPECT_EQ(made_way == 0, !why.empty()) << (why.empty() ? "it keeps what others need" : why);
 }
 
 TEST_P(VerbsOfASkill, CancelledItSaysThatItStands) {
@@ -164,15 +178,18 @@ TEST_P(VerbsOfASkill, CancelledItSaysThatItStands) {
 }
 
 TEST_P(VerbsOfASkill, PausedItMayStillBeCancelled) {
+  int paused = 0;
   at_each_moment([&](TaskRun& cell) {
     ASSERT_TRUE(cell.bridge().pause(id(), cell.now(), "test"));
     while (is_open(cell) && events(cell, "paused").empty()) cell.step();
     if (!is_open(cell)) return;
+    ++paused;
     ASSERT_TRUE(cell.bridge().cancel(id(), cell.now(), "test"));
     cell.await(id(), 12s, [](Time) {});
     EXPECT_EQ(cell.outcome, Outcome::kCancelled) << cell.reason;
     EXPECT_EQ(cell.detail.at("stop"), "CONFIRMED");
   });
+  EXPECT_GT(paused, 0) << "it has no safe point";
 }
 
 TEST_P(VerbsOfASkill, HaltedItStandsAtOnceAndTheCellGoesOn) {
@@ -201,6 +218,25 @@ TEST(Verbs, NoSkillOfAnArmIsLeftOut) {
     const std::string_view use = name == "pick" || name == "place" ? "pick_and_place" : std::string_view(name);
     EXPECT_EQ(std::ranges::count(kUses, use, [](const Use& each) { return std::string_view(each.name); }), 1) << name;
   }
+}
+
+// Of a load that no arm bears.
+TEST(Verbs, WhatTheControlLoopRefusesIsToldInTheTasksStory) {
+  TaskRun cell(small_cell_with_block());
+  ASSERT_TRUE(cell.bridge().submit(
+      R"({"id":"one","priority":95,"steps":[{"skill":"move_to","arguments":{"place":"north"}}]})", {}));
+  const auto moves = [&] { return cell.cerebellum().state().speed.cwiseAbs().maxCoeff() > 0.1; };
+  while (!moves() && cell.now() < Time(kLongest)) cell.step();
+  cell.above().cell().arm.payload(1000, Vector3::Zero());
+  cell.await(kTask, kLongest, [](Time) {});
+  EXPECT_EQ(cell.outcome, Outcome::kSucceeded) << cell.reason << ": the bridge arms it again, and it goes on";
+  EXPECT_EQ(cell.cerebellum().statistics().stops, 1u);
+  const auto history = cell.journal().task(kTask);
+  std::vector<task::Json> stopped;
+  for (const bridge::Event& event : history.value()->events) {
+    if (event.kind == "stopped") stopped.push_back(event.detail);
+  }
+  EXPECT_EQ(stopped, (std::vector<task::Json>{{{"by", "the control loop"}, {"cause", "bad command"}}}));
 }
 
 // What had left the cups before the halt has arrived, and what had not is still held.

@@ -254,7 +254,7 @@ TEST_F(Visitor, ChecksAndShortensTheJournalAfterwards) {
   EXPECT_EQ(journal({"check", folder_ / "j.db"}).code, 0);
   EXPECT_THAT(show("P000001").out, AllOf(HasSubstr("SUCCEEDED"), Not(HasSubstr("attempt"))));
   EXPECT_EQ(journal({"upgrade", folder_ / "j.db"}).code, 0);
-  for (const char* word : {"check", "compact", "upgrade"}) {
+  for (const char* word : {"check", "compact", "upgrade", "end"}) {
     const Finished missing = journal({word, folder_ / "none.db"});
     EXPECT_EQ(missing.code, 2) << word;
     EXPECT_THAT(missing.err, HasSubstr("there is no such journal")) << word;
@@ -388,6 +388,36 @@ TEST_F(Visitor, StopsResetsAndArmsTheArm) {
   EXPECT_EQ(report_["parcels"]["missorted"], 0);
   EXPECT_EQ(report_["parcels"]["exceptions"]["undeserved"], 0) << "nothing has ridden by";
   EXPECT_EQ(report_["interventions"], 2) << "a stop and an emergency stop, each needed a person";
+}
+
+// Not only afterwards, from the journal.
+TEST_F(Visitor, WhoWatchesATaskHearsOfAnEmergencyStopWhileItLasts) {
+  const nlohmann::json waits{
+      {"id", "waits"},
+      {"tree",
+       {{"xml", R"(<root BTCPP_format="4"><BehaviorTree ID="t"><Sleep msec="3600000"/></BehaviorTree></root>)"}}}};
+  during_a_run([&] {
+    EXPECT_EQ(submit(waits.dump()).code, 0);
+    Running watch(folder_.path(), "watch", {"task", "watch", "waits", "--socket", folder_ / "s"});
+    const auto so_far = [&] { return read_text(folder_ / "watch.out"); };
+    const auto hears = [&](const char* what) {
+      for (int i = 0; i < 500 && so_far().find(what) == std::string::npos; ++i) (void)robot("show");
+      EXPECT_THAT(so_far(), HasSubstr(what));
+    };
+    hears("started");
+    EXPECT_EQ(robot("stop", {"--emergency"}).code, 0);
+    hears("held          stopped: emergency stop raised");
+    EXPECT_THAT(so_far(), Not(HasSubstr("released")));
+    EXPECT_EQ(robot("reset").code, 0);
+    EXPECT_EQ(robot("arm").code, 0);
+    hears("released");
+    EXPECT_EQ(run_pons({"task", "cancel", "waits", "--socket", folder_ / "s"}).code, 0);
+    const Finished watched = watch.wait();
+    EXPECT_EQ(watched.code, 0) << watched.err;
+    EXPECT_LT(watched.out.find("held "), watched.out.find("released"));
+    EXPECT_THAT(watched.out, HasSubstr("CANCELLED"));
+  });
+  EXPECT_EQ(report_["parcels"]["lost"], 0) << report_.dump(2);
 }
 
 // The brain asks for its parcels under their own names. One that is taken costs it a try, not the parcel.

@@ -407,6 +407,8 @@ EpisodeResult Episode::run() {
                        .accepted = referee_.heard(),
                        .processes = processes_,
                        .stops = stops_,
+                       .network = network_.losses(),
+                       .disk = disk_.losses(),
                        .outcomes = {},
                        .ends = steps_.ends(),
                        .passed = steps_.passed()};

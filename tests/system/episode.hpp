@@ -57,6 +57,8 @@ struct EpisodeResult {
   std::uint64_t digest = 0;
   Time lasted;
   std::size_t wishes = 0, accepted = 0, processes = 0, stops = 0;
+  NetworkLosses network;
+  Disk::Losses disk;
   std::map<task::Outcome, std::size_t> outcomes;
   std::map<Step, std::int64_t> ends, passed;
 };

@@ -11,12 +11,19 @@ constexpr double kUsually_s = 0.03, kLate_s = 10;
 }  // namespace
 
 int Network::copies() {
-  if (random_.uniform() < faults.lost) return 0;
-  return random_.uniform() < faults.repeated ? 2 : 1;
+  if (random_.uniform() < faults.lost) {
+    ++losses_.lost;
+    return 0;
+  }
+  const bool repeated = random_.uniform() < faults.repeated;
+  losses_.repeated += repeated ? 1 : 0;
+  return repeated ? 2 : 1;
 }
 
 Duration Network::takes() {
-  const double mean_s = random_.uniform() < faults.late ? kLate_s : kUsually_s;
+  const bool late = random_.uniform() < faults.late;
+  losses_.late += late ? 1 : 0;
+  const double mean_s = late ? kLate_s : kUsually_s;
   return from_s(-mean_s * std::log(1.0 - random_.uniform()));
 }
 

@@ -3,6 +3,7 @@
 // somebody listens.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -36,6 +37,11 @@ struct NetworkFaults {
   double lost = 0.05, repeated = 0.05, late = 0.03;
 };
 
+// What came of them, in questions and answers.
+struct NetworkLosses {
+  std::size_t lost = 0, repeated = 0, late = 0;
+};
+
 class Network {
  public:
   explicit Network(Random random) : random_(random) {}
@@ -49,6 +55,8 @@ class Network {
   void answer(const Question& question, const Json& json, Time now);
   [[nodiscard]] std::vector<Answer> take_answers(Time now);
 
+  [[nodiscard]] const NetworkLosses& losses() const { return losses_; }
+
   NetworkFaults faults;
   std::function<void(const Question&)> when_heard;
   std::function<void(const Question&, const Json&)> when_answered;
@@ -58,6 +66,7 @@ class Network {
   [[nodiscard]] Duration takes();
 
   Random random_;
+  NetworkLosses losses_;
   std::multimap<Time, Question> under_way_;
   std::multimap<Time, Answer> back_;
   std::vector<Question> heard_;

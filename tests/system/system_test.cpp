@@ -35,6 +35,8 @@ TEST(System, OneSeedIsOneStory) {
 // Hours of it: system_run --hours. These must have had everything in them, or they show little.
 TEST(System, WhateverGoesWrongNothingIsLostAndNothingDoneTwice) {
   std::size_t accepted = 0, processes = 0, stops = 0;
+  NetworkLosses network;
+  Disk::Losses disk;
   std::map<task::Outcome, std::size_t> outcomes;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const EpisodeResult result = run_episode(cellar(), of(seed, std::chrono::minutes(10)));
@@ -43,11 +45,21 @@ TEST(System, WhateverGoesWrongNothingIsLostAndNothingDoneTwice) {
     accepted += result.accepted;
     processes += result.processes;
     stops += result.stops;
+    network.lost += result.network.lost;
+    network.repeated += result.network.repeated;
+    network.late += result.network.late;
+    disk.lost += result.disk.lost;
+    disk.torn += result.disk.torn;
     for (const auto& [outcome, times] : result.outcomes) outcomes[outcome] += times;
   }
   EXPECT_GT(accepted, 1000U);
   EXPECT_GT(processes, 200U);
   EXPECT_GT(stops, 40U);
+  EXPECT_GT(network.lost, 1000U);
+  EXPECT_GT(network.repeated, 1000U);
+  EXPECT_GT(network.late, 500U);
+  EXPECT_GT(disk.lost, 100U);
+  EXPECT_GT(disk.torn, 0U);
   for (const task::Outcome outcome : {task::Outcome::kSucceeded, task::Outcome::kFailed, task::Outcome::kCancelled})
     EXPECT_GT(outcomes[outcome], 100U) << task::name(outcome);
 }
