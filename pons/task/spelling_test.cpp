@@ -21,7 +21,7 @@ TEST(Edits, AreTheFewestThatMakeOneOfTheOther) {
 TEST(Nearest, IsWhatMayHaveBeenMeant) {
   const std::vector<std::string> names{"book", "run", "replay", "recording"};
   EXPECT_EQ(nearest("runn", names), "run");
-  EXPECT_EQ(nearest("recrodnig", names), "recording");
+  EXPECT_EQ(nearest("recordnig", names), "recording");
   EXPECT_EQ(nearest("foo", names), "") << "two of three characters are not book's";
   EXPECT_EQ(nearest("", names), "");
   EXPECT_EQ(nearest("run", {}), "");

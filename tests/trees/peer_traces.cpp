@@ -1,4 +1,4 @@
-// How BehaviorTree.CPP 4 runs documents that random_trees.py makes: a line of standard output for each of standard
+// How BehaviorTree.CPP 4 runs documents, of random_trees.py or by hand: a line of standard output for each of standard
 // input, "DOCUMENT<tab>TRACE". Built by hand, beside an installed BehaviorTree.CPP:
 //   g++ -std=c++17 -O1 tests/trees/peer_traces.cpp -lbehaviortree_cpp -o peer_traces
 // tests/trees/traces.txt was recorded with 4.10.0.

@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""Random documents of the built-in nodes of BehaviorTree.CPP 4, one a line, for holding one engine against another.
+"""Random documents of built-in nodes of BehaviorTree.CPP 4, one a line, for holding one engine against another.
+
+Not among them: Timeout, Delay and Sleep, whose time passes otherwise; Switch4 to 6, LoopBool, SetBlackboard and
+UnsetBlackboard, of which traces.txt has documents that were written by hand.
 
 Every leaf and every condition adds a letter to the entry `log` when it acts; `t` is the number of the tick. Leaves that
 run for a while are Preconditions that say RUNNING until a tick has come.

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+#include <utility>
+
 namespace pons::bridge::tree {
 namespace {
 
@@ -35,7 +38,7 @@ Expected<void> Blackboard::put(std::int32_t slot, Slot as) {
 }
 
 Expected<void> Blackboard::write(std::int32_t slot, Value value) {
-  return put(slot, {std::move(value), (*this)[slot].writes + 1, true});
+  return put(slot, {std::move(value), std::abs((*this)[slot].writes) + 1, true});
 }
 
 void Blackboard::unset(std::int32_t slot) {

@@ -13,7 +13,8 @@
 
 namespace pons::bridge::tree {
 
-// One entry. `writes` counts every assignment, of the same value, too.
+// One entry. `writes` counts every assignment, of the same value, too. -1: a constant that nothing has written over,
+// which counts as written once, as there.
 struct Slot {
   Value value;
   std::int64_t writes = 0;

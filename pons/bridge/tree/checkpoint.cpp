@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "pons/bridge/tree/node_kinds.hpp"
 #include "pons/bridge/tree/tree.hpp"
 
 namespace pons::bridge::tree {
@@ -106,7 +107,7 @@ Json Tree::checkpoint() const {
   }
   for (std::size_t i = 0; i < board_.slots().size(); ++i) {
     const Slot& slot = board_.slots()[i];
-    if (slot.writes == 0 && slot.exists == program_->entries[i].exists) continue;
+    if (slot.writes <= 0 && slot.exists == program_->entries[i].exists) continue;
     entries.push_back({i, slot.exists ? 1 : 0, slot.writes, written(slot.value)});
   }
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
@@ -183,11 +184,13 @@ Expected<void> Tree::restore(const Json& checkpoint) {
     if (!numbers.next(i, 0, std::ssize(states_) - 1)) return damaged("nodes");
     State& state = made.state(i);
     const std::int32_t end = node(i).end;
-    const bool goes_round = node(i).kind == Kind::kRepeat || node(i).kind == Kind::kRetry;  // and counts to the last
+    const Kind kind = node(i).kind;
+    // Goes round and counts to the last, or waits for so many ms.
+    const bool far = kind == Kind::kRepeat || kind == Kind::kRetry || waits(kind);
     const bool good = numbers.next(state.status, most) && numbers.next(state.returned, most) &&
                       numbers.next(state.on) && numbers.next(state.completed) && numbers.next(state.child, -1, end) &&
-                      numbers.next(state.count, 0, goes_round ? INT32_MAX : INT32_MAX / 2) &&
-                      numbers.next(state.other, 0) && numbers.next(state.stamp, 0) && numbers.at_end();
+                      numbers.next(state.count, 0, far ? INT32_MAX : INT32_MAX / 2) && numbers.next(state.other, 0) &&
+                      numbers.next(state.stamp, 0) && numbers.at_end();
     if (!good || !is_child(i, state.child) || !knows_end(i, state)) return damaged("nodes");
   }
   for (const Json& list : part_of(checkpoint, "entries")) {

@@ -69,7 +69,7 @@ std::vector<std::string> documents() {
 
 TEST(TreeCheckpoint, TakenUpAgainEachTickItGoesOnAsIfNothingHadBeen) {
   const auto all = documents();
-  ASSERT_EQ(all.size(), 480U);
+  ASSERT_EQ(all.size(), 498U);
   for (const std::string& text : all) {
     const Made program = compiled(text);
     ASSERT_NE(program, nullptr);
@@ -112,6 +112,18 @@ TEST(TreeCheckpoint, ItsTimeGoesOn) {
     now += from_s(3600);  // what lies between two lives does not count
   }
   EXPECT_EQ(ticks, 16 + 2) << "100 ms and 50 ms, and the first tick of each further life";
+}
+
+TEST(TreeCheckpoint, SoDoesATimeThatIsAnotherByNow) {
+  const Made program =
+      compiled(in_document("<Sequence><Script code=\"n := 2147483647\"/><Parallel><Sleep msec=\"{n}\"/>"
+                           "<Script code=\"n = 0\"/></Parallel></Sequence>"));
+  const auto tree = begun(program), next = begun(program);
+  EXPECT_EQ(tree->tick(Time{}), Status::kRunning);
+  ASSERT_TRUE(next->restore(tree->checkpoint()));
+  EXPECT_EQ(next->tick(Time{}), Status::kRunning);
+  EXPECT_EQ(next->tick(Time(from_s(2'147'483))), Status::kRunning);
+  EXPECT_EQ(next->tick(Time(from_s(2'147'484))), Status::kSucceeded);
 }
 
 TEST(TreeCheckpoint, WhatADivisionByZeroLeavesIsKept) {

@@ -49,6 +49,10 @@ class Compiler {
     bool remaps_all = false;
     std::map<std::string, std::string, std::less<>> remaps;
     std::map<std::string, std::int32_t, std::less<>> own;
+    // Whether a name that is not its own yet means an entry of another blackboard.
+    [[nodiscard]] bool leads_out(std::string_view name) const {
+      return name.starts_with('@') || remaps.contains(name) || (remaps_all && !name.starts_with('_'));
+    }
   };
 
   void tell_unset();
@@ -95,6 +99,7 @@ Expected<std::shared_ptr<const Program>> Compiler::compile(std::string_view main
   if (auto done = tree(main, 0, {}); !done) return std::unexpected(done.error());
   program_.root = scopes_[0].own;
   tell_unset();
+  differences_.look(uses_);
   program_.differences = differences_.take();
   return std::make_shared<const Program>(std::move(program_));
 }
@@ -210,10 +215,9 @@ Expected<std::int32_t> Compiler::slot(std::int32_t scope, std::string_view name)
   if (name.empty()) return fail("an entry has a name");
   Scope& here = at(scope);
   if (const auto own = here.own.find(name); own != here.own.end()) return own->second;
-  const auto remapped = here.remaps.find(name);
-  const bool is_remapped = remapped != here.remaps.end();
-  if (is_remapped || (here.remaps_all && here.parent >= 0 && !name.starts_with('_'))) {
-    const auto found = slot(here.parent, is_remapped ? std::string_view(remapped->second) : name);
+  if (here.leads_out(name)) {
+    const auto remapped = here.remaps.find(name);
+    const auto found = slot(here.parent, remapped != here.remaps.end() ? std::string_view(remapped->second) : name);
     if (found) here.own.emplace(name, *found);  // the way is long where SubTrees are deep
     return found;
   }
@@ -268,7 +272,8 @@ Expected<void> Compiler::subtree(const Element& element, std::int32_t scope) {
 Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::string& value) {
   stir(program_.fingerprint, name);
   stir(program_.fingerprint, value);
-  if (const auto entry = entry_in(value, name); !entry.empty()) {
+  // "=" alone is a port's own name, and to a SubTree a text.
+  if (const auto entry = entry_in(value, name); !entry.empty() && value != "=") {
     inner.remaps.emplace(name, entry);
     return {};
   }
@@ -276,7 +281,7 @@ Expected<void> Compiler::give(Scope& inner, std::string_view name, const std::st
     return fail(fmt::format("the blackboards have more than {} entries", kMaxSlots));
   inner.own.emplace(name, static_cast<std::int32_t>(program_.entries.size()));
   program_.entries.push_back({inner.path + std::string(name), value_of_literal(value), true});
-  uses_.set(static_cast<std::int32_t>(program_.entries.size() - 1));
+  uses_.constant(static_cast<std::int32_t>(program_.entries.size() - 1), program_.entries.back().initial);
   return {};
 }
 
@@ -293,7 +298,7 @@ Expected<std::int32_t> Compiler::script(const std::string& text, std::int32_t sc
     parsed.error().where = where;
     return std::unexpected(parsed.error());
   }
-  uses_.by(*parsed, where);
+  uses_.by(*parsed, text, where);
   program_.scripts.push_back(*std::move(parsed));
   return static_cast<std::int32_t>(program_.scripts.size() - 1);
 }
@@ -338,6 +343,7 @@ Expected<void> Compiler::ports(const Element& element, const KindInfo& info, std
     if (!read) return std::unexpected(read.error());
     made.push_back(*read);
   }
+  if (node.kind == Kind::kSetBlackboard) uses_.set_to(made[1].slot, made[0], element.where);
   node.ports = static_cast<std::int32_t>(program_.ports.size());
   program_.ports.insert(program_.ports.end(), made.begin(), made.end());
   return {};
@@ -361,7 +367,12 @@ Expected<Port> Compiler::port(const Element& element, const PortType& type, cons
     if (node.kind == Kind::kSetBlackboard && !entry.empty()) return wrong("write the entry's name without braces");
     const auto found = slot(scope, entry.empty() ? std::string_view(text) : entry);
     if (!found) return wrong(found.error().what);
-    if (node.kind == Kind::kSetBlackboard) uses_.set(*found);
+    if (!entry.empty()) program_.entries[static_cast<std::size_t>(*found)].exists = true;
+    if (node.kind == Kind::kUnsetBlackboard) {
+      differences_.look_at_key(element, !entry.empty(), at(scope).leads_out(text));
+    } else if (!entry.empty()) {
+      uses_.watch(*found);
+    }
     return Port{.slot = *found};
   }
   if (type.of == Of::kQueue) {
@@ -375,11 +386,7 @@ Expected<Port> Compiler::port(const Element& element, const PortType& type, cons
     if (type.of == Of::kBoolean || type.of == Of::kStatus) return wrong("it must be a constant");
     const auto found = slot_of_port(scope, entry, element.where);
     if (!found) return std::unexpected(found.error());
-    if (type.of == Of::kOut) {
-      uses_.set(*found);
-    } else {
-      uses_.read(*found, element.where);
-    }
+    uses_.port(*found, type, info.loop, element.where);
     return Port{.slot = *found};
   }
   Port made;
@@ -438,9 +445,9 @@ Expected<void> Compiler::skill(const Element& element, std::int32_t scope, const
     if (!found) return std::unexpected(found.error());
     if (is_output) {
       use.outputs.push_back({name, *found});
-      uses_.set(*found);
+      uses_.output(*found);
     } else {
-      uses_.read(*found, element.where);
+      uses_.argument(*found, properties.at(name), element.where);
       use.bound.push_back({name, properties.at(name), *found});
     }
   }

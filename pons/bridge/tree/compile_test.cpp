@@ -368,6 +368,7 @@ TEST_F(Compiling, NamesAreOfTheBlackboardThatTheSubTreeIsGiven) {
   };
   EXPECT_EQ(after("", "n := 2"), R"({"_p":1,"n":1,"x":1})") << "its own";
   EXPECT_EQ(after("m=\"{n}\"", "m = 2"), R"({"_p":1,"n":2,"x":1})") << "remapped";
+  EXPECT_EQ(after("y=\"=\"", "@got := y"), R"({"_p":1,"got":"=","n":1,"x":1})") << "a text";
   EXPECT_EQ(after("n=\"{=}\"", "n = 2"), R"({"_p":1,"n":2,"x":1})") << "to its own name";
   EXPECT_EQ(after("n=\"3\"", "n += 2; @x = n"), R"({"_p":1,"n":1,"x":5})") << "a constant is the SubTree's own";
   EXPECT_EQ(after("_autoremap=\"true\"", "n = 2; x = 2"), R"({"_p":1,"n":2,"x":2})");
@@ -452,9 +453,11 @@ TEST_F(Compiling, EntriesAreSetUnsetAndSeenToChange) {
       <SetBlackboard value="1" output_key="a"/><SetBlackboard value="{a}" output_key="b"/>
       <WasEntryUpdated entry="{a}"/><WasEntryUpdated entry="{a}"/>
       <SetBlackboard value="1" output_key="a"/><Script code="seen := 1"/>
-      <UnsetBlackboard key="b"/><Fallback><SetBlackboard value="{b}" output_key="c"/><AlwaysSuccess/></Fallback>
-      </Sequence>)")),
+      <UnsetBlackboard key="b"/></Sequence>)")),
             R"({"a":"1","seen":1})");
+  EXPECT_EQ(blackboard_after(in_document(R"(<Fallback><Sequence><UnsetBlackboard key="b"/>
+      <SetBlackboard value="{b}" output_key="c"/></Sequence><AlwaysSuccess/></Fallback>)")),
+            "SetBlackboard reads 'b', which was unset; set it again before");
   const auto tree = tree_of(R"(<Repeat num_cycles="3"><Sequence><SetBlackboard value="same" output_key="a"/>
       <WasEntryUpdated entry="a"/></Sequence></Repeat>)");
   EXPECT_EQ(run(*tree), Status::kSucceeded) << "every time, though it is the same value";
@@ -467,12 +470,11 @@ TEST_F(Compiling, EntriesAreSetUnsetAndSeenToChange) {
 }
 
 TEST_F(Compiling, NumbersBeyondWhatANodeTakesAreRefusedWhenTheyAreRead) {
-  for (const char* number :
-       {"-9223372036854775808", "9223372036854775807", "-2147483648", "2147483648", "1.5", "many"}) {
+  for (const char* number : {"-9223372036854775808", "9223372036854775807", "-1", "2147483648", "1.5", "many"}) {
     const auto tree = tree_of(
         fmt::format(R"(<Sequence><SetBlackboard value="{}" output_key="n"/><Sleep msec="{{n}}"/></Sequence>)", number));
     EXPECT_EQ(run(*tree), Status::kFailed);
-    EXPECT_EQ(tree->result().reason, "Sleep is given text where a whole number is needed") << number;
+    EXPECT_EQ(tree->result().reason, "Sleep is given text where a whole number from 0 on is needed") << number;
   }
 }
 

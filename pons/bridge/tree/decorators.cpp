@@ -1,6 +1,7 @@
 // Nodes with one child.
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <utility>
 
 #include "pons/bridge/tree/tree.hpp"
@@ -97,7 +98,8 @@ NodeStatus Tree::keep_running(std::int32_t index) {
   return status == NodeStatus::kFailure ? status : NodeStatus::kRunning;
 }
 
-// `on`: its time runs, since `stamp`.
+// `on`: its time runs, since `stamp`, for `count` ms: as many as it was given then. What it is given later must be a
+// time all the same, as there.
 NodeStatus Tree::timeout(std::int32_t index) {
   State& state = this->state(index);
   const auto msec = integer(index, 0);
@@ -105,8 +107,9 @@ NodeStatus Tree::timeout(std::int32_t index) {
   if (!state.on) {
     state.on = true;
     state.stamp = clock_.count();
+    state.count = static_cast<std::int32_t>(*msec);
     state.status = NodeStatus::kRunning;
-  } else if (*msec > 0 && elapsed(index, *msec) && this->state(index + 1).status == NodeStatus::kRunning &&
+  } else if (state.count > 0 && elapsed(index, state.count) && this->state(index + 1).status == NodeStatus::kRunning &&
              !skill_has_ended(index + 1)) {
     state.on = false;
     reset_child(index);
@@ -129,9 +132,10 @@ NodeStatus Tree::delay(std::int32_t index) {
   if (!state.on) {
     state.on = true;
     state.stamp = clock_.count();
+    state.count = static_cast<std::int32_t>(*msec);
     state.status = NodeStatus::kRunning;
   }
-  if (!elapsed(index, *msec)) return NodeStatus::kRunning;
+  if (!elapsed(index, state.count)) return NodeStatus::kRunning;
   const NodeStatus status = tick_node(index + 1);
   if (has_ended(status)) {
     state.on = false;
@@ -261,7 +265,8 @@ Expected<void> Tree::queue_up(std::size_t loop, std::vector<Value> values) {
 bool Tree::was_updated(std::int32_t index) {
   const Slot& entry = board_[port(node(index), 0).slot];
   if (!entry.exists) return false;
-  return std::exchange(state(index).stamp, entry.writes) != entry.writes;
+  const std::int64_t writes = std::abs(entry.writes);
+  return std::exchange(state(index).stamp, writes) != writes;
 }
 
 // `on`: the child runs.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pons/bridge/tree/document.hpp"
+#include "pons/bridge/tree/entry_uses.hpp"
 #include "pons/bridge/tree/program.hpp"
 #include "pons/core/error.hpp"
 
@@ -25,6 +26,10 @@ class Differences {
   };
   // Of each sort of difference the first is told.
   void look(const Element& element, Kind kind, const Above& above);
+  // The key of an UnsetBlackboard: whether it is in braces, and whether it may name an entry of another blackboard.
+  void look_at_key(const Element& element, bool in_braces, bool leads_out);
+  // When all of the tree has been looked at.
+  void look(const EntryUses& uses);
   // An attribute that is no port's. What means nothing is told once for each name. Error: one that begins with an
   // underscore and is so near to a name that means something that it must be a slip.
   [[nodiscard]] Expected<void> look_at_attribute(const std::string& name, const std::string& where);
@@ -34,8 +39,21 @@ class Differences {
   [[nodiscard]] std::vector<std::string> take();
 
  private:
-  enum Told : std::uint8_t { kSkill = 1, kTime = 2, kPrecondition = 4, kReactive = 8, kException = 16, kBeside = 32 };
-  int told_ = 0;
+  enum class Sort : std::uint8_t {
+    kSkill,
+    kTime,
+    kPrecondition,
+    kReactive,
+    kException,
+    kBeside,
+    kKeyRead,
+    kKeyElsewhere,
+    kType,
+    kTwoTypes
+  };
+  void tell(Sort sort, std::string_view where, std::string_view what);
+
+  std::set<Sort> told_;
   std::set<std::string> strays_;  // attributes that were told of
   std::vector<std::string> lines_;
   std::size_t more_ = 0;

@@ -68,6 +68,7 @@ class Reader {
   fs::path folder_;  // that files may be included from; empty: none
   fs::path from_;    // of the file that is read
   std::set<fs::path> read_;
+  std::map<std::pair<std::string, std::string>, std::size_t> ports_;  // where each is in its model, by the two's names
   bool first_ = true;
 };
 
@@ -126,6 +127,11 @@ Expected<void> Reader::read(std::string_view text, const std::string& where) {
   }
   const char* const main = root->Attribute("main_tree_to_execute");
   if (std::exchange(first_, false) && main != nullptr) document.main = main;
+  // First what it includes, wherever that stands: what two files say of one port, this one says last.
+  for (auto* child = root->FirstChildElement("include"); child != nullptr;
+       child = child->NextSiblingElement("include")) {
+    if (auto done = include(*child, from_, where); !done) return done;
+  }
   int trees = 0;
   for (auto* child = root->FirstChildElement("BehaviorTree"); child != nullptr;
        child = child->NextSiblingElement("BehaviorTree"))
@@ -133,9 +139,8 @@ Expected<void> Reader::read(std::string_view text, const std::string& where) {
   for (auto* child = root->FirstChildElement(); child != nullptr; child = child->NextSiblingElement()) {
     const std::string_view tag = child->Name();
     Expected<void> done;
-    if (tag == "include") {
-      done = include(*child, from_, where);
-    } else if (tag == "BehaviorTree") {
+    if (tag == "include") continue;
+    if (tag == "BehaviorTree") {
       done = tree(*child, where, trees == 1);
     } else if (tag == "TreeNodesModel") {
       done = models(*child, where);
@@ -208,7 +213,8 @@ Expected<Element> Reader::node(const tinyxml2::XMLElement& element, const std::s
   return read;
 }
 
-// Of SubTrees only: what the other nodes' ports are, those know who have them.
+// Of SubTrees only: what the other nodes' ports are, those know who have them. Of a port that is there more than once
+// the last counts.
 Expected<void> Reader::models(const tinyxml2::XMLElement& element, const std::string& file) {
   for (auto* model = element.FirstChildElement("SubTree"); model != nullptr;
        model = model->NextSiblingElement("SubTree")) {
@@ -222,7 +228,9 @@ Expected<void> Reader::models(const tinyxml2::XMLElement& element, const std::st
       if (!name) return std::unexpected(name.error());
       const char* const value = port->Attribute("default");
       const bool given = value != nullptr && *value != '\0';
-      ports.push_back({*name, given ? std::optional<std::string>(value) : std::nullopt});
+      const auto [known, added] = ports_.try_emplace({*id, *name}, ports.size());
+      if (added) ports.push_back({*name, {}});
+      ports[known->second].value = given ? std::optional<std::string>(value) : std::nullopt;
     }
   }
   return {};

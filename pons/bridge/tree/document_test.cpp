@@ -158,6 +158,28 @@ TEST_F(TreeFiles, WhatIsIncludedIsReadOnce) {
   EXPECT_EQ(read->trees.at("B").where, "b.xml:1");
 }
 
+// Wherever the <include> stands.
+TEST_F(TreeFiles, OfAPortOfTwoFilesTheOwnDefaultCounts) {
+  const auto model = [](const std::string& ports) {
+    return "<TreeNodesModel><SubTree ID=\"A\">" + ports + "</SubTree></TreeNodesModel>";
+  };
+  const auto port = [](const char* name, const char* value) {
+    return fmt::format("<input_port name=\"{}\" default=\"{}\"/>", name, value);
+  };
+  write("a.xml", with(model(port("p", "a") + port("q", "a") + port("r", "a")), "A"));
+  write("b.xml", with(model(port("q", "b") + port("r", "b")), "B"));
+  const std::string own = model(port("p", "own") + port("r", ""));
+  const std::string includes = "<include path=\"a.xml\"/><include path=\"b.xml\"/>";
+  for (const std::string& text : {own + includes, includes + own}) {
+    write("main.xml", with(text, "Main"));
+    const auto read = read_document(folder_ / "main.xml");
+    ASSERT_TRUE(read) << read.error().line();
+    std::string ports;
+    for (const ModelPort& each : read->models.at("A")) ports += each.name + "=" + each.value.value_or("none") + " ";
+    EXPECT_EQ(ports, "p=own q=b r=none ");
+  }
+}
+
 TEST_F(TreeFiles, WhatLiesOutsideIsNotIncluded) {
   write("outside.xml", with("", "Outside"));
   write("trees2/a.xml", with("", "Beside"));

@@ -49,18 +49,31 @@ NodeStatus Tree::script_condition(std::int32_t index) {
 }
 
 NodeStatus Tree::set_blackboard(std::int32_t index) {
-  const Value* const given = value(port(node(index), 0));
+  const Port& from = port(node(index), 0);
+  // What a node names is there from the start, though it is not set: only what was unset is not, and to read that is an
+  // error there.
+  if (from.slot >= 0 && !board_[from.slot].exists) {
+    return broken({fmt::format("{} reads '{}', which was unset", program_->names[static_cast<std::size_t>(index)],
+                               program_->entries[static_cast<std::size_t>(from.slot)].name),
+                   {},
+                   "set it again before"});
+  }
+  const Value* const given = value(from);
   if (given == nullptr) return NodeStatus::kFailure;
   return write(port(node(index), 1).slot, *given) ? NodeStatus::kSuccess : NodeStatus::kBroken;
 }
 
+// For `count` ms: as many as it was given when it began.
 NodeStatus Tree::wait_out(std::int32_t index) {
   State& state = this->state(index);
   if (state.status != NodeStatus::kIdle && state.status != NodeStatus::kRunning) return state.status;
-  const auto msec = integer(index, 0);
-  if (!msec) return NodeStatus::kBroken;
-  if (state.status == NodeStatus::kIdle) state.stamp = clock_.count();
-  return elapsed(index, *msec) ? NodeStatus::kSuccess : NodeStatus::kRunning;
+  if (state.status == NodeStatus::kIdle) {
+    const auto msec = integer(index, 0);
+    if (!msec) return NodeStatus::kBroken;
+    state.stamp = clock_.count();
+    state.count = static_cast<std::int32_t>(*msec);
+  }
+  return elapsed(index, state.count) ? NodeStatus::kSuccess : NodeStatus::kRunning;
 }
 
 // ---- skills ----

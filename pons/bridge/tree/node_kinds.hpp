@@ -36,6 +36,10 @@ struct KindInfo {
   Loop::Of loop = Loop::Of::kText;
 };
 
+// What it is given is a time, in ms.
+[[nodiscard]] constexpr bool waits(Kind kind) {
+  return kind == Kind::kTimeout || kind == Kind::kDelay || kind == Kind::kSleep;
+}
 // nullptr: no such node.
 [[nodiscard]] const KindInfo* find_kind(std::string_view name);
 [[nodiscard]] std::span<const KindInfo> all_kinds();

@@ -169,18 +169,39 @@ TEST_F(SkillLeaves, SoManyResourcesOnly) {
 
 // ---- what of it is otherwise than in BehaviorTree.CPP ----
 
-TEST_F(SkillLeaves, EachSortOfDifferenceIsToldWithItsPlace) {
-  Actor pick("pick", {{}});
-  add(pick);
-  const auto told = [&](const std::string& nodes) {
+class Differing : public TreeTest {
+ protected:
+  Differing() {
+    task::SkillType pick = pick_.type();
+    pick.schema =
+        Json::parse(R"({"type":"object","properties":{"place":{"type":"string"},"mass_kg":{"type":"number"}}})");
+    pick.outputs = {"seen"};
+    skills_.add(pick);
+  }
+  // A line each.
+  std::string told_of(const std::string& text) {
     std::string lines;
-    const auto document = read_document(in_document(nodes), "test");
-    const auto program = compile(*document, "", skills_);
+    const auto document = read_document(text, "test");
+    const auto program = compile(document.value(), "", skills_);
     EXPECT_TRUE(program) << program.error().line();
-    for (const std::string& line : (*program)->differences) lines += line + "\n";
+    for (const std::string& line : program.value()->differences) lines += line + "\n";
     return lines;
-  };
-  using ::testing::HasSubstr;
+  }
+  std::string told(const std::string& nodes) { return told_of(in_document(nodes)); }
+  // Of such nodes in a SubTree, in line 2.
+  std::string told_within(const std::string& given, const std::string& nodes) {
+    return told_of(fmt::format(R"(<root BTCPP_format="4" main_tree_to_execute="Main"><BehaviorTree ID="Main"><Sequence>
+        <Script code="m := 1"/><SubTree ID="A" {}/></Sequence></BehaviorTree><BehaviorTree ID="A">{}</BehaviorTree></root>)",
+                               given, nodes));
+  }
+
+  Actor pick_{"pick", {{}}};
+};
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST_F(Differing, EachSortOfDifferenceIsToldWithItsPlace) {
   EXPECT_EQ(told("<Sequence><pick/><pick/><Repeat num_cycles=\"2\"><pick/></Repeat></Sequence>"), "");
   for (const char* const tag : {"Fallback", "ReactiveFallback", "Inverter", "ForceSuccess"})
     EXPECT_THAT(told(fmt::format("<{0}>\n<pick/></{0}>", tag)),
@@ -189,7 +210,118 @@ TEST_F(SkillLeaves, EachSortOfDifferenceIsToldWithItsPlace) {
   EXPECT_THAT(told("<Parallel>\n<pick/>\n<pick/></Parallel>"),
               HasSubstr("test:2: skills that run at the same time and need the same resource wait for one another"));
   EXPECT_THAT(told("<Timeout msec=\"9\"><pick/></Timeout>"), HasSubstr("leaves the world safe first"));
-  EXPECT_THAT(told("<Sleep msec=\"9\"/>"), HasSubstr("time stands while the task is paused"));
+  for (const char* const node : {"<Sleep msec=\"9\"/>", "<Delay delay_msec=\"9\"><AlwaysSuccess/></Delay>",
+                                 "<Timeout msec=\"9\"><AlwaysSuccess/></Timeout>"})
+    EXPECT_EQ(told(node), "test:1: time stands while the task is paused, and while the robot is stopped\n");
+  const std::string guarded = "\n<Precondition if=\"true\"><AlwaysSuccess/></Precondition>\n";
+  EXPECT_EQ(told("<Sequence>" + guarded + "</Sequence>"), "") << "nobody halts it";
+  EXPECT_EQ(told("<ReactiveSequence>" + guarded + guarded + "</ReactiveSequence>"),
+            "test:2: a Precondition that was halted asks its condition anew; there it goes on as if that held\n");
+  const std::string yields = "<AsyncSequence><AlwaysSuccess/></AsyncSequence>";
+  EXPECT_EQ(told("<ReactiveSequence>" + yields + "</ReactiveSequence>"), "");
+  EXPECT_EQ(told("<Sequence>\n<ReactiveSequence>" + yields + yields + "</ReactiveSequence></Sequence>"),
+            "test:2: more than one AsyncSequence in a ReactiveSequence; BehaviorTree.CPP refuses that\n");
+  EXPECT_THAT(told("<UnsetBlackboard key=\"{a}\"/>"), HasSubstr("key in braces"));
+  EXPECT_THAT(told("<UnsetBlackboard key=\"@a\"/>"), HasSubstr("only one of the tree's own blackboard"));
+  EXPECT_THAT(told("<Sequence><Script code=\"a := 1\"/><SetBlackboard value=\"2\" output_key=\"a\"/></Sequence>"),
+              HasSubstr("an entry holds whatever is written to it"));
+  EXPECT_THAT(told("<Repeat num_cycles=\"{a}\"><Sleep msec=\"{a}\"/></Repeat>"), HasSubstr("of two types"));
+}
+
+TEST_F(Differing, AnUnsetBlackboardIsToldWhereItsKeyIsReadThereOrLeadsOut) {
+  const std::string key = "<UnsetBlackboard key=\"{}\"/>";
+  const auto unset = [&](const std::string& name) { return fmt::format(fmt::runtime(key), name); };
+  EXPECT_EQ(told(unset("a")), "");
+  EXPECT_EQ(
+      told("<Sequence>\n" + unset("{a}") + "\n" + unset("{b}") + "</Sequence>"),
+      "test:2: an UnsetBlackboard's key in braces names what is unset; there the entry is read, and what it holds "
+      "is the name\n");
+  const std::string elsewhere =
+      "test:2: UnsetBlackboard unsets an entry wherever it stands; there only one of the tree's own blackboard\n";
+  EXPECT_EQ(told("<Sequence>\n" + unset("@a") + "\n" + unset("@b") + "</Sequence>"), elsewhere);
+  for (const char* const given : {"", "a=\"1\"", "b=\"{m}\"", "_autoremap=\"false\""})
+    EXPECT_EQ(told_within(given, unset("a")), "") << given;
+  for (const char* const given : {"a=\"{m}\"", "a=\"{=}\"", "_autoremap=\"true\""})
+    EXPECT_EQ(told_within(given, unset("a")), elsewhere) << given;
+  EXPECT_EQ(told_within("_autoremap=\"true\"", unset("_a")), "") << "private";
+}
+
+TEST_F(Differing, WhatIsWrittenIsToldWhereTheEntryHasATypeThere) {
+  const auto differs = [this](const std::string& nodes) {
+    const std::string lines = told("<Sequence>" + nodes + "</Sequence>");
+    return lines.contains("test:1: an entry holds whatever is written to it; there it keeps the type");
+  };
+  const std::string number = "<SetBlackboard value=\"5\" output_key=\"a\"/>";
+  const std::string real = "<SetBlackboard value=\"5.5\" output_key=\"a\"/>";
+  const std::string text = "<SetBlackboard value=\"x\" output_key=\"a\"/>";
+  const std::string copy = "<SetBlackboard value=\"{b}\" output_key=\"a\"/>";
+  const std::string is_number = "<Script code=\"b := 1; b += 1\"/>", is_text = "<Script code=\"b := 'x'\"/>";
+  const std::string wait = "<Sleep msec=\"{a}\"/>", use = "<Script code=\"c := a + 1\"/>";
+  const std::string watch = "<WasEntryUpdated entry=\"{a}\"/>";
+  const std::string choose =
+      "<Switch2 variable=\"{a}\" case_1=\"x\" case_2=\"y\"><AlwaysSuccess/><AlwaysSuccess/>"
+      "<AlwaysSuccess/></Switch2>";
+  const auto loop = [](const std::string& of) {
+    return fmt::format("<Loop{0} queue=\"1\" value=\"{{a}}\"><AlwaysSuccess/></Loop{0}>", of);
+  };
+  for (const std::string& alike :
+       {number + text, number + use, number + wait, text + choose, loop("String") + text, loop("Int") + use,
+        loop("Double") + real, loop("Bool") + "<SetBlackboard value=\"true\" output_key=\"a\"/>",
+        number + "<Script code=\"a += 'x'\"/>", number + "<WasEntryUpdated entry=\"a\"/>",
+        "<pick place=\"{a}\"/>" + text, "<pick mass_kg=\"{a}\"/>" + number, "<pick mass_kg=\"{a}\"/>" + text,
+        "<pick mass_kg=\"{b}\"/><pick mass_kg=\"{a}\"/>" + copy, is_number + copy, is_number + copy + use,
+        is_number + "<Script code=\"a := 2\"/>" + copy, "<Script code=\"a := 2; c := 'a = 5'; d := a == 'x'\"/>" + wait,
+        "<Script code=\"a := 2\"/>" + watch})
+    EXPECT_FALSE(differs(alike)) << alike;
+  for (const std::string& otherwise : {number + wait + use,
+                                       real + wait,
+                                       text + wait,
+                                       loop("Double") + text,
+                                       loop("Bool") + text,
+                                       number + "<pick mass_kg=\"{a}\"/>" + use,
+                                       number + "<pick seen=\"{a}\"/>" + use,
+                                       "<Script code=\"a := ''\"/>" + text,
+                                       text + "<SetBlackboard value=\"{a}\" output_key=\"c\"/>",
+                                       text + "<LoopString queue=\"{a}\" value=\"{v}\"><AlwaysSuccess/></LoopString>",
+                                       text + watch,
+                                       copy,
+                                       is_text + copy,
+                                       is_number + copy + number,
+                                       is_number + copy + wait,
+                                       is_number + copy + choose,
+                                       loop("Double") + number + use,
+                                       "<Script code=\"c := 1; a := 'x'\"/>" + wait,
+                                       "<Script code=\"a = 'x'\"/>" + watch,
+                                       "<Script code=\"a := 1\"/>" + loop("Double")})
+    EXPECT_TRUE(differs(otherwise)) << otherwise;
+  EXPECT_THAT(told_within("a=\"x\"", text), HasSubstr("test:2: an entry holds"));
+  EXPECT_THAT(told_within("a=\"1\"", number), Not(HasSubstr("an entry holds")));
+  EXPECT_THAT(told_within("a=\"1\"", "<Sequence>" + number + use + "</Sequence>"), HasSubstr("test:2: an entry holds"));
+}
+
+TEST_F(Differing, AnEntryOfTwoTypesIsTold) {
+  const std::string line =
+      "test:2: an entry is of two types, by its ports or as a SubTree's constant (unsigned and int, say); "
+      "BehaviorTree.CPP refuses that, or ends the tree\n";
+  const std::string wait = "<Sleep msec=\"{a}\"/>", repeat = "<Repeat num_cycles=\"{a}\">\n" + wait + "</Repeat>";
+  EXPECT_THAT(told(repeat), HasSubstr(line));
+  EXPECT_THAT(told_within("a=\"1\"", wait), HasSubstr(line));
+  for (const char* const loop : {"LoopInt", "LoopDouble", "LoopBool"})
+    EXPECT_THAT(told(fmt::format("<{0} queue=\"1\" value=\"{{a}}\">\n{1}</{0}>", loop, wait)), HasSubstr(line));
+  EXPECT_THAT(told("<Switch2 variable=\"{a}\" case_1=\"1\" case_2=\"2\"><AlwaysSuccess/><AlwaysSuccess/>\n"
+                   "<LoopInt queue=\"1\" value=\"{a}\"><AlwaysSuccess/></LoopInt></Switch2>"),
+              HasSubstr(line));
+  EXPECT_THAT(told("<LoopInt queue=\"1\" value=\"{a}\">\n<Switch2 variable=\"{a}\" case_1=\"1\" case_2=\"2\">"
+                   "<AlwaysSuccess/><AlwaysSuccess/><AlwaysSuccess/></Switch2></LoopInt>"),
+              HasSubstr(line));
+  for (const std::string& one : std::vector<std::string>{
+           "<LoopString queue=\"1\" value=\"{a}\">" + wait + "</LoopString>",
+           "<Sequence>" + wait + wait + "</Sequence>",
+           "<LoopInt queue=\"1\" value=\"{a}\"><Repeat num_cycles=\"{a}\"><AlwaysSuccess/></Repeat></LoopInt>",
+           "<Sequence><pick mass_kg=\"{a}\" place=\"{b}\"/>" + wait + "</Sequence>",
+           "<LoopInt queue=\"1\" value=\"{a}\"><SetBlackboard value=\"{a}\" output_key=\"b\"/></LoopInt>"})
+    EXPECT_THAT(told(one), Not(HasSubstr("two types"))) << one;
+  EXPECT_THAT(told_within("a=\"x\"", wait), Not(HasSubstr("two types"))) << "a text is read as what a port takes";
 }
 
 }  // namespace

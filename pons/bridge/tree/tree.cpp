@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "pons/bridge/tree/node_kinds.hpp"
 #include "pons/task/json_text.hpp"
 
 namespace pons::bridge::tree {
@@ -14,7 +15,8 @@ namespace {
 std::vector<Slot> slots_of(const Program& program) {
   std::vector<Slot> slots;
   slots.reserve(program.entries.size());
-  for (const Entry& entry : program.entries) slots.push_back({entry.initial, 0, entry.exists});
+  for (const Entry& entry : program.entries)
+    slots.push_back({entry.initial, is_empty(entry.initial) ? 0 : -1, entry.exists});
   return slots;
 }
 
@@ -293,12 +295,13 @@ const Value* Tree::value(const Port& port) {
 std::optional<std::int64_t> Tree::integer(std::int32_t index, std::int32_t which) {
   const Value* const given = value(port(node(index), which));
   const auto number = given != nullptr ? integer_of(*given) : std::nullopt;
-  if (!number || *number > INT32_MAX || *number < -INT32_MAX) {
-    (void)broken(
-        {fmt::format("{} is given {} where a whole number is needed", program_->names[static_cast<std::size_t>(index)],
-                     given != nullptr ? kind_of(*given) : "nothing"),
-         {},
-         {}});
+  const bool time = waits(node(index).kind);
+  if (!number || *number > INT32_MAX || *number < (time ? 0 : -INT32_MAX)) {
+    (void)broken({fmt::format("{} is given {} where a whole number{} is needed",
+                              program_->names[static_cast<std::size_t>(index)],
+                              given != nullptr ? kind_of(*given) : "nothing", time ? " from 0 on" : ""),
+                  {},
+                  {}});
     return {};
   }
   return number;

@@ -284,6 +284,27 @@ TEST_F(SkillsInATree, AScriptThatGoesWrongWhileItIsHaltedBreaksTheTree) {
   EXPECT_TRUE(good_.log.started.empty());
 }
 
+TEST_F(SkillsInATree, ATimeIsAsLongAsItWasGivenWhenItBegan) {
+  // How many ticks a node takes that is given 50 ms; 20 ms later the entry is written again.
+  const auto ticks = [this](const std::string& node, const char* later) {
+    const auto tree = tree_of(fmt::format(R"(<Sequence><Script code="n := 50"/><ParallelAll max_failures="2">{}
+        <Sequence><Sleep msec="20"/><Script code="{}"/></Sequence></ParallelAll></Sequence>)",
+                                          node, later));
+    int count = 1;
+    while (tick(*tree) == Status::kRunning && count < 40) ++count;
+    return count;
+  };
+  for (const char* const node : {R"(<Sleep msec="{n}"/>)", R"(<Delay delay_msec="{n}"><AlwaysSuccess/></Delay>)",
+                                 R"(<Timeout msec="{n}"><Sleep msec="300"/></Timeout>)"}) {
+    for (const char* const later : {"n = 50", "n = 0", "n = 30", "n = 200"})
+      EXPECT_EQ(ticks(node, later), 6) << node << later;
+  }
+  EXPECT_EQ(ticks(R"(<Timeout msec="0"><Sleep msec="300"/></Timeout>)", "n = 1"), 31) << "never";
+  const auto negative = tree_of(R"(<Sequence><Script code="n := -5"/><Sleep msec="{n}"/></Sequence>)");
+  EXPECT_EQ(run(*negative), Status::kFailed);
+  EXPECT_EQ(negative->result().reason, "Sleep is given a number where a whole number from 0 on is needed");
+}
+
 // ---- cancel, halt ----
 
 TEST_F(SkillsInATree, CancelledItStartsNothingMore) {
