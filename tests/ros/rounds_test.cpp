@@ -228,15 +228,18 @@ TEST_F(RosRounds, DrivesWhereTheNewestGoalPoseSays) {
   std::vector<std::string> lines;
   ASSERT_TRUE(node_->subscribe<Log>("/rosout", kRosoutQos, [&](const Log& line) { lines.push_back(line.msg); }));
   int ended = 0;
-  ASSERT_TRUE(node_->subscribe<TaskEvent>("/pons/task_events", Qos{.depth = 100},
-                                          [&](const TaskEvent& event) { ended += event.kind == "ended" ? 1 : 0; }));
+  std::string story;
+  ASSERT_TRUE(node_->subscribe<TaskEvent>("/pons/task_events", Qos{.depth = 100}, [&](const TaskEvent& event) {
+    ended += event.kind == "ended" ? 1 : 0;
+    story += event.task + " " + event.text + "\n";
+  }));
   ASSERT_TRUE(spun([&] { return poses->matched() > 0 && hangs_.contains("base_link"); }));
   ASSERT_TRUE(poses->publish(on_map(5.6, 0, 0)));
   ASSERT_TRUE(spun([&] { return map_from_base().x > 0.2; })) << run_.err();
   const double driven_m = map_from_base().x;
   ASSERT_TRUE(poses->publish(on_map(1.0, 0.3, 0.5)));
   ASSERT_TRUE(spun([&] { return ended == 2; })) << map_from_base().x << ", " << map_from_base().y;
-  EXPECT_LT(off_m(1.0, 0.3), 0.05);
+  EXPECT_LT(off_m(1.0, 0.3), 0.05) << story;
   EXPECT_NEAR(map_from_base().yaw, 0.5, 0.05);
   for (const auto& [goal, why] : bad_goals()) ASSERT_TRUE(poses->publish(goal));
   ASSERT_TRUE(spun([&] { return run_.err().find("no room") != std::string::npos; })) << run_.err();
