@@ -8,7 +8,8 @@
  * can be done by the left arm, by either arm, by the left one with the zone between them, or by either one with that, or
  * needs the zone alone. At first one more task may run, which counts as much as any. The world changes at any time what
  * fits. Those that wait for the same are a lane, as they are there. How long anybody waits is claims.pml's matter: here
- * urgent ones come first, and otherwise who came first.
+ * urgent ones come first, and otherwise who came first. Nobody comes to count as urgent by its age, which has it take
+ * turns with those that never end (Arbiter.AllThatNeverEndHaveTheirTurns).
  *
  * Wrong variants, which the check must reject:
  *   LANE_ENDS       a lane is passed over when nobody in it can be granted anything, before one in it was found who fits

@@ -298,7 +298,7 @@ bool Arbiter::gives_way(const Entry& waits, Mask needs, std::vector<std::string>
     const int more = std::get<int>(entry.rank) - std::get<int>(waits.rank);  // that the waiting one counts
     const bool over = now_ - entry.since >= schedule_.ageing && now_ - waits.since >= schedule_.ageing;
     const bool alike = more == 0 && std::get<int>(waits.rank) == -kAged;
-    if (!(more > 0 && (urgent || over)) && !(alike && over)) return false;
+    if (!(more > 0 ? urgent || over : alike && over)) return false;
   }
   return true;
 }
