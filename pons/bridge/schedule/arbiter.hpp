@@ -39,10 +39,10 @@ struct Claim {
 // Seats are given in the same order. Trees may go round for ever, so seats are also shared by turns: who has waited for
 // one for `ageing` may have that of one that counts no more, and has had it for as long (models/seats.pml).
 //
-// add, remove, release and each task granted cost O(log n) of n waiting ones, grant() beside that O(m²) of the m
-// different sets of resources that are waited for. Where it is asked what fits, at most kLooks of those that wait for
-// the same are looked at in one grant(): the first, and as many from where the last one ended. So nobody waits for ever
-// behind those that do not fit.
+// Of n waiting ones, O(log n) are the cost of add, remove, release, of each task granted, and each time that one comes
+// to count more (about a hundred times in its life, at most). Besides, grant() costs O(m²) of the m different sets of
+// resources that are waited for. Where it is asked what fits, at most kLooks of those that wait for the same are looked
+// at in one grant(): the first, and as many from where the last one ended. So nobody waits behind those for ever.
 class Arbiter {
  public:
   static constexpr std::size_t kMaxResources = 64;
