@@ -321,12 +321,13 @@ Expected<void> BridgeHalf::open_journal(const BridgeOptions& options) {
     return refused(fmt::format("holds the run of a body that lives (--link {})", link));
   journal = std::move(*opened);
   if (!options.body) return {};
-  if (auto noted = journal->note(Time{}, kAttached, {{"body", body}, {"link", options.link}}); !noted) return noted;
-  // A bridge's name in a database is for good, and orders wait under it.
-  if (used) {
-    if (auto ended = bridge::end_with_body(*journal, Time{}); !ended) return ended;
-  }
-  return journal->commit();
+  // A bridge's name in a database is for good, and orders wait under it. What stood under the body before ends in the
+  // commit that says that this one has come, or neither does.
+  auto attached = used ? bridge::end_with_body(*journal, Time{}) : Expected<void>{};
+  if (attached) attached = journal->note(Time{}, kAttached, {{"body", body}, {"link", options.link}});
+  if (attached) attached = journal->commit();
+  if (!attached) journal->abandon();
+  return attached;
 }
 
 Expected<std::string> BridgeHalf::servo(const AxisVector& position, Time now) {

@@ -222,6 +222,7 @@ Expected<void> Rounds::review(const bridge::tree::Library& trees) const {
     };
     const auto program = review.check(*task, errand.at);
     if (!program) return refused(program.error());
+    if (auto given = bridge::Review::check_given(*task, program->get()); !given) return refused(given.error());
     if (auto asked = review.judge(*task, bridge::Review::uses(*task, program->get())); !asked)
       return refused(asked.error());
   }

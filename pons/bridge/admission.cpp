@@ -117,6 +117,7 @@ Expected<Bridge::Candidate> Bridge::examine(task::Task task, std::size_t others,
   if (closed_) return std::unexpected(*closed_);
   auto program = review_.check(task, now);
   if (!program) return std::unexpected(program.error());
+  if (auto given = Review::check_given(task, program->get()); !given) return std::unexpected(given.error());
   const std::vector<UseOf> uses = Review::uses(task, program->get());
   auto asked = review_.judge(task, uses);
   if (!asked) return std::unexpected(asked.error());

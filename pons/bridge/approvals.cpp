@@ -44,6 +44,18 @@ void Bridge::ask(Open& open, Asked asked, Time now) {
   park(open, now);
 }
 
+// Of one that another bridge has taken: also what was asked for then, though nobody can see now why.
+Asked Bridge::still_to_ask(Asked judged, const Story& story) const {
+  for (const Story::Wanted& wanted : story.wanted()) {
+    const world::Rule* const rule = review_.rules().find(wanted.rule);
+    const auto is_it = [&](const Leave& leave) { return leave.rule == rule && leave.use == wanted.use; };
+    if (rule != nullptr && !rule->approve.empty() && std::ranges::none_of(judged, is_it))
+      judged.push_back({rule, wanted.use});
+  }
+  std::erase_if(judged, [&](const Leave& leave) { return story.allowed().contains(Open::key(leave)); });
+  return judged;
+}
+
 Expected<void> Bridge::approve(std::string_view id, std::string_view tier, std::string_view by, Time now) {
   const auto found = find_open(id);
   if (!found) return std::unexpected(found.error());

@@ -283,6 +283,36 @@ TEST_F(Approvals, TheNextBridgeAsksAgainUnlessItWasAllowed) {
   EXPECT_TRUE(audit(*journal_).empty());
 }
 
+// It has no picture yet, by which it would ask of itself.
+TEST_F(Approvals, TheNextBridgeStillAsksWhatItCannotSeeTheReasonOf) {
+  open(asks());
+  masses_ = {{"crate", 3.0}};
+  ASSERT_TRUE(pick("a", "crate"));
+  ASSERT_TRUE(pick("b", "crate"));
+  ASSERT_TRUE(bridge_->approve("b", "operator", "Kim", now_));
+  ASSERT_TRUE(bridge_->commit(now_));
+  masses_ = Json::object();
+  for (int life = 0; life < 2; ++life) {
+    begin();
+    ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+    EXPECT_EQ(bridge_->state("a"), "asks a person");
+    EXPECT_EQ(bridge_->state("b"), "waiting");
+  }
+  masses_ = {{"crate", 3.0}};
+  ASSERT_TRUE(bridge_->approve("a", "operator", "Kim", now_));
+  const auto reports = run();
+  ASSERT_EQ(reports.size(), 2U);
+  for (const auto& report : reports) EXPECT_EQ(report.outcome, Outcome::kSucceeded) << report.reason;
+  // A rule that is no more asks nobody.
+  masses_ = {{"crate", 3.0}};
+  ASSERT_TRUE(pick("c", "crate"));
+  ASSERT_TRUE(bridge_->commit(now_));
+  review_.rules.clear();
+  begin();
+  ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
+  EXPECT_EQ(bridge_->state("c"), "waiting");
+}
+
 TEST_F(Approvals, OneThatHadBegunKeepsWhatWasAllowed) {
   open(asks());
   masses_ = {{"crate", 3.0}};

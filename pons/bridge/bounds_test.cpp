@@ -243,6 +243,7 @@ TEST_F(ManyWait, DeadlinesThatPassAtOnceAreWrittenAFewATickAndNoneOfThemBegins) 
   tick(5);
   EXPECT_EQ(bridge_->state("t0999"), "ending");
   EXPECT_TRUE(bridge_->cancel("t0999", now_, "as it ends"));
+  EXPECT_TRUE(recorded("t0999")) << "who asks hears of what is written";
   EXPECT_FALSE(bridge_->pause("t0999", now_, "lunch"));
   EXPECT_TRUE(bridge_->queue().empty());
   tick(20);

@@ -118,8 +118,7 @@ Expected<void> Bridge::take_up(const TaskRecord& record, std::shared_ptr<const t
       finish_unopened(record.task.id, task::Outcome::kFailed, judged.error().line(), now);
       return {};
     }
-    asked = *std::move(judged);
-    std::erase_if(asked, [&](const Leave& leave) { return story.allowed().contains(Open::key(leave)); });
+    asked = still_to_ask(*std::move(judged), story);
   }
   const std::size_t robot = robot_named(story.robot());
   const Resume& resume = resumes[std::min(robot, resumes.size() - 1)];

@@ -147,7 +147,7 @@ class Bridge {
   void refuse_new(std::optional<Error> why) { closed_ = std::move(why); }
 
   // Withheld, no task is given a resource, and none makes way for another: who needs some waits, and its time passes.
-  // Those that have them go on, and so do those that need none.
+  // Those that have them go on, and so do those that need none; but where all is withheld, none of these begins.
   void withhold(Arbiter::Withheld what) { arbiter_.withhold(what); }
 
   // A journal entry of no task; `order` is what it belongs to, if anything.
@@ -245,6 +245,7 @@ class Bridge {
                                              const Story& story, const Resume& resume, Time now);
   // approvals.cpp
   void ask(Open& open, Asked asked, Time now);
+  [[nodiscard]] Asked still_to_ask(Asked judged, const Story& story) const;
   void expire_asked(Time now);
   [[nodiscard]] Expected<void> permit(const std::string& id, const task::Step& use, Time now);
 

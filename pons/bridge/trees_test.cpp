@@ -117,11 +117,25 @@ TEST_F(TreesOfTasks, WhatCannotRunIsRefusedWithALineThatHelps) {
 }
 
 TEST_F(TreesOfTasks, AnArgumentThatIsNotSetFailsTheLeafAndTheTreeDealsWithIt) {
-  ASSERT_TRUE(submit_tree("T1", {{"name", "sort"}}));
+  ASSERT_TRUE(submit_tree("T1", {{"xml", R"(<root BTCPP_format="4"><BehaviorTree><Sequence>
+      <Fallback><AlwaysSuccess/><Script code="code := 'P1'"/></Fallback><pick object="{code}"/></Sequence>
+      </BehaviorTree></root>)"}}));
   const auto reports = run();
   EXPECT_EQ(reports.at(0).outcome, Outcome::kFailed);
   EXPECT_EQ(reports[0].reason, "pick/object: it is not set; set it before the skill starts");
   EXPECT_TRUE(pick_.log.started.empty());
+}
+
+// Of one that was taken before nobody asks: it may hold something, and may never come by what it lacks.
+TEST_F(TreesOfTasks, WhatNothingSetsHasToBeGivenWhenItIsAskedFor) {
+  const auto refused = submit_tree("T1", {{"name", "sort"}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().line(), "/tree/inputs: the tree reads 'code', which nothing in it sets; give it");
+  ASSERT_TRUE(journal_->accept({.id = "T2", .tree = task::TreeRequest{.name = "sort"}}, now_));
+  ASSERT_TRUE(journal_->commit());
+  recover(goes_on);
+  EXPECT_EQ(bridge_->state("T2"), "waiting");
+  EXPECT_EQ(run().at(0).reason, "pick/object: it is not set; set it before the skill starts");
 }
 
 TEST_F(TreesOfTasks, ABrokenFolderOfTreesIsRefusedWhole) {
@@ -130,7 +144,13 @@ TEST_F(TreesOfTasks, ABrokenFolderOfTreesIsRefusedWhole) {
   const auto loaded = trees.load(folder_ / "trees");
   ASSERT_FALSE(loaded);
   EXPECT_TRUE(trees.names().empty());
-  EXPECT_THAT(loaded.error().line(), HasSubstr("zzz.xml:1: a <BehaviorTree> has exactly one node in it"));
+  EXPECT_THAT(loaded.error().line(),
+              HasSubstr((folder_ / "trees/zzz.xml:1: a <BehaviorTree> has exactly one node in it").string()));
+  std::ofstream(folder_ / "trees/zzz.xml") << kSort;
+  const auto twice = trees.load(folder_ / "trees");
+  ASSERT_FALSE(twice);
+  EXPECT_EQ(twice.error().line(),
+            (folder_ / "trees/zzz.xml:3").string() + ": there is a tree 'sort' in sort.xml:3, too; rename one");
 }
 
 TEST_F(TreesOfTasks, AnUrgentOneOvertakesItAndItGoesOnByItself) {

@@ -202,8 +202,12 @@ Expected<void> Bridge::end(std::string_view id, Ending ending, Time now, std::st
   if (open.stage == Open::Stage::kRuns) {
     end_running(open, ending, now, reason);
   } else {
-    if (open.stage == Open::Stage::kLeaves) return {};  // as a running one that was told before
-    leave(open, task::Outcome::kCancelled, std::string(reason));
+    // One that leaves keeps its own reason; who asks hears of an end that is written.
+    if (open.stage == Open::Stage::kLeaves) {
+      std::erase(leaving_, open.task.id);
+    } else {
+      leave(open, task::Outcome::kCancelled, std::string(reason));
+    }
     close(open, now);
   }
   return {};

@@ -222,8 +222,8 @@ void BridgeSide::look_after_parts(Time now) {
 
 void BridgeSide::hold_back() {
   // What is begun goes on. A new task would be one more that a camera has to show the way to.
-  bridge_.withhold(vitals_.belt_unseen() || resting_ ? bridge::Arbiter::Withheld::kResources
-                                                     : bridge::Arbiter::Withheld::kNothing);
+  using enum bridge::Arbiter::Withheld;
+  bridge_.withhold(resting_ ? kAll : vitals_.belt_unseen() ? kResources : kNothing);
   if (resting_) {
     bridge_.refuse_new(Error{"the robot rests, and takes no tasks", "run", "have it go on, and send them again"});
     return;
@@ -363,7 +363,7 @@ void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBeli
 // Durable at once: a bridge that comes after this one must know what hangs there.
 Expected<void> BridgeSide::note_carried(Robot& robot, Time now) {
   Json carries = robot.skills.carries();
-  bridge_.load(!carries.is_null(), robot.skills.robot);
+  bridge_.load(carries.is_object() && !carries.value("gone", false), robot.skills.robot);
   if (carries == robot.carried) return {};
   const std::string code = task::text_of(carries.is_object() ? carries : robot.carried, "code");
   robot.carried = std::move(carries);

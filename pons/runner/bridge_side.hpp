@@ -51,7 +51,7 @@ class BridgeSide {
   // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
   void stop(Time now, const std::string& reason);
   [[nodiscard]] bool idle() const;
-  // Nothing new is decided, taken or begun, but for tasks that use no resource; the belt waits; tasks that run stand at
+  // Nothing new is decided, taken or begun; the belt waits; tasks that run stand at
   // their next safe point, and go on with go_on(). Either may be called again.
   void rest(Time now);
   void go_on(Time now);

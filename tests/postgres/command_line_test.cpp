@@ -151,6 +151,9 @@ TEST_F(CommandLine, WhatCannotBeIsSaid) {
   EXPECT_THAT(pons({"book", "list", folder_ / "day.db"}).err, HasSubstr("an order book lies in a PostgreSQL database"));
   write_text(folder_ / "late.json", R"({"id":"a","deadline_s":9,"steps":[{"skill":"fly"}]})");
   EXPECT_THAT(pons({"book", "submit", place_, folder_ / "late.json"}).err, HasSubstr("an order has no deadline"));
+  // As it stands, it is short enough; with what it leaves out, no bridge takes it.
+  write_text(folder_ / "long.json", R"({"id":"a","tree":{"xml":")" + std::string(64 * 1024 - 32, ' ') + R"("}})");
+  EXPECT_THAT(pons({"book", "submit", place_, folder_ / "long.json"}).err, HasSubstr("send at most 65536 bytes"));
   EXPECT_THAT(pons({"run", "small_cell", "--parcels", "1", "--journal", place_ + "#No"}).err,
               HasSubstr("no name that a bridge can have"));
 }

@@ -7,6 +7,7 @@
 #include "pons/bridge/journal/layout.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/bridge/journal/postgres.hpp"
+#include "pons/task/json_text.hpp"
 
 namespace pons::bridge {
 
@@ -49,6 +50,10 @@ Expected<Accepted> OrderBook::submit(const task::Task& task) {
   if (task.deadline)
     return fail("an order has no deadline", "/deadline_s", "it would count from the begin of some bridge's run");
   const std::string body = task::to_json(task).dump();
+  if (body.size() > task::kMaxJsonBytes) {
+    return fail(fmt::format("{} bytes of JSON, with what it does not say itself", body.size()), {},
+                fmt::format("send at most {} bytes", task::kMaxJsonBytes));
+  }
   auto insert = impl_->database->prepare(
       "INSERT INTO pons.book(id, priority, body) VALUES(?1, ?2, ?3) ON CONFLICT (id) DO NOTHING RETURNING number");
   if (!insert) return std::unexpected(insert.error());

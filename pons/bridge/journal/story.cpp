@@ -67,12 +67,8 @@ Expected<void> Story::take(const Event& event) {
   }
   if (event.kind == kPreemptedEvent) handed_over_ = event.sequence;
   if (event.kind == kRegainedEvent || event.kind == kAttemptEvent) handed_over_ = 0;
-  if (event.kind == kAllowedEvent && event.detail.is_object()) {
-    for (const Json& use : event.detail.value("uses", Json::array())) {
-      if (use.is_string()) allowed_.insert(use.get<std::string>());
-    }
-    allowances_.insert(event.sequence);
-  }
+  if (event.kind == kAskedEvent && event.detail.is_object()) take_asked(event);
+  if (event.kind == kAllowedEvent && event.detail.is_object()) take_allowed(event);
   // What the bridge before was at, nobody saw end.
   if (event.kind == kResumedEvent) trying_.clear();
   if (event.kind == kCheckpointEvent) checkpoint_ = event.detail;
@@ -143,6 +139,19 @@ Expected<void> Story::take_end(const Event& event) {
     return impossible(event, fmt::format("says SUCCEEDED while leaf {} goes on", trying_.begin()->first));
   ended_ = true;
   return {};
+}
+
+void Story::take_asked(const Event& event) {
+  wanted_.clear();
+  for (const Json& one : event.detail.value("wanted", Json::array()))
+    wanted_.push_back({task::text_of(one, "rule"), task::text_of(one, "use")});
+}
+
+void Story::take_allowed(const Event& event) {
+  for (const Json& use : event.detail.value("uses", Json::array())) {
+    if (use.is_string()) allowed_.insert(use.get<std::string>());
+  }
+  allowances_.insert(event.sequence);
 }
 
 std::set<std::int64_t> Story::rests_on() const {

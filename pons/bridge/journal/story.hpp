@@ -51,7 +51,11 @@ class Story {
   [[nodiscard]] const std::string& paused_for() const { return paused_for_; }  // the reason
   // Why it was told to end, if it was.
   [[nodiscard]] const std::optional<std::string>& ending() const { return ending_; }
-  // What a person was asked for, and has allowed: rule, skill and arguments.
+  // What a person was asked for last, and what any has allowed: rule, skill and arguments.
+  struct Wanted {
+    std::string rule, use;
+  };
+  [[nodiscard]] const std::vector<Wanted>& wanted() const { return wanted_; }
   [[nodiscard]] const std::set<std::string>& allowed() const { return allowed_; }
   // It was preempted and has not gone on: what it had begun stands at a safe point, with nothing in use.
   [[nodiscard]] bool handed_over() const { return handed_over_ > 0; }
@@ -76,12 +80,15 @@ class Story {
   [[nodiscard]] Expected<void> take_attempt_end(const Event& event);
   [[nodiscard]] Expected<void> take_found_done(const Event& event);
   [[nodiscard]] Expected<void> take_end(const Event& event);
+  void take_asked(const Event& event);
+  void take_allowed(const Event& event);
 
   std::size_t steps_ = 0;
   std::size_t done_ = 0;
   std::string robot_;
   std::map<std::size_t, Trying> trying_;
   Json checkpoint_;
+  std::vector<Wanted> wanted_;
   std::set<std::string> allowed_;
   std::set<std::int64_t> allowances_;  // the events that say so
   std::optional<std::string> ending_;

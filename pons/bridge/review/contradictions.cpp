@@ -64,7 +64,14 @@ Expected<void> Contradictions::claim(const task::Task& task, std::span<const Use
                     other->task == task.id ? "leave one of them out" : "leave it out, or cancel the other task");
       }
       Claim claim{std::move(said.about), std::move(said.says)};
-      if (!claimed_by_[task.id].insert(claim).second) continue;
+      std::set<Claim>& all = claimed_by_[task.id];
+      if (all.size() >= kMost && !all.contains(claim)) {
+        for (const Claim& each : made) drop(task.id, each);
+        return fail(fmt::format("the task has said {} different things of what others may contradict ({})", kMost,
+                                said.kind->name),
+                    use.where, "divide it");
+      }
+      if (!all.insert(claim).second) continue;
       claims_[claim.about][claim.says].insert(task.id);
       made.push_back(std::move(claim));
     }

@@ -27,8 +27,11 @@ class Contradictions {
   Contradictions() = default;
   explicit Contradictions(std::vector<world::Contradiction> kinds) : kinds_(std::move(kinds)) {}
 
+  static constexpr std::size_t kMost = 1024;  // different claims of a task: a tree may go round for weeks
+
   // Claims what the uses do, O(log n) each. Of a tree, only some of them will come to pass: among themselves they may
-  // say what they like. Error: another task, or an earlier step, says otherwise; then nothing of this call is claimed.
+  // say what they like. Errors: another task, or an earlier step, says otherwise; it claims too much. Then nothing of
+  // this call is claimed.
   [[nodiscard]] Expected<void> claim(const task::Task& task, std::span<const UseOf> uses);
   // Of a task that has ended; nothing when it claims nothing.
   void release(std::string_view task);

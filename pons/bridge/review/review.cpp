@@ -122,6 +122,16 @@ Expected<std::shared_ptr<const tree::Program>> Review::check(const task::Task& t
   return program;
 }
 
+Expected<void> Review::check_given(const task::Task& task, const tree::Program* program) {
+  if (program == nullptr) return {};
+  for (const std::string& entry : program->needs) {
+    if (task.tree->inputs.contains(entry)) continue;
+    return fail(fmt::format("the tree reads '{}', which nothing in it sets", task::excerpt(entry)), "/tree/inputs",
+                "give it");
+  }
+  return {};
+}
+
 // ---- what may be done ----
 
 std::vector<UseOf> Review::uses(const task::Task& task, const tree::Program* program) {

@@ -39,7 +39,10 @@ class Review {
   // its resources against the world's, the deadline against `now`. Of a tree: that it can be run. Returns what the tree
   // runs as; of steps nullptr.
   [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> check(const task::Task& task, Time now) const;
-  // Likewise, of a task that was checked before. Error: its tree cannot be run any more.
+  // That a tree is given what nothing in it sets. Of a task that was taken earlier nobody asks: it may never come by
+  // what reads that.
+  [[nodiscard]] static Expected<void> check_given(const task::Task& task, const tree::Program* program);
+  // As check(), of a task that was checked before. Error: its tree cannot be run any more.
   [[nodiscard]] Expected<std::shared_ptr<const tree::Program>> program(const task::Task& task) const;
 
   // The uses of skills whose arguments are known before it runs: all of steps; of a tree those that take none from its
@@ -53,6 +56,7 @@ class Review {
                                             const task::SkillRegistry& skills);
 
   [[nodiscard]] Rules& rules() { return rules_; }
+  [[nodiscard]] const Rules& rules() const { return rules_; }
   [[nodiscard]] Contradictions& contradictions() { return contradictions_; }
 
  private:

@@ -227,6 +227,11 @@ Expected<Asked> Rules::check(const task::Task& task, const task::Step& use, task
   return asked;
 }
 
+const world::Rule* Rules::find(std::string_view name) const {
+  const auto found = std::ranges::find_if(rules_, [&](const Compiled& each) { return each.rule.name == name; });
+  return found == rules_.end() ? nullptr : &found->rule;
+}
+
 // ---- counted ----
 
 Expected<void> Rules::count(bool (*concerns)(const world::RateLimit&, const std::string&), const std::string& skill,

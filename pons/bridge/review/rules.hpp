@@ -58,6 +58,9 @@ class Rules {
   // What a person must allow first, by rules that live as long as this. Error: it is refused, and by which.
   [[nodiscard]] Expected<Asked> check(const task::Task& task, const task::Step& use, task::Moment moment) const;
 
+  // The rule of that name; nullptr: there is none.
+  [[nodiscard]] const world::Rule* find(std::string_view name) const;
+
   // Counts tasks that a sender brings, good ones or not. Error: too many, and when to ask again; then none is counted.
   [[nodiscard]] Expected<void> count_tasks(std::size_t tasks, Time now);
   // Counts a start of a skill; likewise.

@@ -209,6 +209,17 @@ TEST_F(ContradictionsTest, StepsAllComeToPassAndTheLeavesOfATreeDoNot) {
   EXPECT_FALSE(claim("b", {place("P1", "chute_1")})) << "one of the two would be another's";
 }
 
+TEST_F(ContradictionsTest, OfATreeThatGoesRoundForWeeksNoMoreIsKeptThanIsTold) {
+  tree_ = true;
+  for (std::size_t i = 0; i < Contradictions::kMost; ++i)
+    ASSERT_TRUE(claim("a", {place(std::to_string(i), "chute_1")})) << i;
+  const auto refused = claim("a", {place("one more", "chute_1")});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().what, HasSubstr("has said 1024 different things"));
+  EXPECT_TRUE(claim("a", {place("7", "chute_1")})) << "it has said so before";
+  EXPECT_TRUE(claim("b", {place("one more", "chute_2")}));
+}
+
 TEST_F(ContradictionsTest, TheSameAgainIsOneClaimAndARefusalTakesNoOlderOneAway) {
   EXPECT_TRUE(claim("a", {place("P1", "chute_1"), place("P1", "chute_1")}));
   EXPECT_TRUE(claim("b", {place("P2", "chute_2")}));

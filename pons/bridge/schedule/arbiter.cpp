@@ -193,7 +193,8 @@ std::vector<std::string> Arbiter::grant(Time now, const Fits& fits) {
     const Ways ways = entry->ways;  // the entry may be elsewhere soon
     Looked& there = looked[ways];
     there.id = entry->claim.id, there.rank = entry->rank;
-    const Mask barred = entry->claim.priority == kFirst ? 0 : withheld_;
+    const bool bars = withheld_ != Withheld::kNothing && entry->claim.priority != kFirst;
+    const Mask barred = bars ? ~Mask{0} : 0;
     const std::vector<std::size_t> fit = fitting(*entry, fits);
     const auto free = std::ranges::find_if(fit, [&](std::size_t way) { return is_free(ways[way], taken | barred); });
     if (free != fit.end()) {
@@ -223,19 +224,16 @@ void Arbiter::give(const Entry& waits, std::size_t way, std::vector<std::string>
   running_.insert(waiting_.extract(entry.claim.id));
 }
 
-bool Arbiter::is_free(Mask needs, Mask taken) const {
-  return needs != 0 ? (needs & taken) == 0 : seated_ < schedule_.running;
-}
+bool Arbiter::is_free(Mask needs, Mask taken) const { return needs != 0 ? (needs & taken) == 0 : has_seat(); }
 
 // Whether any of it may be given, or kept for who waits for all of it.
-bool Arbiter::has_left(Mask needs, Mask taken) const {
-  return needs != 0 ? (needs & ~taken) != 0 : seated_ < schedule_.running;
-}
+bool Arbiter::has_left(Mask needs, Mask taken) const { return needs != 0 ? (needs & ~taken) != 0 : has_seat(); }
+
+bool Arbiter::has_seat() const { return seated_ < schedule_.running && withheld_ != Withheld::kAll; }
 
 void Arbiter::withhold(Withheld what) {
-  const Mask withheld = what == Withheld::kResources ? ~Mask{0} : 0;
-  changed_ = changed_ || withheld != withheld_;
-  withheld_ = withheld;
+  changed_ = changed_ || what != withheld_;
+  withheld_ = what;
 }
 
 void Arbiter::give_back(const Entry& entry) {
@@ -324,9 +322,9 @@ std::vector<Arbiter::Preemption> Arbiter::preemptions(const Stays& stays, const 
   std::map<Ways, Looked> looked;
   while (const Entry* const entry = next(passed, looked)) {
     const Ways& ways = entry->ways;
-    if (ways == Ways{0}) free_seats(lanes_.find(ways)->second, stays, by);
+    if (ways == Ways{0} && withheld_ != Withheld::kAll) free_seats(lanes_.find(ways)->second, stays, by);
     // Who counts less than an urgent task, aged or not, takes nothing from anybody, nor does who is behind it.
-    if (ways == Ways{0} || withheld_ != 0 || -std::get<int>(entry->rank) < schedule_.urgent_priority) {
+    if (ways == Ways{0} || withheld_ != Withheld::kNothing || -std::get<int>(entry->rank) < schedule_.urgent_priority) {
       passed.insert(ways);
       continue;
     }

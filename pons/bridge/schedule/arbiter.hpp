@@ -66,9 +66,9 @@ class Arbiter {
   // A task that was granted waits again, for the same way, at the place in the queue that the age gives it with which
   // it was granted; its deadline was met.
   void hand_over(std::string_view id);
-  // Withheld, no resource is given from the next grant() on, but to those of kFirst, which may hold something; seats
-  // are.
-  enum class Withheld : std::uint8_t { kNothing, kResources };
+  // Withheld, no resource is given from the next grant() on, but to those of kFirst, which may hold something; nor, of
+  // all, a seat.
+  enum class Withheld : std::uint8_t { kNothing, kResources, kAll };
   void withhold(Withheld what);
   // A task in the queue leaves it, and comes back at the age that it had; whether it is granted, and its deadline, are
   // nobody's concern meanwhile. `now` as for grant().
@@ -140,6 +140,7 @@ class Arbiter {
   [[nodiscard]] bool gives_way(const Entry& waits, Mask needs, std::vector<std::string>& holders) const;
   [[nodiscard]] bool is_free(Mask needs, Mask taken) const;
   [[nodiscard]] bool has_left(Mask needs, Mask taken) const;
+  [[nodiscard]] bool has_seat() const;
   void give_back(const Entry& entry);
   [[nodiscard]] bool gives_seat(const Entry& sits, const Entry& waits) const;
   void make_way(const Entry& waits, const std::vector<std::size_t>& fit, Mask& claimed,
@@ -153,7 +154,8 @@ class Arbiter {
   // At whom the looks of the last grant() ended that had not come to the lane's end. By id: it grows older.
   std::map<Ways, std::string> looked_to_;
   Agenda ageing_, deadlines_;
-  Mask held_ = 0, withheld_ = 0;
+  Mask held_ = 0;
+  Withheld withheld_ = Withheld::kNothing;
   int seated_ = 0;
   std::uint64_t added_ = 0;
   Time now_;

@@ -72,6 +72,23 @@ TEST(Arbiter, GivesNoResourceWhileTheyAreWithheld) {
   EXPECT_EQ(arbiter.grant(at(2)), Ids{"urgent"});
 }
 
+TEST(Arbiter, GivesNoSeatEitherWhileAllIsWithheld) {
+  world::Schedule one_seat;
+  one_seat.running = 1;
+  Arbiter arbiter({"arm"}, one_seat);
+  arbiter.add(claim("sits", 10, {}));
+  EXPECT_EQ(arbiter.grant({}), Ids{"sits"});
+  arbiter.withhold(Arbiter::Withheld::kAll);
+  arbiter.add(claim("urgent", 99, {}));
+  arbiter.add(claim("arm", 50, {"arm"}));
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{});
+  EXPECT_TRUE(arbiter.preemptions().empty()) << "nobody stands up for one that gets nothing";
+  arbiter.release("sits");
+  EXPECT_EQ(arbiter.grant(at(1)), Ids{});
+  arbiter.withhold(Arbiter::Withheld::kResources);
+  EXPECT_EQ(arbiter.grant(at(2)), Ids{"urgent"});
+}
+
 TEST(Arbiter, GivesAllOrNothing) {
   Arbiter arbiter({"arm", "camera"}, {});
   arbiter.add(claim("a", 50, {"arm"}));

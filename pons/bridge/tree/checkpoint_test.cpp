@@ -288,6 +288,19 @@ TEST_F(CheckpointsOfSkills, WhatRanIsBegunAnewAndItsAttemptsCount) {
   EXPECT_EQ(again_.log.started.size(), 3U);
 }
 
+// Cancelled once more, or it would run for good.
+TEST_F(CheckpointsOfSkills, WhatHadNoMoreTimeHasNoneInTheNextLife) {
+  Actor heavy("heavy", {{.ticks = kForEver, .ticks_after_cancel = kForEver},
+                        {.ticks = kForEver, .cancelled_end = ends(Status::kFailed, "let go")}});
+  add(heavy, 1, from_s(1));
+  const std::string nodes = "<heavy/>";
+  const auto tree = tree_of(nodes);
+  for (int i = 0; i < 150; ++i) EXPECT_EQ(tick(*tree), Status::kRunning);
+  const auto next = next_life(*tree, nodes);
+  EXPECT_EQ(run(*next, 20), Status::kFailed);
+  EXPECT_EQ(next->result().reason, "timed out after 1 s: let go");
+}
+
 TEST_F(CheckpointsOfSkills, WhatIsKnownToHaveEndedIsNotBegunAnew) {
   const std::string nodes = "<Sequence><good/><bad/></Sequence>";
   const auto fresh = tree_of(nodes), tree = tree_of(nodes);

@@ -146,7 +146,7 @@ std::optional<NodeStatus> Tree::begin(std::size_t step) {
     return broken(told.error());
   stop_.reset();
   leaf.last = {};
-  leaf.told_to_end = false;
+  leaf.told_to_end = leaf.expired = false;  // as a checkpoint may say; it has no more time than was left
   leaf.ending = Duration{0};
   leaf.skill = use.type->start(what->arguments, now_);
   if (!leaf.skill) {
@@ -198,7 +198,10 @@ NodeStatus Tree::skill_ended(std::size_t step) {
   if (leaf.expired) last.reason = fmt::format("timed out after {} s: {}", to_s(use.type->timeout), last.reason);
   last.status = Status::kFailed;
   failure_ = last;
-  return NodeStatus::kFailure;
+  if (!cancelled_) return NodeStatus::kFailure;
+  // What was broken off no node above makes good.
+  if (!broken_) broken_ = last;
+  return NodeStatus::kBroken;
 }
 
 void Tree::run_skills(Duration passed) {

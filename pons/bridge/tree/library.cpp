@@ -11,6 +11,16 @@ namespace pons::bridge::tree {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// A document knows its lines by the file's name alone.
+Error in_folder(const fs::path& folder, Error error) {
+  if (error.where.find('/') == error.where.npos) error.where = (folder / error.where).string();
+  return error;
+}
+
+}  // namespace
+
 Expected<void> Library::load(const fs::path& folder) {
   std::set<fs::path> files;
   std::error_code error;
@@ -25,14 +35,17 @@ Expected<void> Library::load(const fs::path& folder) {
   std::map<std::string, std::string> files_of;
   for (const fs::path& file : files) {
     const auto document = read_document(file);
-    if (!document) return std::unexpected(document.error());
+    if (!document) return std::unexpected(in_folder(folder, document.error()));
     for (const auto& [name, root] : document->trees) {
       // What another file includes is that file's as well.
       const auto [known, added] = files_of.emplace(name, root.where);
       if (!added && known->second == root.where) continue;
-      if (!added) return fail(fmt::format("there are two trees '{}'", task::excerpt(name)), root.where, "rename one");
+      if (!added) {
+        return fail(fmt::format("there is a tree '{}' in {}, too", task::excerpt(name), known->second),
+                    (folder / root.where).string(), "rename one");
+      }
       auto program = compile(*document, name, *skills_);
-      if (!program) return std::unexpected(program.error());
+      if (!program) return std::unexpected(in_folder(folder, program.error()));
       programs.emplace(name, *std::move(program));
     }
   }

@@ -111,7 +111,8 @@ Status Tree::ended(NodeStatus status) {
     result_ = broken_.value_or(Progress{Status::kFailed, "broken off", Json::object()});
   } else if (status == NodeStatus::kFailure) {
     const bool by_skill = failure_ && failed_ >= 0 && node(failed_).kind == Kind::kSkill;
-    const std::string where = failed_ < 0 ? "" : " at " + program_->names[static_cast<std::size_t>(failed_)];
+    const std::string where =
+        failed_ < 0 ? "" : fmt::format(" at '{}'", program_->names[static_cast<std::size_t>(failed_)]);
     result_ = by_skill ? *failure_ : Progress{Status::kFailed, "the tree has failed" + where, Json::object()};
   } else {
     result_ = {Status::kSucceeded, status == NodeStatus::kSkipped ? "skipped" : "", Json::object()};

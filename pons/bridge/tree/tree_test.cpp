@@ -79,12 +79,12 @@ TEST_F(SkillsInATree, ItTellsWhichNodeHasFailedWhereNoSkillHas) {
   for (const auto& [nodes, reason] :
        {std::pair{
             "<Sequence><ForceSuccess><bad/></ForceSuccess><ScriptCondition name=\"dry\" code=\"1 > 2\"/></Sequence>",
-            "the tree has failed at dry"},
-        std::pair{"<Inverter><good/></Inverter>", "the tree has failed at Inverter"},
-        std::pair{"<Timeout msec=\"50\"><Sleep msec=\"90\"/></Timeout>", "the tree has failed at Timeout"},
-        std::pair{"<Precondition if=\"false\"><good/></Precondition>", "the tree has failed at Precondition"},
+            "the tree has failed at 'dry'"},
+        std::pair{"<Inverter><good/></Inverter>", "the tree has failed at 'Inverter'"},
+        std::pair{"<Timeout msec=\"50\"><Sleep msec=\"90\"/></Timeout>", "the tree has failed at 'Timeout'"},
+        std::pair{"<Precondition if=\"false\"><good/></Precondition>", "the tree has failed at 'Precondition'"},
         std::pair{"<Sequence><Inverter><AlwaysSuccess/></Inverter><bad/></Sequence>",
-                  "the tree has failed at Inverter"},
+                  "the tree has failed at 'Inverter'"},
         std::pair{"<Fallback><AlwaysFailure/><bad/></Fallback>", "no"}}) {
     const auto tree = tree_of(nodes);
     EXPECT_EQ(run(*tree), Status::kFailed);
@@ -344,6 +344,25 @@ TEST_F(SkillsInATree, CancelledItTriesNotAgainAndTellsWhatWasBrokenOff) {
   between->cancel(now_);
   EXPECT_EQ(run(*between), Status::kFailed);
   EXPECT_EQ(again_.log.started.size(), 1u);
+}
+
+// A task that was told to end must not be told as done because a node above forgives.
+TEST_F(SkillsInATree, WhatWasBrokenOffNoNodeAboveMakesGood) {
+  Actor drops("drops", {{.ticks = kForEver, .cancelled_end = ends(Status::kFailed, "broken off")}});
+  add(drops);
+  for (const char* const nodes :
+       {"<ForceSuccess><drops/></ForceSuccess>", "<Fallback><drops/><AlwaysSuccess/></Fallback>",
+        "<Inverter><drops/></Inverter>", "<TryCatch><drops/><AlwaysSuccess/></TryCatch>",
+        "<Fallback><drops/><Script code=\"done := true\"/></Fallback>"}) {
+    for (const bool halts : {false, true}) {
+      const auto tree = tree_of(nodes);
+      for (int i = 0; i < 3; ++i) (void)tick(*tree);
+      halts ? tree->halt(now_) : tree->cancel(now_);
+      EXPECT_EQ(run(*tree), Status::kFailed) << nodes;
+      EXPECT_EQ(tree->result().reason, halts ? "halted" : "broken off") << nodes;
+      EXPECT_EQ(tree->blackboard().value("done", Json()), Json()) << "nothing goes on after it";
+    }
+  }
 }
 
 TEST_F(SkillsInATree, CancelledWhereNoSkillRunsItEndsAtOnce) {
