@@ -100,6 +100,7 @@ std::string carries(const Json& d) {
   const auto load = d.is_object() ? d.find("load") : d.end();
   if (load == d.end() || !load->is_object()) return "the cups hold nothing";
   const double mass_kg = number(*load, "mass_kg");
+  if (load->value("gone", false)) return fmt::format("the cups have lost {}", text(*load, "code"));
   return mass_kg > 0 ? fmt::format("the cups hold {}, {:.2f} kg", text(*load, "code"), mass_kg)
                      : fmt::format("the cups hold {}, not weighed yet", text(*load, "code"));
 }

@@ -35,6 +35,7 @@ TEST(StoryText, SaysWhatTheCupsHold) {
   EXPECT_EQ(told("carries", {{"load", nullptr}}), "the cups hold nothing");
   EXPECT_EQ(told("carries", {{"load", {{"code", "P1"}, {"mass_kg", 0.0}}}}), "the cups hold P1, not weighed yet");
   EXPECT_EQ(told("carries", {{"load", {{"code", "P1"}, {"mass_kg", 1.25}}}}), "the cups hold P1, 1.25 kg");
+  EXPECT_EQ(told("carries", {{"load", {{"code", "P1"}, {"mass_kg", 1.25}, {"gone", true}}}}), "the cups have lost P1");
 }
 
 TEST(StoryText, SaysHowATaskEnded) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "pons/core/random.hpp"
 
@@ -108,12 +109,28 @@ TEST_F(OnTheMap, TellsWhatTheMapDoesNotShow) {
   EXPECT_LT(off_m(), 0.03) << "and is not led astray by it";
 }
 
-TEST_F(OnTheMap, WithoutALidarItHasOdometryAndSaysHowUnsureThatIs) {
+TEST_F(OnTheMap, OfALidarThatShowsNothingItBelievesNothing) {
+  drive({0.1, 0});
+  const Time seen = localiser_.base()->stamp;
+  for (int i = 0; i < 10; ++i) {
+    RgbdFrame blind = scan();
+    std::fill(blind.depth_m.data(), blind.depth_m.data() + blind.depth_m.size(), 0.0F);
+    now_ += std::chrono::milliseconds(100);
+    wheels_.array() += 0.5;
+    localiser_.process(blind, {wheels_, 0});
+  }
+  EXPECT_EQ(localiser_.base()->stamp, seen) << "else it drives on as in an open hall";
+  drive({0.001, 0});
+  EXPECT_GT(localiser_.base()->stamp, seen);
+}
+
+TEST_F(OnTheMap, InAnOpenHallItHasOdometryAndSaysHowUnsureThatIs) {
   drive({0.1, 0});
   const double sure = localiser_.base()->covariance.trace();
   for (int i = 0; i < 50; ++i) {
     RgbdFrame blind = scan();
-    std::fill(blind.depth_m.data(), blind.depth_m.data() + blind.depth_m.size(), 0.0F);
+    std::fill(blind.depth_m.data(), blind.depth_m.data() + blind.depth_m.size(),
+              std::numeric_limits<float>::infinity());
     now_ += std::chrono::milliseconds(100);
     wheels_.array() += 0.5;
     localiser_.process(blind, {wheels_, 0});

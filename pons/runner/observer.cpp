@@ -78,8 +78,9 @@ Snapshot Observer::take_in(std::size_t camera) {
   RgbdFrame& frame = frames_[camera];
   frame.stamp = shot.stamp;
   perception_.process(frame, {shot.joint_position, shot.belt_travel_m});
-  if (shows_anything(frame)) shown_[camera] = shot.stamp;
-  if (world_.cameras[camera].watches == "belt") {
+  const bool shows = shows_anything(frame);
+  if (shows) shown_[camera] = shot.stamp;
+  if (shows && world_.cameras[camera].watches == "belt") {
     belt_seen_ = shot.stamp;
     if (perception_.sees_belt()) belt_clear_ = shot.stamp;
   }

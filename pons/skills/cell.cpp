@@ -28,7 +28,6 @@ constexpr double kBoldest = 0.5, kTimid = 0.97, kTimidAtLast = 0.9;
 constexpr double kSofter = 0.8;  // of the acceleration, when a load must be brought to rest
 constexpr int kFineCorrections = 5;
 constexpr double kUnsure_kg = 0.1;                    // the scale's
-constexpr std::uint32_t kFirstLeft = 0x8000'0000;     // tracks of what no camera has seen
 constexpr int kSeenBefore = 3;                        // at least: whoever asked for it trusted them
 constexpr double kStoodUp_m = 0.10;                   // of what leans, or lies on another, where that was not known
 constexpr double kBeside_m = 0.05, kBounces_m = 0.2;  // the belt, what falls: it comes to lie on it, or may
@@ -176,7 +175,7 @@ std::vector<task::Note> Cell::take_notes() {
 void Cell::left_on_belt(const Pose& world_from_tip, std::optional<double> top_z_m) {
   ObjectBelief object = held_at(*held, world_from_tip);
   object.world_from_top.translation().z() = top_z_m.value_or(world.belt.surface_z_m + object.size_m.z());
-  object.track = kFirstLeft + lefts_++;
+  object.track = strays->next_unseen_track();
   object.frames_seen = kSeenBefore;
   object.stamp = object.last_seen = now_;
   object.velocity_m_s.x() = belt_speed_m_s();
@@ -378,6 +377,7 @@ bool Cell::step_aside(Time now) {
 task::Chance Cell::chance(std::string_view code) const {
   const auto holds_it = [&](const Cell* other) { return other->held && other->held->code == code; };
   if (std::ranges::any_of(others_, holds_it)) return task::Chance::kGone;
+  if (!lifts && !world.next_arm.empty()) return task::Chance::kGone;
   const ObjectBelief* const object = find(code);
   if (object == nullptr) return task::Chance::kNow;
   const double x_m = object->world_from_top.translation().x();

@@ -249,7 +249,7 @@ class Cell {
   std::optional<Held> held;
   std::optional<Miss> missed;
   std::optional<Hooked> hooked;  // the last one
-  std::optional<Held> lost;      // from the cups in a stop, as long as nobody has told what became of it
+  std::optional<Held> lost;      // from the cups, as long as nobody has told what became of it
   std::optional<Time> lost_at;   // when; of what was lost before this bridge lived, nobody knows
   std::shared_ptr<Strays> strays = std::make_shared<Strays>();  // of all arms of a belt
   double grip_share = 1;  // of its force that a sealed cup holds now, by its vacuum: carries are as soft as that asks
@@ -289,7 +289,6 @@ class Cell {
   Fallen fallen_{view_end_m_.value_or(world.belt.x_end_m), world.belt.x_end_m};
   std::optional<Felt> felt_;                       // of the last one
   std::map<std::uint32_t, std::string> labelled_;  // codes by the track of what was seen since
-  std::uint32_t lefts_ = 0;
   std::optional<ObjectBelief> hidden_;
   struct Unseen {
     double from_m, height_m;  // its hindmost, and over the belt

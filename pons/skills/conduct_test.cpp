@@ -36,6 +36,7 @@ class ConductTest : public testing::Test {
 
   void tick() {
     now_ += std::chrono::milliseconds(10);
+    if (loop_is_gone_) return cell_.refresh(now_, {});
     const AxisState at = asked_ ? cell_.arm.planned(now_) : at_rest(world_.robot.home);
     link::State state;
     state.stamp = now_;
@@ -67,7 +68,7 @@ class ConductTest : public testing::Test {
   }
 
   Time now_ = Time(from_s(5));
-  bool asked_ = false;
+  bool asked_ = false, loop_is_gone_ = false;
   std::uint32_t vacuum_on_ = 0;
   link::SafetyState safety_ = link::SafetyState::kOperational;
   link::StopCause cause_ = link::StopCause::kNone;
@@ -88,6 +89,17 @@ TEST_F(ConductTest, ALookHandsNothingOverThatHangsOnTheCups) {
   const Progress progress = look->tick(now_);
   EXPECT_EQ(progress.status, Status::kPaused);
   EXPECT_EQ(progress.stop, task::StopResult::kConfirmed);
+}
+
+// Who measured has died, and says nothing new: what it said last is no measurement of now.
+TEST_F(ConductTest, WhereNobodyMeasuresStandstillIsUncertain) {
+  const auto skill = conduct(cell_, std::make_unique<Idle>());
+  loop_is_gone_ = true;
+  tick();
+  skill->pause(now_, Pause::kStand);
+  const Progress progress = rest(*skill);
+  EXPECT_EQ(progress.status, Status::kPaused);
+  EXPECT_EQ(progress.stop, task::StopResult::kUncertain);
 }
 
 // As a skill that was halted left the arm, or one that had it while this one made way.

@@ -212,6 +212,11 @@ std::optional<task::Progress> not_as_it_hangs(const world::World& world, const H
   return std::nullopt;
 }
 
+task::Progress too_weak(const world::World& world) {
+  using task::Progress, task::Status;
+  return {world.next_arm.empty() ? Status::kException : Status::kFailed, "the vacuum is too weak", {}};
+}
+
 task::Progress not_there(const Cell& cell, const std::string& code) {
   using task::Progress, task::Status;
   if (cell.disputed(code)) return {Status::kFailed, "it shows two codes", {}};

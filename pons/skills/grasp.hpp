@@ -70,6 +70,8 @@ struct GraspSearch {
 // nothing if it is taken as it hangs.
 [[nodiscard]] std::optional<task::Progress> not_as_it_hangs(const world::World& world, const Held& held);
 
+// How a pick ends that the vacuum cannot do: who comes after this arm may.
+[[nodiscard]] task::Progress too_weak(const world::World& world);
 // How a pick ends whose parcel is not where it should be, or nowhere.
 [[nodiscard]] task::Progress not_there(const Cell& cell, const std::string& code);
 // What would come along with that object, or that it may be another, and why; nothing if it lies by itself.

@@ -83,7 +83,7 @@ class Pick final : public ArmSkill {
     if (!cell_.arm.operational()) return;
     if (phase_ == Phase::kSetDown) {
       verdict_ = {Status::kFailed, "cancelled", {}};
-    } else if (phase_ == Phase::kLift) {
+    } else if (phase_ == Phase::kLift && cell_.held) {
       begin_put_back(now, kPutAside, {Status::kFailed, "cancelled", {}});
       if (phase_ != Phase::kSetDown) begin_retreat(now, {Status::kFailed, "cancelled; still held", {}});
     } else if (phase_ != Phase::kRetreat) {
@@ -130,7 +130,7 @@ class Pick final : public ArmSkill {
       const Progress begun = begin_set_down(now, wanted ? *put_down : Progress{});
       return begun.status == Status::kRetry ? Progress{} : begun;  // what is in the way rides on
     }
-    if (!cell_.lifts) return {Status::kException, "the vacuum is too weak", {}};
+    if (!cell_.lifts) return too_weak(cell_.world);
     const ObjectBelief* object = cell_.find(code_);
     if (object == nullptr) {
       step_aside(now);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pons/skills/grasp.hpp"
 #include "pons/skills/pick_kit.hpp"
 
 namespace pons::skills {
@@ -403,6 +404,23 @@ TEST_F(PickTest, WhatDoesNotComeIsLeftForWhatTheBeltWaitsFor) {
   EXPECT_EQ(progress.reason, "the belt waits for P2");
   EXPECT_EQ(cell_.chance("P1"), task::Chance::kNotYet);
   EXPECT_EQ(cell_.chance("P2"), task::Chance::kNow);
+}
+
+TEST_F(PickTest, WhatAWeakVacuumCannotLiftIsLeftToTheNextArm) {
+  world::World shared = world_;
+  shared.next_arm = "arm_2";
+  const auto link = std::make_unique<link::Link>();
+  link::BridgeEnd end(*link);
+  Cell first(end, shared, model::RobotModel::load(world_.robot).value());
+  first.lifts = cell_.lifts = false;
+  EXPECT_EQ(first.chance("P1"), task::Chance::kGone);
+  EXPECT_EQ(cell_.chance("P1"), task::Chance::kNow) << "which tries now and then";
+  const auto ends = [&](Cell& cell) { return pick(cell).start(task::Json{{"object", "P1"}}, now_)->tick(now_); };
+  EXPECT_EQ(ends(cell_).status, Status::kException);
+  EXPECT_EQ(ends(cell_).reason, "the vacuum is too weak");
+  EXPECT_EQ(too_weak(shared).status, Status::kFailed) << "who has failed is asked for again";
+  first.lifts = true;
+  EXPECT_EQ(first.chance("P1"), task::Chance::kNow);
 }
 
 // An arm that waits for the same would find that it is gone, and its task had failed.

@@ -64,8 +64,8 @@ class Place final : public ArmSkill {
   Progress tick(Time now) override {
     move_along(delay_.take());
     if (!let_go_.empty() && !cell_.held) return gone(now);
-    if (phase_ == Phase::kFall) return fall(now);
-    if (!cell_.arm.operational()) return stopped();
+    if (phase_ == Phase::kFall) return fallen(now);
+    if (!cell_.arm.operational()) return stopped(now);
     stopped_ = false;
     switch (phase_) {
       case Phase::kPlan:
@@ -87,7 +87,8 @@ class Place final : public ArmSkill {
     cancelled_ = true;
     // It is over the mouth already, or on its way down.
     if (phase_ == Phase::kRelease || phase_ == Phase::kFall || phase_ == Phase::kHold) return;
-    hold(now, kCancelled);
+    // What a stop has taken off the cups cannot be held: plan() says where it went.
+    cell_.held ? hold(now, kCancelled) : plan_anew();
   }
 
   // With the parcel on the cups, the arm is nobody else's; over the mouth it is let go of first.
@@ -107,8 +108,9 @@ class Place final : public ArmSkill {
   // The cups hold through a stop: once the arm is armed again, a new way from where it rests. Where it strikes
   // something again and again, a mouth is jammed maybe; the next collision could be one that only a person leads out
   // of.
-  Progress stopped() {
+  Progress stopped(Time now) {
     plan_anew();
+    if (cancelled_ && !cell_.held) return plan(now);
     if (cancelled_) return {Status::kFailed, kCancelled, {}};
     if (!std::exchange(stopped_, true) && cell_.arm.has_struck()) ++times_struck_;
     return {};
@@ -132,8 +134,7 @@ class Place final : public ArmSkill {
   }
 
   Progress plan(Time now) {
-    if (!cell_.held && cell_.lost && cell_.lost->code == object_)
-      return begin_fall(now, *std::exchange(cell_.lost, std::nullopt));
+    if (!cell_.held && cell_.lost && cell_.lost->code == object_) return begin_fall(now, *cell_.lost);
     if (!cell_.held) return {Status::kFailed, "nothing is held", {}};
     if (!object_.empty() && cell_.held->code != object_) {
       return {Status::kFailed, fmt::format("the cups hold {}, not {}", cell_.held->code, object_), {}};
@@ -298,14 +299,25 @@ class Place final : public ArmSkill {
     return more_ticks_ < kMoreTicks ? std::nullopt : std::optional(felt->mass_kg);
   }
 
+  // A bridge that comes after this one in the middle of it must know of it, too: until it is told, it is `lost`.
   Progress begin_fall(Time now, Held load) {
     fallen_ = std::move(load);
     cell_.arm.vacuum(false);
-    if (cell_.held) cell_.dropped();
+    if (cell_.held) {
+      cell_.lost = fallen_;
+      cell_.lost_at = now;
+      cell_.dropped();
+    }
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
     phase_ = Phase::kFall;
-    return fall(now);
+    return fallen(now);
+  }
+
+  Progress fallen(Time now) {
+    Progress progress = fall(now);
+    if (task::is_end(progress.status)) cell_.lost.reset();
+    return progress;
   }
 
   // The mouths' light curtains tell into which it went, and the journal whom to send there. What lies on the belt again
@@ -388,6 +400,7 @@ class Place final : public ArmSkill {
   // Let go of over its mouth, whether a stop came then or not.
   Progress gone(Time now) {
     cell_.await_no_more(let_go_);
+    if (cell_.lost && cell_.lost->code == let_go_) cell_.lost.reset();
     cell_.arm.expect_contact(0);
     return {Status::kSucceeded, {}, {{"place", name_}, {"object", let_go_}, {"seconds", to_s(now - started_)}}};
   }

@@ -246,6 +246,78 @@ TEST_F(CarriedTest, WhatItsOwnCurtainDoesNotCountIsNamed) {
   }
 }
 
+// A bridge that dies meanwhile must have written it down.
+TEST_F(CarriedTest, WhatFallsOnTheWayIsLostUntilThatIsTold) {
+  opened_ = false;
+  stands({0.4, -0.3, 1.4});
+  cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 0.5};
+  const auto skill = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+  for (int i = 0; i < 20; ++i) {
+    pass();
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  }
+  loses_ = true;
+  Progress progress;
+  int ticks = 0;
+  for (; ticks < 600 && progress.status == Status::kRunning; ++ticks) {
+    pass();
+    progress = skill->tick(now_);
+    if (progress.status != Status::kRunning) break;
+    ASSERT_TRUE(cell_.lost);
+    EXPECT_EQ(cell_.lost->code, "P1");
+  }
+  EXPECT_GT(ticks, 10);
+  EXPECT_EQ(progress.reason, "dropped");
+  EXPECT_FALSE(cell_.lost);
+}
+
+// Whatever a person says meanwhile: it is no more there to be held.
+TEST_F(CarriedTest, CancelledOnceAStopHasTakenItOffTheCupsItSaysWhereItWent) {
+  const Vector3 over = world_.place("chute_3")->center_m + Vector3(0, 0, 0.4);
+  for (const bool armed : {true, false}) {
+    opened_ = false;
+    stands(over);
+    cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 0.5, {}, true, {}, falls_};
+    const auto skill = type_.start(task::Json{{"place", "chute_5"}, {"object", "P1"}}, now_);
+    pass();
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+    skill->pause(now_, task::Pause::kStand);
+    opened_ = true;
+    stops_at(over, link::StopCause::kHeartbeatLost);
+    ASSERT_FALSE(cell_.held);
+    ASSERT_TRUE(cell_.lost);
+    if (armed) is_armed_at(over);
+    skill->cancel(now_);
+    ++falls_[2];
+    Progress progress;
+    for (int i = 0; i < 600 && progress.status == Status::kRunning; ++i) {
+      progress = skill->tick(now_);
+      pass();
+    }
+    EXPECT_EQ(progress.reason, "fell into chute_3") << armed << " " << task::name(progress.status);
+    EXPECT_FALSE(cell_.lost);
+    is_armed_at(over);
+  }
+}
+
+// It was sorted, whatever stopped the arm meanwhile.
+TEST_F(CarriedTest, WhatIsLetGoOfInAStopIsNobodysLoss) {
+  opened_ = false;
+  stands({0.4, -0.3, 1.4});
+  cell_.held = Held{"P1", {{0.2, 0.15, 0.1}, 0, {}}, 0.5};
+  const auto skill = type_.start(task::Json{{"place", "chute_3"}, {"object", "P1"}}, now_);
+  for (int i = 0; i < 600 && !lets_go(); ++i) {
+    pass();
+    ASSERT_EQ(skill->tick(now_).status, Status::kRunning);
+  }
+  const Vector3 over = tip_now();
+  opened_ = true;
+  stops_at(over, link::StopCause::kCommanded);
+  ASSERT_TRUE(cell_.lost);
+  EXPECT_EQ(skill->tick(now_).status, Status::kSucceeded);
+  EXPECT_FALSE(cell_.lost);
+}
+
 // It was to be laid down, for its own task had given it up.
 TEST_F(CarriedTest, WhatAStopTookOffTheCupsAfterItsTaskIsToldByTheNextPick) {
   const Vector3 over = world_.place("chute_3")->center_m + Vector3(0, 0, 0.15);

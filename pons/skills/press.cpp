@@ -218,14 +218,18 @@ Expected<void> feasible(Cell& cell, const std::string& place, double force_n) {
 }  // namespace
 
 task::SkillType press(Cell& cell) {
+  std::vector<std::string> regions;
   for (const world::Place& place : cell.world.places) {
-    if (place.kind == world::PlaceKind::kRegion) cell.reach.foresee(place.name, std::array{height_over(place)});
+    if (place.kind != world::PlaceKind::kRegion) continue;
+    cell.reach.foresee(place.name, std::array{height_over(place)});
+    regions.push_back(place.name);
   }
+  if (regions.empty()) regions = cell.world.place_names();  // of which none will do; feasible() says what would
   return {.name = "press",
           .summary = "Press the tool down on a region with a force, hold it, and rise",
           .schema = {{"type", "object"},
                      {"properties",
-                      {{"place", {{"enum", cell.world.place_names()}}},
+                      {{"place", {{"enum", std::move(regions)}}},
                        {"force_n", {{"type", "number"}, {"minimum", 5}, {"maximum", 60}}},
                        {"seconds", {{"type", "number"}, {"minimum", 0.1}, {"maximum", 10}}}}},
                      {"required", {"place", "force_n", "seconds"}},

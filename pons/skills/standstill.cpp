@@ -1,6 +1,7 @@
 #include "pons/skills/standstill.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace pons::skills {
 namespace {
@@ -35,7 +36,11 @@ std::optional<StopResult> Standstill::look(Time now) {
   }
   const double fastest_rad_s = state.speed.size() > 0 ? state.speed.cwiseAbs().maxCoeff() : 0;
   const Time stands_at = std::max(since_, arm_.motion_end());
-  still_ticks_ = now >= stands_at && fastest_rad_s < kStill_rad_s ? still_ticks_ + 1 : 0;
+  const bool is_new = state.stamp > std::exchange(measured_, std::max(measured_, state.stamp));
+  if (now < stands_at || fastest_rad_s >= kStill_rad_s)
+    still_ticks_ = 0;
+  else if (is_new)
+    ++still_ticks_;
   if (still_ticks_ >= kStillTicks) return StopResult::kConfirmed;
   if (now < stands_at + kWithin) return std::nullopt;
   return fastest_rad_s < kMoves_rad_s ? StopResult::kUncertain : StopResult::kFailed;

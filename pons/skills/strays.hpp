@@ -66,10 +66,13 @@ class Strays {
   [[nodiscard]] bool may_have_fallen(const std::string& code) const;
   // The cups met nothing where it should lie. True once they have before, with no camera's having seen it meanwhile.
   [[nodiscard]] bool missed_twice(const std::string& code);
+  // For what lies on the belt and no camera has seen: whichever arm put it there, no other has that track.
+  [[nodiscard]] std::uint32_t next_unseen_track() { return next_unseen_track_++; }
   // Those found gone since the last call.
   [[nodiscard]] std::vector<Stray> take_found_gone() { return std::exchange(found_gone_, {}); }
 
  private:
+  std::uint32_t next_unseen_track_ = 0x8000'0000;
   struct Doubted {
     std::uint32_t track = 0;
     std::string arm, load;       // with which it may have come along

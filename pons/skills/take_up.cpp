@@ -34,8 +34,8 @@ Vector3 vector_from(const Json& json, const char* key) {
 }  // namespace
 
 Json TakeUp::carries() const {
-  if (!cell_.held) return {};
-  const Held& held = *cell_.held;
+  if (!cell_.held && !cell_.lost) return {};
+  const Held& held = cell_.held ? *cell_.held : *cell_.lost;
   Json carried = {{"code", held.code},
                   {"mass_kg", held.mass_kg},
                   {"size_m", of(held.load.size_m)},
@@ -45,6 +45,7 @@ Json TakeUp::carries() const {
                   {"doubtful", held.doubtful},
                   {"falls", std::span(held.falls).first(cell_.world.places.size())}};
   if (held.from_m) carried["from_m"] = of(*held.from_m);
+  if (!cell_.held) carried["gone"] = true;
   return carried;
 }
 
@@ -61,7 +62,7 @@ void TakeUp::restore(const Json& carried) {
                   .from_m = carried.contains("from_m") ? std::optional(vector_from(carried, "from_m")) : std::nullopt,
                   .falls = falls_from(carried),
                   .doubtful = carried.value("doubtful", false)};
-  if (!cell_.arm.cups().open) {
+  if (!cell_.arm.cups().open && !carried.value("gone", false)) {
     cell_.held = held;
     return;
   }

@@ -92,6 +92,27 @@ TEST_F(TakeUpTest, WhatHangsThereIsRestoredAsItWasWrittenDown) {
   EXPECT_EQ(take_up_.fate(task(), 1), Fate::kGoesOn);
 }
 
+// It may die in the middle of a fall, or while a person leads the arm out of a stop.
+TEST_F(TakeUpTest, WhatTheCupsHaveLostIsWrittenDownUntilItIsTold) {
+  fallen_into_ = {"chute_2"};
+  cups(0, 0, world_.robot.home);
+  cell_.lost = held_;
+  cell_.lost->falls = cell_.falls();
+  const task::Json written = task::Json::parse(take_up_.carries().dump());
+  EXPECT_TRUE(written.value("gone", false));
+  cell_.lost.reset();
+  EXPECT_TRUE(take_up_.carries().is_null());
+  fallen_into_.push_back("chute_3");
+  cups(kSealed_kpa, 15, world_.robot.home);  // closed already, on nothing
+  take_up_.restore(written);
+  EXPECT_FALSE(cell_.held);
+  ASSERT_TRUE(cell_.lost);
+  EXPECT_EQ(cell_.lost->code, "P1");
+  EXPECT_EQ(take_up_.carries(), written) << "whoever comes then must know, too";
+  EXPECT_EQ(take_up_.fate(task(), 1), Fate::kAstray);
+  EXPECT_EQ(take_up_.fell_into(), "chute_3");
+}
+
 // Its predecessor had tracks of it.
 TEST_F(TakeUpTest, WhatRidesBeyondTheViewMayBeAnything) {
   cups(0, 0, world_.robot.home);

@@ -68,6 +68,7 @@ class ObedientArmTest : public testing::Test {
   Time now_ = Time(from_s(5));
   const Held held_{"P1", {{0.3, 0.2, 0.1}, 0.7, {0.01, -0.02, 0}}, 1.25};
   bool opened_ = false;
+  bool loses_ = false;  // the cups what they held, while they are to hold it
   std::size_t sealed_cups_ = 4;
   double belt_m_s_ = 0;
   Duration late_{0};     // the motion is, behind the clock
@@ -91,7 +92,10 @@ class ObedientArmTest : public testing::Test {
     state.fallen_into = falls_;
     if (hangs_kg_ != 0) Vector3::Map(state.wrist_force_n.data()) = pull_n(at.position);
     std::ranges::copy(wrist_nm_, state.wrist_torque_nm.begin());
-    if (!opened_) {
+    if (loses_) {
+      state.vacuum_on = 15;
+      state.vacuum = {.phase = link::VacuumPhase::kLost, .sealed_cups = 0, .open = true};
+    } else if (!opened_) {
       state.vacuum_on = 15;
       state.vacuum = {.phase = link::VacuumPhase::kSealed, .sealed_cups = 4, .open = false};
       std::fill_n(state.cup_vacuum_kpa.begin(), sealed_cups_, kSealed_kpa);

@@ -44,14 +44,14 @@ Pressed press(TaskRun& cell, double force_n, double tolerance_n) {
 }
 
 TEST(PressTest, HoldsTheForceThatWasAskedFor) {
-  TaskRun cell(small_cell_with_block());
+  TaskRun cell(small_cell());
   const Pressed pressed = press(cell, 20, tolerance_n(20));
   EXPECT_GE(pressed.within_ms, 1000);
   EXPECT_LT(pressed.peak_n, 30);
 }
 
 TEST(PressTest, HoldsALargerForce) {
-  TaskRun cell(small_cell_with_block());
+  TaskRun cell(small_cell());
   const Pressed pressed = press(cell, 50, tolerance_n(50));
   EXPECT_GE(pressed.within_ms, 1000);
   EXPECT_LT(pressed.peak_n, 65);
@@ -59,7 +59,7 @@ TEST(PressTest, HoldsALargerForce) {
 
 // By what its drives' torques tell, which is less exact.
 TEST(PressTest, AnArmWithoutAWristSensorFeelsByItsDrives) {
-  TaskRun cell(small_cell_with_block("  wrist_sensor: no\n"));
+  TaskRun cell(small_cell("  wrist_sensor: no\n"));
   const Pressed pressed = press(cell, 20, 2);
   EXPECT_GE(pressed.within_ms, 1000);
   EXPECT_LT(pressed.peak_n, 40);

@@ -24,17 +24,13 @@ void put_in(const fs::path& file, const std::string& before, const std::string& 
 
 }  // namespace
 
-world::World small_cell_with_block(const std::string& robot_lines) {
+world::World small_cell(const std::string& robot_lines) {
   std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
   std::ranges::replace(name, '/', '_');  // of a test with a parameter
   const fs::path worlds = fs::path(testing::TempDir()) / (name + "_worlds");
   fs::remove_all(worlds);
   fs::copy(PONS_WORLDS_SOURCE, worlds, fs::copy_options::recursive);
-  put_in(worlds / "small_cell" / "world.yaml", "  - {name: tray, kind: tray",
-         "  - {name: block, kind: region, center: [-0.40, -0.82, 0.66], size: [0.20, 0.20, 0.08]}\n");
   put_in(worlds / "small_cell" / "world.yaml", "  payload_kg:", robot_lines);
-  put_in(worlds / "small_cell" / "scene.xml", "    <geom name=\"floor\"",
-         "    <geom name=\"block\" pos=\"-0.40 -0.82 0.66\" size=\"0.1 0.1 0.04\"/>\n");
   auto world = world::load(worlds, "small_cell");
   EXPECT_TRUE(world) << world.error().line();
   return std::move(*world);

@@ -14,7 +14,7 @@
 namespace pons::tests {
 
 // The small cell with a block to press on, beside the arm; `robot_lines` are added to the file's robot.
-[[nodiscard]] world::World small_cell_with_block(const std::string& robot_lines = {});
+[[nodiscard]] world::World small_cell(const std::string& robot_lines = {});
 
 class TaskRun {
  public:

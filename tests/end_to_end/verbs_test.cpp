@@ -64,7 +64,7 @@ class VerbsOfASkill : public testing::TestWithParam<Use> {
 
   // The task's whole course, undisturbed.
   Duration length() {
-    TaskRun cell(small_cell_with_block());
+    TaskRun cell(small_cell());
     begin(cell);
     const Time began = cell.now();
     cell.await(id(), kLongest, [](Time) {});
@@ -86,7 +86,7 @@ class VerbsOfASkill : public testing::TestWithParam<Use> {
   void at_each_moment(Check check) {
     const Duration all = length();
     for (int moment = 0; moment < kMoments; ++moment) {
-      TaskRun cell(small_cell_with_block());
+      TaskRun cell(small_cell());
       begin(cell);
       const Time until = cell.now() + (2 * moment + 1) * all / (2 * kMoments);
       while (cell.now() < until) cell.step();
@@ -213,7 +213,7 @@ INSTANTIATE_TEST_SUITE_P(Skills, VerbsOfASkill, testing::ValuesIn(kUses),
                          [](const auto& use) { return std::string(use.param.name); });
 
 TEST(Verbs, NoSkillOfAnArmIsLeftOut) {
-  TaskRun cell(small_cell_with_block());
+  TaskRun cell(small_cell());
   for (const auto& [name, type] : cell.above().arms.front()->registry.all()) {
     const std::string_view use = name == "pick" || name == "place" ? "pick_and_place" : std::string_view(name);
     EXPECT_EQ(std::ranges::count(kUses, use, [](const Use& each) { return std::string_view(each.name); }), 1) << name;
@@ -222,7 +222,7 @@ TEST(Verbs, NoSkillOfAnArmIsLeftOut) {
 
 // Of a load that no arm bears.
 TEST(Verbs, WhatTheControlLoopRefusesIsToldInTheTasksStory) {
-  TaskRun cell(small_cell_with_block());
+  TaskRun cell(small_cell());
   ASSERT_TRUE(cell.bridge().submit(
       R"({"id":"one","priority":95,"steps":[{"skill":"move_to","arguments":{"place":"north"}}]})", {}));
   const auto moves = [&] { return cell.cerebellum().state().speed.cwiseAbs().maxCoeff() > 0.1; };

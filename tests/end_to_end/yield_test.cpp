@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 TEST(YieldTest, GivesWayAsTheSpringThatWasAskedForAndComesBack) {
   constexpr double kPush_n = 12, kStiffness_n_m = 400;
   for (const Vector3& along : {Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, -1)}) {
-    TaskRun cell(small_cell_with_block());
+    TaskRun cell(small_cell());
     auto model = model::RobotModel::load(cell.world().robot).value();
     Vector3 before = Vector3::Zero(), pushed = before, released = before;
     bool yielded = false;
@@ -50,7 +50,7 @@ TEST(YieldTest, GivesWayAsTheSpringThatWasAskedForAndComesBack) {
 
 // Pushed harder than any spring is meant for, it is a collision all the same, and the task is tried again.
 TEST(YieldTest, AHardBlowIsStillACollision) {
-  TaskRun cell(small_cell_with_block());
+  TaskRun cell(small_cell());
   bool struck = false;
   Time began;
   cell.run("yield", R"({"seconds":2})", [&](Time now) {

@@ -234,14 +234,18 @@ TEST_F(TakeOverTest, AtRestNothingBeginsInTheSamePeriodEither) {
   state_.safety = link::SafetyState::kOperational;
   for (int i = 0; i < 3; ++i) tick();
   ASSERT_TRUE(bridge_.submit(R"({"id":"a","steps":[{"skill":"pick"}]})", now_));
+  // One that needs nothing may do things all the same.
+  const bridge::Json sleeps{
+      {"xml", R"(<root BTCPP_format="4"><BehaviorTree><Sleep msec="60000"/></BehaviorTree></root>)"}};
+  ASSERT_TRUE(bridge_.submit(bridge::Json{{"id", "b"}, {"tree", sleeps}}.dump(), now_));
   side_.rest(now_);
   EXPECT_TRUE(side_.rests());
   for (int i = 0; i < 20; ++i) tick();
   EXPECT_TRUE(side_.rests());
-  EXPECT_EQ(bridge_.state("a"), "waiting");
+  for (const char* const id : {"a", "b"}) EXPECT_EQ(bridge_.state(id), "waiting");
   side_.go_on(now_);
   tick();
-  EXPECT_EQ(bridge_.state("a"), "running");
+  for (const char* const id : {"a", "b"}) EXPECT_EQ(bridge_.state(id), "running");
 }
 
 TEST_F(TakeOverTest, WithSomethingOnItTheRobotMakesNoWayBetweenTwoSkills) {
@@ -252,10 +256,11 @@ TEST_F(TakeOverTest, WithSomethingOnItTheRobotMakesNoWayBetweenTwoSkills) {
   for (int i = 0; i < 3; ++i) tick();
   carries_ = {{"code", "P1"}};
   tick();
+  carries_["gone"] = false;
   ASSERT_TRUE(bridge_.submit(R"({"id":"u","priority":99,"steps":[{"skill":"pick"}]})", now_));
   for (int i = 0; i < 10; ++i) tick();
   EXPECT_EQ(bridge_.state("a"), "running");
-  carries_ = {};
+  carries_["gone"] = true;  // not told yet, and not there
   for (int i = 0; i < 5; ++i) tick();
   EXPECT_EQ(bridge_.state("a"), "preempted");
   EXPECT_EQ(bridge_.state("u"), "running");
