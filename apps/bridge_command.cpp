@@ -23,6 +23,7 @@
 #include "apps/run_watch.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/bridge/journal/story.hpp"
+#include "pons/rt/periodic_loop.hpp"
 #include "pons/runner/processes.hpp"
 
 namespace pons::apps {
@@ -66,6 +67,12 @@ RunFacts facts_of(const BridgeCommandOptions& options) {
           .errands = {}};
 }
 
+// Those of which it can tell: what killed one bridge was told by none.
+world::FaultPlan own_faults(world::FaultPlan plan) {
+  plan.leave_out(world::Strikes::kBridge);
+  return plan;
+}
+
 // All outlive it.
 runner::Watch watch_of(const BridgeCommandOptions& options, BridgeHalf& half, const RunAlong& along,
                        link::Border& border, Progress& progress, std::int64_t total) {
@@ -96,11 +103,26 @@ void tell(const runner::RunResult& result, const brain::Tally& tally, std::int64
   for (const auto& [fault, times] : faults) say(stdout, fmt::format("fault: {} {}\n", times, fault));
 }
 
+constexpr int kFarewell = 30;  // periods in which whoever waits for an outcome hears of it
+
 // Its tasks' outcomes, before the journal is closed.
-int body_gone(bridge::Journal& journal, Time now) {
-  auto told = bridge::end_with_body(journal, now);
-  if (told) told = journal.commit();
-  return told ? kExitBodyGone : bad_run(told.error());
+int body_gone(BridgeHalf& half, const rt::MonotonicClock& clock) {
+  auto told = bridge::end_with_body(*half.journal, clock.now());
+  if (told) told = half.journal->commit();
+  if (!told) return bad_run(told.error());
+  const rt::MonotonicClock own;  // the body's may stand still
+  rt::PeriodicLoop loop(own, runner::kBridgePeriod);
+  loop.run([&, left = kFarewell](Time) mutable {
+    half.show(clock.now());
+    if (half.desk) half.desk->take_leave(clock.now());
+    return --left > 0;
+  });
+  return kExitBodyGone;
+}
+
+int end_badly(const Error& why, BridgeHalf& half, const link::Border& border) {
+  const int code = failed(why);
+  return code == kExitBodyGone ? body_gone(half, border.clock) : code;
 }
 
 int run_bridge(const BridgeCommandOptions& options, const world::World& world, const world::Manifest& manifest,
@@ -134,7 +156,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   say(stderr, left_out_line(plan, "give pons body the plan, too; control loops end with their body"));
   if (auto named = name_journal(border, options.journal); !named) return bad_input(named.error());
   const runner::Crossing crossing = place.crossing({});
-  if (auto begun = runner::await_begin(crossing, interrupted); !begun) return failed(begun.error());
+  if (auto begun = runner::await_begin(crossing, interrupted); !begun) return end_badly(begun.error(), **half, border);
   if (interrupted()) return kExitInterrupted;
   auto taken = (*half)->bridge_side->take_over(*(*half)->journal, border.clock.now());
   if (!taken) return bad_run(taken.error());
@@ -152,8 +174,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   progress.finish();
   const brain::Tally tally = (*half)->dispatcher->tally();
   // Said at once; what perception is in the middle of may take its time to end.
-  int code = result ? kExitGood : failed(result.error());
-  if (code == kExitBodyGone) code = body_gone(*(*half)->journal, border.clock.now());
+  const int code = result ? kExitGood : end_badly(result.error(), **half, border);
   if (result) {
     (*half)->show(result->end);
     along->end(*result);
@@ -163,7 +184,7 @@ int run_bridge(const BridgeCommandOptions& options, const world::World& world, c
   const bool asked = border.now_at() == link::Stage::kEnding;
   world::FaultCounts counts;
   faults.count(counts);
-  tell(*result, tally, total, options.journal, injected(plan, counts));
+  tell(*result, tally, total, options.journal, injected(own_faults(plan), counts));
   say(stdout, along->line());
   if (!result->degraded.empty()) say(stdout, fmt::format("degraded: {}\n", result->degraded));
   // A bridge that a person ends leaves its body to the next one.

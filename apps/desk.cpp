@@ -115,10 +115,22 @@ void Desk::attend(Time now) {
       request.reply(answered);
     }
   }
-  // Nobody hears of an acceptance or an outcome before the disk has it; all who came in this period wait for it
-  // together.
-  const auto kept = of_tasks.empty() || !bridge_.unkept() ? Expected<void>{} : bridge_.commit(now);
+  // Nobody hears of anything of a task before the disk has it; all who came in this period wait for it together.
+  const auto kept = of_tasks.empty() ? Expected<void>{} : bridge_.commit(now);
   for (auto& [request, answered] : of_tasks) request.reply(kept ? answered : gate::refusal(kept.error()));
+  tell_watchers(now);
+}
+
+void Desk::take_leave(Time now) {
+  for (gate::Request& request : visitors_->poll()) {
+    auto asked =
+        request.refused ? Expected<gate::Asked>(std::unexpected(*request.refused)) : gate::asked_from(request.text);
+    if (asked && asked->operation == gate::Operation::kWatch) {
+      watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
+    } else {
+      request.reply(gate::refusal({"the run is over: its body is gone", "run", "start both again"}));
+    }
+  }
   tell_watchers(now);
 }
 

@@ -48,6 +48,9 @@ class Desk {
   // On the bridge's thread, once a period: answers what has come. Waits for the disk where it tells of tasks, else for
   // nothing.
   void attend(Time now);
+  // Likewise, once there is no robot any more, and the journal says what has become of its tasks: who watches them
+  // hears of it, and nothing else is done.
+  void take_leave(Time now);
 
  private:
   [[nodiscard]] bridge::Json answer(const gate::Asked& asked, Time now);

@@ -2,10 +2,14 @@
 // on with.
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <set>
 
 #include "apps/assembly.hpp"
 #include "apps/commands.hpp"
+#include "apps/journal_json.hpp"
 #include "apps/story_text.hpp"
 #include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/place.hpp"
@@ -21,6 +25,8 @@ using bridge::Journal;
 struct JournalOptions {
   std::string file;
   std::int64_t keep = 0;
+  std::set<std::string> kinds;
+  bool json = false;
 };
 
 int check(const JournalOptions& options) {
@@ -40,22 +46,35 @@ int check(const JournalOptions& options) {
   return kExitGood;
 }
 
-int refused(const JournalOptions& options) {
+// Those for which `is_meant`; `none` where there are none.
+int tell_notes(const JournalOptions& options, const std::function<bool(const bridge::Event&)>& is_meant,
+               const std::string& none) {
   const auto journal = Journal::open_to_read(options.file);
   if (!journal) return bad_input(journal.error());
   std::int64_t told = 0;
-  const auto read = (*journal)->each_note([&told](const bridge::Event& note) -> Expected<void> {
-    if (note.kind != bridge::kRefusedEvent) return {};
+  const auto read = (*journal)->each_note([&](const bridge::Event& note) -> Expected<void> {
+    if (!is_meant(note)) return {};
     ++told;
-    say(stdout, story_line({{"time_s", note.stamp.s()},
-                            {"task", task::text_of(note.detail, "id")},
-                            {"kind", note.kind},
-                            {"detail", note.detail}}));
+    task::Json json = to_json(note);
+    json["task"] = note.kind == bridge::kRefusedEvent ? task::text_of(note.detail, "id") : note.order;
+    say(stdout, options.json ? json.dump() + "\n" : story_line(json));
     return {};
   });
   if (!read) return bad_run(read.error());
-  if (told == 0) say(stdout, "nothing was refused\n");
+  if (told == 0 && !options.json) say(stdout, none);
   return kExitGood;
+}
+
+int refused(const JournalOptions& options) {
+  return tell_notes(
+      options, [](const bridge::Event& note) { return note.kind == bridge::kRefusedEvent; }, "nothing was refused\n");
+}
+
+int notes(const JournalOptions& options) {
+  const auto is_meant = [&kinds = options.kinds](const bridge::Event& note) {
+    return kinds.empty() ? note.order.empty() : kinds.contains(note.kind);
+  };
+  return tell_notes(options, is_meant, "there are none\n");
 }
 
 // Opening for writing would create one.
@@ -98,7 +117,13 @@ int end(const JournalOptions& options) {
                       "start `pons bridge` to go on with it, or end the body first"});
   const auto before = (*journal)->counts();
   if (!before) return bad_run(before.error());
-  auto ended = bridge::end_with_body(**journal, Time{});
+  Time last;  // of the run that is gone: the stories read on
+  const auto read = (*journal)->each_event([&last](const bridge::Event& event) -> Expected<void> {
+    last = std::max(last, event.stamp);
+    return {};
+  });
+  if (!read) return bad_run(read.error());
+  auto ended = bridge::end_with_body(**journal, last);
   if (ended) ended = (*journal)->commit();
   if (!ended) return bad_run(ended.error());
   const auto after = (*journal)->counts();
@@ -123,6 +148,10 @@ void add_journal(CLI::App& app, Chosen& chosen) {
   };
   add("check", "Whether it is whole: the file, each task's story, each record", check);
   add("refused", "What was sent that no task could be made of or that might not be done, and why", refused);
+  CLI::App* notes_command = add("notes", "What is told of no task: arming, stops, health, alerts, fallbacks", notes);
+  notes_command->add_option("--kind", options->kinds, "Those of these kinds, whichever order they belong to")
+      ->delimiter(',');
+  notes_command->add_flag("--json", options->json, "A line of JSON each");
   add("compact", "Drop what happened to ended tasks between acceptance and outcome", compact)
       ->add_option("--keep", options->keep, "All of so many tasks that ended last (0)")
       ->check(whole_number(1'000'000'000'000));

@@ -16,15 +16,17 @@ task::Json to_json(const bridge::TaskRecord& record) {
   return json;
 }
 
+task::Json to_json(const bridge::Event& event) {
+  return {{"sequence", event.sequence},
+          {"task", event.task},
+          {"time_s", event.stamp.s()},
+          {"kind", event.kind},
+          {"detail", event.detail}};
+}
+
 task::Json to_json(const std::vector<bridge::Event>& events) {
   task::Json json = task::Json::array();
-  for (const bridge::Event& event : events) {
-    json.push_back({{"sequence", event.sequence},
-                    {"task", event.task},
-                    {"time_s", event.stamp.s()},
-                    {"kind", event.kind},
-                    {"detail", event.detail}});
-  }
+  for (const bridge::Event& event : events) json.push_back(to_json(event));
   return json;
 }
 

@@ -42,7 +42,7 @@ std::string hint(const std::string& word, const std::vector<std::string>& known)
 // CLI11 says no more than that a command is missing where it knows none of the words.
 Error without_command(const CLI::App& app, const CLI::RequiredError& error) {
   const Asked asked = asked_for(app);
-  if (asked.command->get_require_subcommand_min() == 0) return {error.what(), "", help_of(asked)};
+  if (asked.command->get_require_subcommand_min() == 0) return {error.what(), asked.name, help_of(asked)};
   std::vector<std::string> names;
   for (const CLI::App* each : asked.command->get_subcommands([](const CLI::App*) { return true; }))
     names.push_back(each->get_name());

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <string_view>
 #include <utility>
 
 #include "pons/bridge/journal/place.hpp"
@@ -41,10 +42,18 @@ std::uint64_t orders_of(const world::Manifest& manifest) {
 
 rt::SharedMemory::Layout layout_of(const link::FramePages& pages) { return {pages.bytes(), link::kFramesVersion}; }
 
+constexpr std::string_view kInMemory = ":memory:";
+
+// From wherever it is named, and through whatever link.
 std::string absolute(const std::string& journal) {
-  std::error_code ignored;
-  return bridge::in_database(journal) ? journal : fs::absolute(journal, ignored).string();
+  if (bridge::in_database(journal) || journal == kInMemory) return journal;
+  std::error_code failed;
+  const fs::path path = fs::absolute(journal, failed), resolved = fs::weakly_canonical(path, failed);
+  return (failed ? path : resolved).string();
 }
+
+// Passwords may change.
+bool is_same(const std::string& one, const std::string& other) { return bridge::shown(one) == bridge::shown(other); }
 
 }  // namespace
 
@@ -95,9 +104,15 @@ Expected<MeetingPlace> MeetingPlace::join(const std::string& name, const world::
 std::string journal_of(const link::Border& border) { return border.journal(); }
 
 Expected<void> find_journal(const link::Border& border, const std::string& journal) {
+  const std::string earlier = border.journal(), here = absolute(journal);
+  if (earlier.empty()) return {};
+  if (!is_same(earlier, here)) {
+    return fail("is not the journal of this body's bridges, which holds what was told and what hangs on the arm",
+                bridge::shown(journal),
+                fmt::format("go on with --journal {}; to begin anew, end the body, too", bridge::shown(earlier)));
+  }
   std::error_code ignored;
-  const bool on_disk = !bridge::in_database(journal) && journal != ":memory:";
-  if (!on_disk || border.journal() != absolute(journal) || fs::exists(journal, ignored)) return {};
+  if (bridge::in_database(here) || here == kInMemory || fs::exists(here, ignored)) return {};
   return fail(
       "the journal is gone that the bridges of this body kept, and with it what was told and what hangs on the arm",
       journal, "put it back; to begin anew, end the body, too");

@@ -50,7 +50,8 @@ class MeetingPlace {
 
 // The journal of the body's last bridge, as that one named it.
 [[nodiscard]] std::string journal_of(const link::Border& border);
-// Before a bridge opens its journal. Error: an earlier bridge of that body kept it there, and it is not there any more.
+// Before a bridge opens its journal. Errors: the earlier bridges of that body kept another; or this one, and it is not
+// there any more.
 [[nodiscard]] Expected<void> find_journal(const link::Border& border, const std::string& journal);
 // Error: its absolute path is too long.
 [[nodiscard]] Expected<void> name_journal(link::Border& border, const std::string& journal);

@@ -195,10 +195,6 @@ int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world)
   const auto speech =
       options.speech.empty() ? temporary.file("speech") : Expected<std::string>(options.speech.string());
   if (!speech) return bad_input(speech.error());
-  std::error_code error;
-  const bool made = fs::create_directories(*speech, error);
-  if (error) return bad_input({error.message(), *speech, "name a folder that can be written for --speech"});
-
   RoundsSetup setup{.seed = options.seed,
                     .journal = *journal,
                     .socket = {},
@@ -221,12 +217,19 @@ int run_rounds(const RoundsOptions& options, RunFacts facts, world::World world)
   if (!along) return bad_input(along.error());
   setup.sinks = along->sinks();
   setup.visitors = along->visitors();
-  auto rounds = Rounds::build(std::move(world), *errands, setup);
-  if (!rounds) {
+  // Of a run that is refused nothing is left.
+  std::error_code error, ignored;
+  fs::path made = fs::absolute(*speech);
+  while (made.has_relative_path() && !fs::exists(made.parent_path(), ignored)) made = made.parent_path();
+  const bool is_new = fs::create_directories(*speech, error);
+  const auto refused = [&](const Error& why) {
     along->withdraw();
-    if (made) fs::remove(*speech, error);
-    return bad_input(rounds.error());
-  }
+    if (is_new) fs::remove_all(made, ignored);
+    return bad_input(why);
+  };
+  if (error) return refused({error.message(), *speech, "name a folder that can be written for --speech"});
+  auto rounds = Rounds::build(std::move(world), *errands, setup);
+  if (!rounds) return refused(rounds.error());
   return Run(options, *along, **rounds).go();
 }
 

@@ -17,10 +17,11 @@
 #include "apps/paths.hpp"
 #include "apps/story_text.hpp"
 #include "apps/task_file.hpp"
-#include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/bridge.hpp"
 #include "pons/bridge/journal/place.hpp"
 #include "pons/gate/local_socket.hpp"
 #include "pons/gate/request.hpp"
+#include "pons/record/sweep.hpp"
 
 namespace pons::apps {
 namespace {
@@ -133,9 +134,14 @@ void print_more(const TaskOptions& options, const Json& answer, const std::strin
   const std::int64_t all = answer.at(which), after = answer.at("after");
   const bool first = options.after == 0;
   if (first ? all <= shown : shown < options.limit) return;
-  const std::string how =
-      fmt::format("pons task list --{}{}", which, shown > 0 ? fmt::format(" --after {}", after) : "");
-  fmt::print("{}: {}\n", first ? fmt::format("{} more {}", all - shown, which) : "what follows, if anything", how);
+  std::vector<std::string> how{"pons", "task", "list", "--" + which};
+  const auto add = [&how](const char* name, const std::string& value) { how.insert(how.end(), {name, value}); };
+  if (shown > 0) add("--after", std::to_string(after));
+  if (options.limit != TaskOptions{}.limit) add("--limit", std::to_string(options.limit));
+  if (!options.journal.empty()) add("--journal", bridge::shown(options.journal));
+  if (options.journal.empty() && !options.socket.empty()) add("--socket", options.socket);
+  fmt::print("{}: {}\n", first ? fmt::format("{} more {}", all - shown, which) : "what follows, if anything",
+             record::shell_line(how));
 }
 
 // Open ones first.
@@ -186,19 +192,23 @@ int history(const TaskOptions& options) {
   return kExitGood;
 }
 
-// Prints what happens to it after that sequence, until one of these events of the task itself: which. Error: the run
-// has ended before, or there is nothing of that name.
-Expected<std::string> follow(const TaskOptions& options, std::int64_t after, const std::set<std::string>& until) {
+// Prints what happens to it after that sequence, until one of these events of the task itself: that one. Errors: the
+// run has ended before, there is nothing of that name, or it was refused, and no such task is there.
+Expected<Json> follow(const TaskOptions& options, std::int64_t after, const std::set<std::string>& until) {
+  bool refused = false, accepted = after > 0;
   for (;;) {
     const auto answer = ask(options, {{"op", "watch"}, {"id", options.id}, {"after", after}}, kWatchPatience);
     if (!answer) return std::unexpected(answer.error());
     after = answer->at("after");
     for (const Json& event : answer->at("events")) {
       fmt::print("{}", story_line(event));
-      auto kind = event.value("kind", std::string{});
-      if (event.value("task", std::string{}) == options.id && until.contains(kind)) return kind;
+      const auto kind = event.value("kind", std::string{});
+      refused = refused || kind == bridge::kRefusedEvent;
+      accepted = accepted || kind == bridge::kAcceptedEvent;
+      if (event.value("task", std::string{}) == options.id && until.contains(kind)) return event;
     }
     std::fflush(stdout);
+    if (refused && !accepted) return fail("no such task was accepted", options.id, "mend it, and submit it again");
   }
 }
 
@@ -207,7 +217,7 @@ int watch(const TaskOptions& options) {
   return ended ? kExitGood : bad_input(ended.error());
 }
 
-// A verb, and the event that says that it was done.
+// A verb, and the event that says that it was done. What could not be broken off any more has ended otherwise.
 int tell(const TaskOptions& options, const std::string& verb, const std::string& done) {
   Json request{{"op", verb}, {"id", options.id}};
   if (!options.reason.empty()) request["reason"] = options.reason;
@@ -216,7 +226,9 @@ int tell(const TaskOptions& options, const std::string& verb, const std::string&
   if (options.at_once) return kExitGood;
   const auto came = follow(options, answer->at("after"), {done, "continued", "ended"});
   if (!came) return bad_input(came.error());
-  return *came == done ? kExitGood : kExitBadRun;
+  const bool otherwise = done == bridge::kEndedEvent &&
+                         task::text_of(came->value("detail", Json{}), "outcome") != name(task::Outcome::kCancelled);
+  return came->value("kind", std::string{}) == done && !otherwise ? kExitGood : kExitBadRun;
 }
 
 }  // namespace

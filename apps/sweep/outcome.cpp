@@ -69,8 +69,10 @@ void judge(record::SweepRun& run, const RunOutcome& outcome, const fs::path& fol
     const std::string how = said.empty() ? describe(ended) : fmt::format("{}: {}", describe(ended), said);
     return fail_with(run, Fate::kFailed, whole && said.empty() ? report.error().line() : how);
   }
-  if (report->world != run.world || report->seed != run.seed) {
-    return fail_with(run, Fate::kFailed, fmt::format("its report is of {}, seed {}", report->world, report->seed));
+  if (report->world != run.world || report->seed != run.seed || report->fault_plan != run.faults) {
+    return fail_with(
+        run, Fate::kFailed,
+        fmt::format("its report is of {}, faults {}, seed {}", report->world, report->fault_plan, report->seed));
   }
   run.report = std::move(*report);
   run.fate = ended.code == kExitGood ? Fate::kGood : Fate::kBad;

@@ -92,8 +92,9 @@ Expected<void> check_members(const Json& json, std::string_view operation) {
     const bool all_tasks = member == "id" && operation == "watch";
     const bool needed = belongs && !all_tasks && std::ranges::find(kOptional, member) == kOptional.end();
     if (json.contains(member) ? belongs : !needed) continue;
-    return fail(fmt::format("'{}' {}", member, needed ? "is missing" : "does not belong there"),
-                fmt::format("/{}", member), fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
+    if (needed) return fail(fmt::format("'{}' is missing", member), fmt::format("/{}", member), "add it");
+    return fail(fmt::format("'{}' does not belong there", member), fmt::format("/{}", member),
+                fmt::format("give it with {}, only", fmt::join(belongs_to, " or ")));
   }
   return {};
 }

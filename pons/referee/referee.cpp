@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "pons/bridge/journal/story.hpp"
 
 namespace pons::referee {
 namespace {
@@ -71,6 +74,39 @@ void take_in(Entry& entry, const std::string& place, const std::optional<bridge:
   }
 }
 
+// What a tree puts somewhere its leaves say, not its text: each that has succeeded, whatever the tree comes to.
+Expected<void> take_in_tree(std::map<std::string, Entry>& entries, const bridge::Journal& journal,
+                            const bridge::TaskRecord& record) {
+  const auto history = journal.task(record.task.id);
+  if (!history) return std::unexpected(history.error());
+  if (!*history) return {};
+  std::map<std::int64_t, bridge::Event> trying;  // by the leaf
+  std::set<std::string> picked, placed;
+  std::string last;
+  for (const bridge::Event& event : (*history)->events) {
+    const std::int64_t leaf = event.detail.value("step", std::int64_t{-1});
+    if (event.kind == bridge::kAttemptEvent) trying.insert_or_assign(leaf, event);
+    const bool succeeded =
+        event.kind == bridge::kFoundDoneEvent ||
+        (event.kind == bridge::kAttemptEndedEvent && task::text_of(event.detail, "status") == "succeeded");
+    const auto begun = trying.find(leaf);
+    if (!succeeded || begun == trying.end()) continue;
+    const std::string skill = task::text_of(begun->second.detail, "skill");
+    const Json arguments = begun->second.detail.value("arguments", Json::object());
+    const std::string object = task::text_of(arguments, "object");
+    if (skill == "pick") picked.insert(last = object);
+    if (skill != "place") continue;
+    const auto& put = *placed.insert(object.empty() ? last : object).first;
+    take_in(entries[put], task::text_of(arguments, "place"),
+            bridge::OutcomeRecord{.outcome = Outcome::kSucceeded, .run = event.run, .stamp = event.stamp});
+  }
+  const bool failed = record.outcome && record.outcome->outcome != Outcome::kSucceeded;
+  for (const std::string& object : picked) {
+    if (failed && !placed.contains(object)) take_in(entries[object], {}, record.outcome);
+  }
+  return {};
+}
+
 void stray(Entry& entry, const std::string& place, const std::pair<std::int64_t, Time>& when) {
   entry.fell_into = place;
   entry.strayed = true;
@@ -102,7 +138,7 @@ Expected<Story> read(const bridge::Journal& journal) {
   auto& entries = story.entries;
   const auto tasks = journal.each_task([&](const bridge::TaskRecord& record) -> Expected<void> {
     for (const auto& [object, place] : objects_of(record.task)) take_in(entries[object], place, record.outcome);
-    return {};
+    return record.task.tree ? take_in_tree(entries, journal, record) : Expected<void>{};
   });
   if (!tasks) return std::unexpected(tasks.error());
   const auto notes = journal.each_note([&](const bridge::Event& event) -> Expected<void> {

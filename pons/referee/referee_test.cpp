@@ -98,6 +98,38 @@ TEST_F(RefereeTest, WhatIsLostOrMissortedIsTheFirstFinding) {
                                      ::testing::HasSubstr("D: lost"), ::testing::HasSubstr("A: undeserved")));
 }
 
+// Its text may name nothing: what its leaves have done counts, whatever the tree comes to.
+TEST_F(RefereeTest, WhatATreePutsSomewhereItsLeavesSay) {
+  const auto tree = [&](const std::string& id, const std::string& object, std::optional<Outcome> outcome,
+                        bool placed = true) {
+    ASSERT_TRUE(journal_->accept({.id = id, .tree = task::TreeRequest{.name = "sort"}}, Time{}));
+    const auto tell = [&](const char* kind, const Json& detail) {
+      ASSERT_TRUE(journal_->event(id, Time{}, kind, detail));
+    };
+    tell("started", Json::object());
+    tell("attempt", {{"step", 3}, {"skill", "pick"}, {"attempt", 1}, {"arguments", {{"object", object}}}});
+    tell("attempt_ended", {{"step", 3}, {"skill", "pick"}, {"attempt", 1}, {"status", "succeeded"}});
+    tell("attempt", {{"step", 5}, {"skill", "place"}, {"attempt", 1}, {"arguments", {{"place", "chute_1"}}}});
+    tell("attempt_ended",
+         {{"step", 5}, {"skill", "place"}, {"attempt", 1}, {"status", placed ? "succeeded" : "failed"}});
+    if (outcome) end(id, *outcome);
+  };
+  tree("T1", "A", Outcome::kSucceeded);
+  accept("A", "A");
+  end("A", Outcome::kFailed);  // the tree had taken it
+  tree("T2", "B", Outcome::kFailed);
+  tree("T3", "C", Outcome::kSucceeded);
+  accept("C", "C");
+  end("C", Outcome::kSucceeded);
+  tree("T4", "D", Outcome::kFailed, false);
+  const Verdict verdict =
+      judge({parcel("A", Whereabouts::kChute, "chute_1"), parcel("B", Whereabouts::kChute, "chute_1"),
+             parcel("C", Whereabouts::kChute, "chute_1"), parcel("D", Whereabouts::kException, "exception")});
+  EXPECT_EQ(verdict.sorted, 3);
+  EXPECT_EQ(verdict.lost, 0) << (verdict.findings.empty() ? "" : verdict.findings.front());
+  EXPECT_EQ(verdict.duplicated, 1) << "the tree's and the task's";
+}
+
 TEST_F(RefereeTest, SortedNeedsTruthAndJournal) {
   accept("A", "A");
   end("A", Outcome::kSucceeded);

@@ -133,7 +133,8 @@ Expected<SharedMemory> SharedMemory::open(const std::string& name, const Layout&
   memory.name_ = name;
   memory.file_ = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
   if (memory.file_ < 0) {
-    if (errno == ENOENT) return fail("nobody owns it", path, "start its owner first: of a robot that is pons body");
+    if (errno == ENOENT)
+      return fail("nobody owns it", path, "start its owner first (a robot's: pons body --link NAME)");
     return system_error(path);
   }
   struct stat status{};

@@ -36,13 +36,16 @@ class Deaths {
   [[nodiscard]] Now look(Time now) {
     const bool dead = spells_.on(now);
     const bool was = std::exchange(dead_, dead);
+    if (dead && !was) ++count_;
     if (dead) return was ? Now::kDead : Now::kDies;
     return was ? Now::kFollows : Now::kLives;
   }
-  [[nodiscard]] std::int64_t count() const { return spells_.begun(); }
+  // Two spells of which nobody saw the end of one are one death.
+  [[nodiscard]] std::int64_t count() const { return count_; }
 
  private:
   world::Spells spells_;
+  std::int64_t count_ = 0;
   bool dead_ = false;
 };
 

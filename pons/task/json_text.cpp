@@ -12,9 +12,16 @@
 namespace pons::task {
 namespace {
 
+// The first byte is 1, and so is the first line; one that stands for itself is not told.
+std::string place_of(std::size_t byte, std::string_view text) {
+  const auto lines = std::ranges::count(text.substr(0, byte), '\n');
+  return fmt::format("byte {}{}", byte, lines == 0 ? "" : fmt::format(", in line {}", lines + 1));
+}
+
 // Reads the text once without building anything, so that the builder only ever sees text within the bounds.
 class Bounds final : public nlohmann::json_sax<Json> {
  public:
+  explicit Bounds(std::string_view text) : text_(text) {}
   std::string problem;
 
   bool null() override { return true; }
@@ -37,8 +44,8 @@ class Bounds final : public nlohmann::json_sax<Json> {
 
   bool parse_error(std::size_t position, const std::string&, const nlohmann::json::exception& error) override {
     // 406: a number beyond a double. Everything else is bad syntax or bad UTF-8, which what() may quote byte for byte.
-    problem = error.id == 406 ? fmt::format("number out of range at byte {}", position)
-                              : fmt::format("not JSON in UTF-8 at byte {}", position);
+    problem = fmt::format("{} at {}", error.id == 406 ? "number out of range" : "not JSON in UTF-8",
+                          place_of(position, text_));
     return false;
   }
 
@@ -54,6 +61,7 @@ class Bounds final : public nlohmann::json_sax<Json> {
     return true;
   }
 
+  std::string_view text_;
   std::vector<std::set<std::string>> names_;  // of the objects now open; arrays have an empty set
 };
 
@@ -135,9 +143,9 @@ Expected<Json> parse_json(std::string_view text) {
   }
   // The parser takes a zero byte for the end of the text.
   if (const auto zero = text.find('\0'); zero != text.npos) {
-    return fail(fmt::format("not JSON in UTF-8 at byte {}", zero + 1), {}, "send one JSON value (RFC 8259)");
+    return fail(fmt::format("not JSON in UTF-8 at {}", place_of(zero + 1, text)), {}, "send one JSON value (RFC 8259)");
   }
-  Bounds bounds;
+  Bounds bounds(text);
   if (!Json::sax_parse(text, &bounds)) return fail(bounds.problem, {}, "send one JSON value (RFC 8259)");
   return Json::parse(text);
 }

@@ -73,6 +73,7 @@ TEST(ParseJson, RefusesWhatIsNotUtf8OrNotJson) {
 
 TEST(ParseJson, RefusesNumbersBeyondADouble) {
   EXPECT_EQ(parse_json("[1e999]").error().what, "number out of range at byte 6");
+  EXPECT_EQ(parse_json("{\n \"id\": 1\n  'x': 2}").error().what, "not JSON in UTF-8 at byte 14, in line 3");
 }
 
 using Seen = std::map<std::string, std::string, std::less<>>;

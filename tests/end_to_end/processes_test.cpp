@@ -256,6 +256,9 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   Running first_body(folder_.path(), "body", body(6));
   Running bridge_process(folder_.path(), "bridge", bridge(6));
   ASSERT_TRUE(eventually([&] { return !task_at("attempt", "pick").empty(); })) << bridge_process.err();
+  const std::string id = task_at("attempt", "pick");
+  Running watch(folder_.path(), "watch", {"task", "watch", id, "--socket", folder_ / "s"});
+  ASSERT_TRUE(eventually([&] { return read_text(folder_ / "watch.out").find("attempt ") != std::string::npos; }));
   first_body.signal(SIGKILL);
   EXPECT_EQ(first_body.wait().code, -SIGKILL);
   const Finished ended = bridge_process.wait();
@@ -264,7 +267,10 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db-wal")) << "the journal was not closed";
   const auto ends = outcomes(folder_ / "j.db");
   EXPECT_FALSE(ends.empty());
-  for (const auto& [id, outcome] : ends) EXPECT_NE(outcome, "none") << id << " ends with its body";
+  for (const auto& [task, outcome] : ends) EXPECT_NE(outcome, "none") << task << " ends with its body";
+  const Finished watched = watch.wait();
+  EXPECT_EQ(watched.code, 0) << watched.err;
+  EXPECT_THAT(watched.out, HasSubstr("FAILED: its body is gone"));
 
   // What it left does not hinder the next body; the journal of its run is of no use to that one's bridge.
   Running next_body(folder_.path(), "next", body(6, "next"));
@@ -322,7 +328,17 @@ TEST_F(Processes, WithoutTheJournalOfItsBodysBridgesNoBridgeBegins) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "j.db"));
   for (const char* const beside : {"j.db", "j.db-wal"})
     std::filesystem::rename(folder_ / (std::string("away_") + beside), folder_ / beside);
-  Running second(folder_.path(), "second", bridge(6));
+  auto elsewhere = bridge(6);
+  *std::ranges::find(elsewhere, (folder_ / "j.db").string()) = folder_ / "other.db";
+  const Finished misnamed = run_pons(elsewhere);
+  EXPECT_EQ(misnamed.code, kBadInput) << misnamed.err;
+  EXPECT_THAT(misnamed.err, HasSubstr("other.db: is not the journal of this body's bridges"));
+  EXPECT_THAT(misnamed.err, HasSubstr("go on with --journal " + (folder_ / "j.db").string()));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "other.db"));
+  // However it is spelt.
+  auto spelt = bridge(6);
+  *std::ranges::find(spelt, (folder_ / "j.db").string()) = folder_ / "./j.db";
+  Running second(folder_.path(), "second", spelt);
   EXPECT_EQ(second.wait().code, 0) << second.err();
   EXPECT_EQ(body_process.wait().code, 0);
   EXPECT_EQ(read_json(folder_ / "body.json")["parcels"]["lost"], 0);

@@ -42,6 +42,18 @@ class RoundsProgram : public ::testing::Test {
   Folder folder_;
 };
 
+TEST_F(RoundsProgram, OfARunThatIsRefusedNoFolderIsLeft) {
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--record", folder_ / "urgent.json"},
+                                                {"--socket", "/proc/nowhere/s"},
+                                                {"--journal", folder_ / "inspect.json"}}) {
+    std::vector<std::string> words{"run", "rounds", "--realtime", "--speech", folder_ / "new/a/b"};
+    words.insert(words.end(), wrong.begin(), wrong.end());
+    const Finished run = run_pons(words);
+    EXPECT_EQ(run.code, 2) << wrong[0] << run.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "new")) << wrong[0];
+  }
+}
+
 TEST_F(RoundsProgram, OneCommandMakesTheRound) {
   const Finished run = run_pons({"run", "rounds", "--explain", "--report", folder_ / "r.json", "--speech",
                                  folder_ / "speech", "--picture", folder_ / "p.png"});
@@ -100,6 +112,9 @@ TEST_F(RoundsProgram, WhatNobodyCanDoIsRefusedBeforeTheRun) {
                       {"/steps/0/params/frame_id"});
   expect_task_refused(R"({"id":"x","steps":[{"skill":"speak","params":{"text":""}}]})", {"/steps/0/params/text"});
   expect_task_refused("{", {"bad.json"});
+  expect_task_refused(R"({"id":"x","tree":{"xml":"<root BTCPP_format=\"4\"><BehaviorTree><speak text=\"{said}\"/>)"
+                      R"(</BehaviorTree></root>"}})",
+                      {"x/tree/inputs", "reads 'said', which nothing in it sets"});
   expect_refused({"run", "rounds", "--task", folder_ / "none.json"}, {"none.json", "cannot be read"});
   expect_refused({"run", "rounds", "--task", (folder_ / "inspect.json").string() + "@soon"}, {"is no time"});
   expect_refused({"run", "rounds", "--task", folder_ / "inspect.json", "--task", folder_ / "inspect.json"},

@@ -271,19 +271,23 @@ TEST_F(SweepTest, PlansRunsThatAreMadeByThemselvesAndMerged) {
 }
 
 TEST_F(SweepTest, MergesAroundReportsThatAreCutOrOfAnotherForm) {
-  ASSERT_EQ(run_pons(sweep({"--seeds", "1-3", "--quiet"})).code, 0);
+  ASSERT_EQ(run_pons(sweep({"--seeds", "1-4", "--quiet"})).code, 0);
   const std::string whole = read_text(run(1) / "report.json");
   write_text(run(1) / "report.json", whole.substr(0, whole.size() / 2));
   json other = read_json(run(2) / "report.json");
   other["version"] = 99;
   write_text(run(2) / "report.json", other.dump());
   write_text(run(3) / "outcome.json", "{");
+  json copied = read_json(run(4) / "report.json");
+  copied["fault_plan"] = "robin";
+  write_text(run(4) / "report.json", copied.dump());
   const Finished merged = run_pons({"sweep", "--merge", out()});
   EXPECT_EQ(merged.code, 4) << merged.err;
-  EXPECT_THAT(merged.out, AllOf(HasSubstr("report.json: is cut"), HasSubstr("is of version 99"),
-                                HasSubstr("outcome.json: is cut")));
-  EXPECT_EQ(report()["totals"]["runs"]["failed"], 3);
-  EXPECT_EQ(run_pons(sweep({"--seeds", "1-3", "--quiet"})).code, 0) << "and makes them again";
+  EXPECT_THAT(merged.out,
+              AllOf(HasSubstr("report.json: is cut"), HasSubstr("is of version 99"), HasSubstr("outcome.json: is cut"),
+                    HasSubstr("its report is of parcel_cell, faults robin, seed 4")));
+  EXPECT_EQ(report()["totals"]["runs"]["failed"], 4);
+  EXPECT_EQ(run_pons(sweep({"--seeds", "1-4", "--quiet"})).code, 0) << "and makes them again";
 }
 
 // A base, and worlds beside one another.
