@@ -84,11 +84,13 @@ Expected<void> take_in_tree(std::map<std::string, Entry>& entries, const bridge:
   std::set<std::string> picked, placed;
   std::string last;
   for (const bridge::Event& event : (*history)->events) {
-    const std::int64_t leaf = event.detail.value("step", std::int64_t{-1});
-    if (event.kind == bridge::kAttemptEvent) trying.insert_or_assign(leaf, event);
+    const bool begins = event.kind == bridge::kAttemptEvent;
     const bool succeeded =
         event.kind == bridge::kFoundDoneEvent ||
         (event.kind == bridge::kAttemptEndedEvent && task::text_of(event.detail, "status") == "succeeded");
+    if (!begins && !succeeded) continue;
+    const std::int64_t leaf = event.detail.value("step", std::int64_t{-1});
+    if (begins) trying.insert_or_assign(leaf, event);
     const auto begun = trying.find(leaf);
     if (!succeeded || begun == trying.end()) continue;
     const std::string skill = task::text_of(begun->second.detail, "skill");

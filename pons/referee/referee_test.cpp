@@ -107,6 +107,7 @@ TEST_F(RefereeTest, WhatATreePutsSomewhereItsLeavesSay) {
       ASSERT_TRUE(journal_->event(id, Time{}, kind, detail));
     };
     tell("started", Json::object());
+    tell("resumed", {{"step", {1, 2}}});
     tell("attempt", {{"step", 3}, {"skill", "pick"}, {"attempt", 1}, {"arguments", {{"object", object}}}});
     tell("attempt_ended", {{"step", 3}, {"skill", "pick"}, {"attempt", 1}, {"status", "succeeded"}});
     tell("attempt", {{"step", 5}, {"skill", "place"}, {"attempt", 1}, {"arguments", {{"place", "chute_1"}}}});

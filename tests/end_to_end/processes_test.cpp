@@ -194,7 +194,8 @@ TEST_F(Processes, ATreeGoesOnAtTheLastNodeThatWasDoneBeforeItsBridgeWasKilled) {
   }
   Running second(folder_.path(), "second", bridge(3));
   EXPECT_EQ(second.wait().code, 0) << second.err();
-  EXPECT_EQ(body_process.wait().code, 0);
+  const Finished ended = body_process.wait();
+  EXPECT_EQ(ended.code, 0) << ended.out << ended.err;
   EXPECT_EQ(outcomes(folder_ / "j.db").at("T"), "SUCCEEDED");
   const auto journal = bridge::Journal::open_to_read(folder_ / "j.db");
   ASSERT_TRUE(journal) << journal.error().line();
