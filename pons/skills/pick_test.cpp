@@ -406,6 +406,22 @@ TEST_F(PickTest, WhatDoesNotComeIsLeftForWhatTheBeltWaitsFor) {
   EXPECT_EQ(cell_.chance("P2"), task::Chance::kNow);
 }
 
+// Whoever decides of both arms' knows what it has decided by its track.
+TEST_F(PickTest, WhatTwoArmsPutBackIsToldApart) {
+  const auto link = std::make_unique<link::Link>();
+  link::BridgeEnd end(*link);
+  Cell other(end, world_, model::RobotModel::load(world_.robot).value());
+  cell_.beside(other);
+  other.beside(cell_);
+  other.strays = cell_.strays;
+  for (Cell* const cell : {&cell_, &other}) {
+    cell->held = Held{cell == &cell_ ? "P1" : "P2", {.size_m = {0.2, 0.15, 0.1}}, 0.5};
+    cell->left_on_belt(Cell::tip_down({0, 0, 1.1}, 0));
+  }
+  ASSERT_EQ(cell_.left().size() + other.left().size(), 2U);
+  EXPECT_NE(cell_.left()[0].track, other.left()[0].track);
+}
+
 TEST_F(PickTest, WhatAWeakVacuumCannotLiftIsLeftToTheNextArm) {
   world::World shared = world_;
   shared.next_arm = "arm_2";

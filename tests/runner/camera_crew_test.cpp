@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <latch>
 #include <map>
@@ -41,7 +42,12 @@ class CountingCamera final : public body::Camera {
     opened.insert(now);
     camera_.begin(now);
   }
-  [[nodiscard]] Expected<void> finish(RgbdFrame& frame) override { return camera_.finish(frame); }
+  [[nodiscard]] Expected<void> finish(RgbdFrame& frame) override {
+    auto finished = camera_.finish(frame);
+    if (covered) std::fill_n(frame.depth_m.data(), frame.depth_m.size(), 0.0F);
+    return finished;
+  }
+  std::atomic<bool> covered = false;
   int shutters = 0;
   std::set<Time> opened;
 
@@ -113,6 +119,25 @@ TEST(CameraCrew, NothingIsKnownBeforeItsLatencyHasPassed) {
   EXPECT_GE(snapshots.size(), 14U);
   EXPECT_TRUE(std::ranges::any_of(snapshots, [](const Snapshot& s) { return !s.objects.empty(); }));
   EXPECT_EQ(snapshots.back().occupancy.at("tray"), 0);
+}
+
+// Who takes over waits for pictures of what is there.
+TEST(CameraCrew, WhatACoveredCameraShowsWasNotSeen) {
+  Scene scene;
+  const auto runs = [&](int periods) {
+    Time seen;
+    for (int i = 0; i < periods; ++i) {
+      if (const auto snapshot = scene.period()) seen = snapshot->belt_seen;
+    }
+    return seen;
+  };
+  const Time seen = runs(100);
+  EXPECT_GT(seen, Time(std::chrono::milliseconds(500)));
+  for (CountingCamera& camera : scene.cameras) camera.covered = true;
+  const Time covered_at = scene.now;
+  EXPECT_LE(runs(100), covered_at + std::chrono::milliseconds(200)) << "but for those that were on their way";
+  for (CountingCamera& camera : scene.cameras) camera.covered = false;
+  EXPECT_GT(runs(100), covered_at + std::chrono::seconds(1));
 }
 
 TEST(CameraCrew, LabelsArePhotographedOnlyWhileSomethingLiesUnread) {

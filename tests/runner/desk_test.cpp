@@ -90,6 +90,17 @@ TEST(ByHand, NobodyHearsOfATaskBeforeTheDiskHasIt) {
   EXPECT_FALSE(bridge.unkept());
 }
 
+// The next bridge would give its number to another event, and who watches from there on would miss one.
+TEST_F(DeskOfARobot, NothingOfATaskIsToldBeforeTheDiskHasIt) {
+  bridge_.note("seen", {{"track", 1}}, Time{}, "P1");
+  ASSERT_GT(journal_->newest(), journal_->durable());
+  ASSERT_FALSE(bridge_.unkept()) << "nobody waits for it";
+  visitor_.texts = {R"({"op":"history","id":"P1"})"};
+  desk_.attend(Time{});
+  EXPECT_EQ(visitor_.told.at("events").size(), 1U);
+  EXPECT_EQ(journal_->durable(), visitor_.told.at("events").back().at("sequence"));
+}
+
 // Of a run without robots and skills.
 class BareDesk : public testing::Test {
  protected:
