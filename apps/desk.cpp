@@ -31,6 +31,11 @@ Json to_json(const ObjectBelief& object) {
           {"size_m", list_of(object.size_m)}};
 }
 
+Expected<gate::Asked> asked_by(const gate::Request& request) {
+  if (request.refused) return std::unexpected(*request.refused);
+  return gate::asked_from(request.text);
+}
+
 bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kApprove; }
 
 // What the next bridge keeps to, if it finds it in the journal.
@@ -95,8 +100,7 @@ void Desk::attend(Time now) {
   std::ranges::stable_partition(
       requests, [](const gate::Request& request) { return !request.refused && gate::asks_to_stop(request.text); });
   for (gate::Request& request : requests) {
-    auto asked =
-        request.refused ? Expected<gate::Asked>(std::unexpected(*request.refused)) : gate::asked_from(request.text);
+    auto asked = asked_by(request);
     if (!asked) note_refusal(request.text, asked.error(), now);
     if (asked && asked->operation == gate::Operation::kWatch && watchers_.size() < kWatchersMost) {
       watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
@@ -123,8 +127,7 @@ void Desk::attend(Time now) {
 
 void Desk::take_leave(Time now) {
   for (gate::Request& request : visitors_->poll()) {
-    auto asked =
-        request.refused ? Expected<gate::Asked>(std::unexpected(*request.refused)) : gate::asked_from(request.text);
+    auto asked = asked_by(request);
     if (asked && asked->operation == gate::Operation::kWatch) {
       watchers_.push_back({std::move(request), std::move(*asked), now + kWatchedFor});
     } else {

@@ -36,6 +36,14 @@ class Approvals : public BridgeTest {
         fmt::format(R"({{"id":"{}","steps":[{{"skill":"pick","arguments":{{"object":"{}"}}}}]}})", id, object));
   }
   Expected<Admission> submit_text(const std::string& text) { return bridge_->submit(text, now_); }
+  void ask_for_two_of_which_b_is_allowed() {
+    open(asks());
+    masses_ = {{"crate", 3.0}};
+    ASSERT_TRUE(pick("a", "crate"));
+    ASSERT_TRUE(pick("b", "crate"));
+    ASSERT_TRUE(bridge_->approve("b", "operator", "Kim", now_));
+    ASSERT_TRUE(bridge_->commit(now_));
+  }
   static world::Review asks(double within_s = 600) {
     return {.tiers = {"operator", "supervisor"},
             .rules = {{.name = "heavy",
@@ -264,12 +272,7 @@ TEST_F(Approvals, AFaultOfTheBridgeLeavesThemOpenInTheJournal) {
 }
 
 TEST_F(Approvals, TheNextBridgeAsksAgainUnlessItWasAllowed) {
-  open(asks());
-  masses_ = {{"crate", 3.0}};
-  ASSERT_TRUE(pick("a", "crate"));
-  ASSERT_TRUE(pick("b", "crate"));
-  ASSERT_TRUE(bridge_->approve("b", "operator", "Kim", now_));
-  ASSERT_TRUE(bridge_->commit(now_));
+  ask_for_two_of_which_b_is_allowed();
   begin();
   ASSERT_TRUE(bridge_->recover([](const task::Task&, std::size_t done) { return Resumption{.done = done}; }, now_));
   EXPECT_EQ(bridge_->state("a"), "asks a person");
@@ -285,12 +288,7 @@ TEST_F(Approvals, TheNextBridgeAsksAgainUnlessItWasAllowed) {
 
 // It has no picture yet, by which it would ask of itself.
 TEST_F(Approvals, TheNextBridgeStillAsksWhatItCannotSeeTheReasonOf) {
-  open(asks());
-  masses_ = {{"crate", 3.0}};
-  ASSERT_TRUE(pick("a", "crate"));
-  ASSERT_TRUE(pick("b", "crate"));
-  ASSERT_TRUE(bridge_->approve("b", "operator", "Kim", now_));
-  ASSERT_TRUE(bridge_->commit(now_));
+  ask_for_two_of_which_b_is_allowed();
   masses_ = Json::object();
   for (int life = 0; life < 2; ++life) {
     begin();

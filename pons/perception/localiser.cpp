@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pons/perception/shows.hpp"
+
 namespace pons::perception {
 namespace {
 
@@ -25,14 +27,6 @@ constexpr double kOnMap_m = 0.10;
 constexpr double kUnmapped_m = 0.20;  // as far from any edge something else stands
 // With fewer, or fewer that fit, a scan says nothing: the base is shut in, or lost.
 constexpr int kFewest = 20;
-constexpr std::size_t kOneIn = 100;  // ray at least tells how far something is, or that nothing is there
-
-// Of a lidar that is covered or broken, which is no open hall: there rays have no end.
-bool is_blind(const RgbdFrame& frame) {
-  const auto read =
-      std::count_if(frame.depth_m.begin(), frame.depth_m.end(), [](float range_m) { return range_m > 0; });
-  return static_cast<std::size_t>(read) * kOneIn < frame.depth_m.size();
-}
 
 }  // namespace
 
@@ -43,7 +37,7 @@ Localiser::Localiser(const world::World& world)
 
 void Localiser::process(const RgbdFrame& frame, const Moment& moment) {
   predict(moment.joint_position.of[0]);
-  if (is_blind(frame)) return;  // what was believed grows old, until nobody goes by it
+  if (!shows_anything(frame)) return;  // what was believed grows old, until nobody goes by it
   take_ends(frame);
   if (static_cast<int>(ends_.size()) >= kFewest) correct();
   map_from_base_.yaw = wrapped(map_from_base_.yaw);

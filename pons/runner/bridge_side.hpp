@@ -51,8 +51,8 @@ class BridgeSide {
   // Lets running skills leave the world safe and takes no more from the brain; tick on until idle().
   void stop(Time now, const std::string& reason);
   [[nodiscard]] bool idle() const;
-  // Nothing new is decided, taken or begun; the belt waits; tasks that run stand at
-  // their next safe point, and go on with go_on(). Either may be called again.
+  // Nothing new is decided, taken or begun; the belt waits; tasks that run stand at their next safe point, and go on
+  // with go_on(). Either may be called again.
   void rest(Time now);
   void go_on(Time now);
   // Whether all that stands by now.

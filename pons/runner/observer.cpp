@@ -3,19 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "pons/perception/shows.hpp"
+
 namespace pons::runner {
 namespace {
 
 constexpr timespec kNever{.tv_sec = 1'000'000'000, .tv_nsec = 0};
-
-// By a sample of its readings: one in a hundred is enough. A camera that is covered or broken has none.
-bool shows_anything(const RgbdFrame& frame) {
-  constexpr std::size_t kSample = 1000, kOneIn = 100;
-  const std::size_t pixels = frame.depth_m.size(), stride = std::max<std::size_t>(1, pixels / kSample);
-  std::size_t looked_at = 0, read = 0;
-  for (std::size_t i = 0; i < pixels; i += stride, ++looked_at) read += frame.depth_m[i] > 0 ? 1U : 0U;
-  return read * kOneIn >= looked_at;
-}
 
 }  // namespace
 
@@ -78,7 +71,7 @@ Snapshot Observer::take_in(std::size_t camera) {
   RgbdFrame& frame = frames_[camera];
   frame.stamp = shot.stamp;
   perception_.process(frame, {shot.joint_position, shot.belt_travel_m});
-  const bool shows = shows_anything(frame);
+  const bool shows = perception::shows_anything(frame);
   if (shows) shown_[camera] = shot.stamp;
   if (shows && world_.cameras[camera].watches == "belt") {
     belt_seen_ = shot.stamp;

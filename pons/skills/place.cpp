@@ -64,7 +64,7 @@ class Place final : public ArmSkill {
   Progress tick(Time now) override {
     move_along(delay_.take());
     if (!let_go_.empty() && !cell_.held) return gone(now);
-    if (phase_ == Phase::kFall) return fallen(now);
+    if (phase_ == Phase::kFall) return fall_on(now);
     if (!cell_.arm.operational()) return stopped(now);
     stopped_ = false;
     switch (phase_) {
@@ -311,10 +311,10 @@ class Place final : public ArmSkill {
     cell_.mouths.expect_anywhere(now);
     fell_at_ = now;
     phase_ = Phase::kFall;
-    return fallen(now);
+    return fall_on(now);
   }
 
-  Progress fallen(Time now) {
+  Progress fall_on(Time now) {
     Progress progress = fall(now);
     if (task::is_end(progress.status)) cell_.lost.reset();
     return progress;
