@@ -38,6 +38,11 @@ Expected<gate::Asked> asked_by(const gate::Request& request) {
 
 bool tells_of_tasks(gate::Operation operation) { return operation <= gate::Operation::kApprove; }
 
+bool only_looks(gate::Operation operation) {
+  using enum gate::Operation;
+  return operation == kList || operation == kShow || operation == kHistory || operation == kWatch;
+}
+
 // What the next bridge keeps to, if it finds it in the journal.
 bool outlasts_bridge(gate::Operation operation) {
   using enum gate::Operation;
@@ -55,7 +60,7 @@ const Error kNoStream{"no stream goes on", "chunk_stream",
 
 }  // namespace
 
-Desk::Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
+Desk::Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, bridge::Journal& journal,
            std::vector<runner::Arming*> arming, const runner::Health& health, Stream stream)
     : visitors_(std::move(visitors)),
       bridge_(bridge),
@@ -95,6 +100,7 @@ Json Desk::take(const gate::Asked& asked, Time now) {
 
 void Desk::attend(Time now) {
   std::vector<std::pair<gate::Request, Json>> of_tasks;
+  bool changes = false;
   std::vector<gate::Request> requests = visitors_->poll();
   // No stop waits for what came before it.
   std::ranges::stable_partition(
@@ -114,13 +120,15 @@ void Desk::attend(Time now) {
     }
     if (!asked || tells_of_tasks(asked->operation)) answered["time_s"] = now.s();
     if (asked && tells_of_tasks(asked->operation)) {
+      changes |= !only_looks(asked->operation);
       of_tasks.emplace_back(std::move(request), std::move(answered));
     } else {
       request.reply(answered);
     }
   }
-  // Nobody hears of anything of a task before the disk has it; all who came in this period wait for it together.
-  const auto kept = of_tasks.empty() ? Expected<void>{} : bridge_.commit(now);
+  // Nobody hears of anything of a task before the disk has it; all who came in this period wait for it together. Who
+  // only looks changes nothing of the run, nor of its recording.
+  const auto kept = changes ? bridge_.commit(now) : of_tasks.empty() ? Expected<void>{} : journal_.commit();
   for (auto& [request, answered] : of_tasks) request.reply(kept ? answered : gate::refusal(kept.error()));
   tell_watchers(now);
 }
@@ -260,7 +268,8 @@ Json Desk::history(const std::string& order) const {
 
 std::optional<Json> Desk::news(const gate::Asked& asked, std::int64_t after) const {
   const bool all = asked.task.empty();
-  auto events = all ? journal_.since(after, gate::kWatchedAtOnce) : journal_.history(asked.task, after);
+  auto events =
+      all ? journal_.since(after, journal_.durable(), gate::kWatchedAtOnce) : journal_.history(asked.task, after);
   if (!events) return gate::refusal(events.error());
   if (!all && events->empty() && after == 0) return history(asked.task);  // nothing is known of it
   std::erase_if(*events, [&](const bridge::Event& event) { return event.sequence > journal_.durable(); });

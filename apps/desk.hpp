@@ -26,7 +26,7 @@ class Desk {
   using Stream = std::function<task::ChunkStream*()>;
   // All but the visitors must outlive it. `arming` is that of each robot: a stop is for all of them, a reset and an
   // arming for those that wait for a person.
-  Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, const bridge::Journal& journal,
+  Desk(std::unique_ptr<gate::Visitors> visitors, bridge::Bridge& bridge, bridge::Journal& journal,
        std::vector<runner::Arming*> arming, const runner::Health& health, Stream stream);
   // Of which it may be asked that it rests, goes on or ends, which is refused without; it outlives this.
   void serve(runner::BridgeSide& run) { run_ = &run; }
@@ -75,7 +75,7 @@ class Desk {
 
   std::unique_ptr<gate::Visitors> visitors_;
   bridge::Bridge& bridge_;
-  const bridge::Journal& journal_;
+  bridge::Journal& journal_;
   std::vector<runner::Arming*> arming_;
   const runner::Health& health_;
   Stream stream_;

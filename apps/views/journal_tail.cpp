@@ -4,16 +4,16 @@ namespace pons::apps {
 
 // A journal that cannot be read ends the run by itself.
 void JournalTail::show(Time) {
-  using Until = bridge::Journal::Until;
-  for (const Until until : {Until::kNewest, Until::kDurable}) {
-    Listeners& listeners = until == Until::kDurable ? durable_ : written_;
-    if (listeners.hears.empty()) continue;
-    const auto events = journal_.since(listeners.after, kAtOnce, until);
+  const bridge::Journal& journal = bridge_.journal();
+  for (Listeners* const listeners : {&written_, &kept_}) {
+    if (listeners->hears.empty()) continue;
+    const std::int64_t last = listeners == &kept_ ? bridge_.kept() : journal.newest();
+    const auto events = journal.since(listeners->after, last, kAtOnce);
     if (!events) continue;
     for (const bridge::Event& event : *events) {
-      listeners.after = event.sequence;
-      if (until == Until::kNewest && !event.task.empty()) continue;
-      for (const Hears& hears : listeners.hears) hears(event);
+      listeners->after = event.sequence;
+      if (listeners == &written_ && !event.task.empty()) continue;
+      for (const Hears& hears : listeners->hears) hears(event);
     }
   }
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/views/outlets.hpp"
-#include "pons/bridge/journal/journal.hpp"
+#include "pons/bridge/bridge.hpp"
 #include "pons/core/time.hpp"
 
 namespace pons::apps {
@@ -18,11 +18,11 @@ class JournalTail final : public View {
   static constexpr std::int64_t kAtOnce = 64;
   using Hears = std::function<void(const bridge::Event& event)>;
 
-  // From its newest event on. It outlives this.
-  explicit JournalTail(const bridge::Journal& journal)
-      : journal_(journal), durable_{.after = journal.durable()}, written_{.after = journal.durable()} {}
-  // Of each event once it is durable.
-  void add(Hears hears) { durable_.hears.push_back(std::move(hears)); }
+  // Of its journal, from the last durable event on. It outlives this.
+  explicit JournalTail(const bridge::Bridge& bridge)
+      : bridge_(bridge), kept_{.after = bridge.journal().durable()}, written_{.after = bridge.journal().durable()} {}
+  // Of each event once the bridge has kept it.
+  void add(Hears hears) { kept_.hears.push_back(std::move(hears)); }
   // Of those of no task once they are written: nobody was promised anything by them, and a stop is no news later.
   void add_at_once(Hears hears) { written_.hears.push_back(std::move(hears)); }
   // Before those that hear of it show what they have heard. Waits for the disk, for as long as a few rows take.
@@ -34,8 +34,8 @@ class JournalTail final : public View {
     std::vector<Hears> hears = {};
   };
 
-  const bridge::Journal& journal_;
-  Listeners durable_, written_;
+  const bridge::Bridge& bridge_;
+  Listeners kept_, written_;
 };
 
 }  // namespace pons::apps

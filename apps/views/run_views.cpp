@@ -12,7 +12,7 @@ std::string logger_name(const gate::ros::NodeName& name) {
 
 Expected<std::unique_ptr<RunViews>> RunViews::open(Outlets& outlets, const bridge::Bridge& bridge,
                                                    const gate::ros::NodeName& name, HealthView::Sources health) {
-  std::unique_ptr<RunViews> views(new RunViews(bridge.journal()));
+  std::unique_ptr<RunViews> views(new RunViews(bridge));
   auto tasks = TasksView::open(outlets, bridge, views->tail_);
   if (!tasks) return std::unexpected(tasks.error());
   views->tasks_ = *std::move(tasks);

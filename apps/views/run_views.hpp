@@ -30,7 +30,7 @@ class RunViews final : public View {
   void say(std::uint8_t level, Time at, std::string_view line) { log_->say(level, at, line); }
 
  private:
-  explicit RunViews(const bridge::Journal& journal) : tail_(journal) {}
+  explicit RunViews(const bridge::Bridge& bridge) : tail_(bridge) {}
 
   JournalTail tail_;
   std::unique_ptr<TasksView> tasks_;

@@ -415,7 +415,10 @@ Expected<void> Bridge::commit(Time now) {
   unkept_ = false;
   const auto durable = journal_.commit();
   keep(durable);
-  if (durable) std::ranges::move(ended_, std::back_inserter(outcomes_));
+  if (durable) {
+    kept_ = journal_.durable();
+    std::ranges::move(ended_, std::back_inserter(outcomes_));
+  }
   ended_.clear();
   return durable;
 }

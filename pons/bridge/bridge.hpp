@@ -156,6 +156,9 @@ class Bridge {
   [[nodiscard]] Expected<void> commit(Time now);
   // Whether an acceptance or an outcome waits for that, or never will be durable: tell nobody of tasks before.
   [[nodiscard]] bool unkept() const { return unkept_ || fault_; }
+  // The sequence up to which it has made the journal's events durable in its own time: those who look on may have the
+  // disk asked for more, but by them nothing becomes part of a recording earlier.
+  [[nodiscard]] std::int64_t kept() const { return kept_; }
 
   // Since the last call, in the order of their writing; none before the journal holds it for good.
   [[nodiscard]] std::vector<OutcomeReport> take_outcomes();
@@ -308,6 +311,7 @@ class Bridge {
   std::optional<Error> fault_, closed_;
   std::size_t shared_work_ = 0;  // of this tick, by those that need no resource
   std::string next_;             // of those, who has the first turn in the next tick; empty: all have had theirs
+  std::int64_t kept_ = 0;
   Time last_commit_, last_tick_, look_at_;  // the last: into the order book again
   Duration held_for_{0};                    // since the first tick
   std::int64_t retries_ = 0, refused_ = 0;

@@ -1,6 +1,7 @@
 // In which order visitors are answered.
 #include "apps/desk.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -10,10 +11,14 @@
 #include <vector>
 
 #include "apps/by_hand.hpp"
+#include "apps/views/journal_tail.hpp"
 #include "pons/bridge/test_kit.hpp"
 
 namespace pons::apps {
 namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
 
 class Asks final : public gate::Visitors {
  public:
@@ -99,6 +104,22 @@ TEST_F(DeskOfARobot, NothingOfATaskIsToldBeforeTheDiskHasIt) {
   desk_.attend(Time{});
   EXPECT_EQ(visitor_.told.at("events").size(), 1U);
   EXPECT_EQ(journal_->durable(), visitor_.told.at("events").back().at("sequence"));
+}
+
+// When someone looks is another time in each run; what its recording shows, and in which order, must not be.
+TEST_F(DeskOfARobot, WhoLooksIsNotSeenInARecording) {
+  JournalTail tail(bridge_);
+  std::vector<std::string> heard;
+  tail.add([&](const bridge::Event& event) { heard.push_back(event.kind); });
+  bridge_.note("seen", {{"track", 1}}, Time{}, "P1");
+  visitor_.texts = {R"({"op":"history","id":"P1"})", R"({"op":"list"})", R"({"op":"show","id":"P1"})"};
+  desk_.attend(Time{});
+  ASSERT_EQ(answered_.size(), 3U);
+  tail.show(Time{});
+  EXPECT_THAT(heard, IsEmpty());
+  ASSERT_TRUE(bridge_.commit(Time{}));
+  tail.show(Time{});
+  EXPECT_THAT(heard, ElementsAre("seen"));
 }
 
 // Of a run without robots and skills.

@@ -22,7 +22,7 @@ class TasksViewTest : public bridge::BridgeTest {
  protected:
   void open() {
     view_.reset();
-    tail_ = std::make_unique<JournalTail>(*journal_);
+    tail_ = std::make_unique<JournalTail>(*bridge_);
     auto opened = TasksView::open(outlets_, *bridge_, *tail_);
     ASSERT_TRUE(opened) << opened.error().line();
     view_ = *std::move(opened);

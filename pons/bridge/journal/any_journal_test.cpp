@@ -54,24 +54,24 @@ TEST_P(AnyJournal, KeepsTasksEventsAndOutcomesOverARestart) {
   EXPECT_EQ(counts.events, 6) << "acceptances and outcomes among them";
 }
 
-TEST_P(AnyJournal, TellsWhatIsDurableSinceAnEvent) {
+TEST_P(AnyJournal, TellsWhatWasWrittenSinceAnEvent) {
   const auto journal = open();
   const std::int64_t before = journal->durable();
   EXPECT_EQ(journal->accept(sample("a"), at(1)), Accepted::kNew);
   EXPECT_TRUE(journal->note(at(2), "ride", {{"code", "P1"}}, "P1"));
-  EXPECT_TRUE(journal->since(before, 10).value().empty()) << "a power cut could take it back";
-  EXPECT_EQ(journal->since(before, 10, Journal::Until::kNewest).value().size(), 2u);
+  EXPECT_TRUE(journal->since(before, journal->durable(), 10).value().empty()) << "a power cut could take it back";
+  EXPECT_EQ(journal->since(before, journal->newest(), 10).value().size(), 2u);
   ASSERT_TRUE(journal->commit());
   EXPECT_TRUE(journal->event("a", at(3), kStartedEvent));
-  const auto events = journal->since(before, 10).value();
+  const auto events = journal->since(before, journal->durable(), 10).value();
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0].kind, kAcceptedEvent);
   EXPECT_EQ(events[0].task, "a");
   EXPECT_EQ(events[1].order, "P1");
   EXPECT_EQ(events[1].sequence, journal->durable());
-  EXPECT_EQ(journal->since(before, 1).value().size(), 1u);
-  EXPECT_EQ(journal->since(events[0].sequence, 10).value().size(), 1u);
-  EXPECT_TRUE(journal->since(events[1].sequence, 10).value().empty());
+  EXPECT_EQ(journal->since(before, journal->durable(), 1).value().size(), 1u);
+  EXPECT_EQ(journal->since(events[0].sequence, journal->durable(), 10).value().size(), 1u);
+  EXPECT_TRUE(journal->since(events[1].sequence, journal->durable(), 10).value().empty());
 }
 
 TEST_P(AnyJournal, WhatWasCommittedSurvivesAKillAndNothingElse) {

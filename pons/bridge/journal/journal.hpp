@@ -161,11 +161,8 @@ class Journal {
   // All that belongs to an order, of whatever task or of none, written after that sequence; a task's own id will do as
   // well.
   [[nodiscard]] Expected<std::vector<Event>> history(std::string_view order, std::int64_t after = 0) const;
-  // At most so many of those written after that sequence, in their order, as far as they are durable or at all; of one
-  // opened for writing.
-  enum class Until : std::uint8_t { kDurable, kNewest };
-  [[nodiscard]] Expected<std::vector<Event>> since(std::int64_t after, std::int64_t most,
-                                                   Until until = Until::kDurable) const;
+  // At most so many of those written after one sequence and up to another, in their order.
+  [[nodiscard]] Expected<std::vector<Event>> since(std::int64_t after, std::int64_t last, std::int64_t most) const;
   // The sequence of the last event that was written, and of the last that a commit has made durable; of one opened for
   // writing.
   [[nodiscard]] std::int64_t newest() const;

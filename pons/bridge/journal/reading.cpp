@@ -155,8 +155,7 @@ Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64
   return impl_->all_of(finds.bind(order).bind(after));
 }
 
-Expected<std::vector<Event>> Journal::since(std::int64_t after, std::int64_t most, Until until) const {
-  const std::int64_t last = until == Until::kDurable ? impl_->durable : newest();
+Expected<std::vector<Event>> Journal::since(std::int64_t after, std::int64_t last, std::int64_t most) const {
   if (after >= last) return std::vector<Event>{};
   return impl_->all_of(impl_->events_since.bind(after).bind(last).bind(most));
 }
