@@ -377,7 +377,7 @@ std::vector<runner::SkillPort> BridgeHalf::skill_ports() {
          .halt = [&cell] { cell.arm.halt(); },
          .raise_emergency = [&end] { end.raise_emergency_stop(); },
          .release_emergency = [&end] { end.clear_emergency_stop(); },
-         .carries = [&take_up] { return take_up.carries(); },
+         .carries = [&take_up]() -> const task::Json& { return take_up.carries(); },
          .takes_until_m = cell.world.belt.pick_x_max_m,
          .lets_pass = [&cell] { return cell.lets_pass(); },
          .restore = [&take_up](const task::Json& carried) { take_up.restore(carried); },

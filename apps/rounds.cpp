@@ -244,7 +244,10 @@ std::vector<runner::SkillPort> Rounds::skill_ports() {
            .halt = [&wheels] { wheels.halt(); },
            .raise_emergency = [this] { bridge_end.raise_emergency_stop(); },
            .release_emergency = [this] { bridge_end.clear_emergency_stop(); },
-           .carries = [] { return bridge::Json{}; },
+           .carries = []() -> const bridge::Json& {
+             static const bridge::Json kNothing;
+             return kNothing;
+           },
            .restore = [](const bridge::Json&) {},
            .resume =
                [](const task::Task&, std::size_t done) {

@@ -362,11 +362,11 @@ void BridgeSide::note_seen(const std::string& code, const std::vector<ObjectBeli
 
 // Durable at once: a bridge that comes after this one must know what hangs there.
 Expected<void> BridgeSide::note_carried(Robot& robot, Time now) {
-  Json carries = robot.skills.carries();
+  const Json& carries = robot.skills.carries();
   bridge_.load(carries.is_object() && !carries.value("gone", false), robot.skills.robot);
   if (carries == robot.carried) return {};
   const std::string code = task::text_of(carries.is_object() ? carries : robot.carried, "code");
-  robot.carried = std::move(carries);
+  robot.carried = carries;
   bridge_.note(bridge::kCarriesEvent, {{"robot", robot.skills.name}, {"load", robot.carried}}, now, code);
   return bridge_.commit(now);
 }

@@ -48,7 +48,7 @@ struct SkillPort {
   std::function<bool(Time)> holds_belt = [](Time) { return false; };  // whether what the arm does wants it to wait
   std::function<void()> halt;                                         // a protective stop
   std::function<void()> raise_emergency, release_emergency;           // the link's emergency word
-  std::function<bridge::Json()> carries;                              // what is on the cups; null when nothing is
+  std::function<const bridge::Json&()> carries;                       // what is on the cups; null when nothing is
   double takes_until_m = 0;                                           // where along the belt it takes hold last
   // Of one that no longer works: whether what rides along the belt passes it where it stands.
   std::function<bool()> lets_pass = [] { return true; };

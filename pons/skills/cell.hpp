@@ -49,6 +49,8 @@ struct Held {
   // Put back before, unseen since, and lifted from among others: until it is weighed in that lift, it may be one of
   // these.
   bool doubtful = false;
+
+  bool operator==(const Held&) const = default;
 };
 
 // A grasp that failed: the parcel may lie elsewhere now, and the arm is in the cameras' way.

@@ -16,6 +16,8 @@ struct Companion {
   std::string code;         // empty: not read
   Eigen::Vector2d aside_m;  // the middle of its top from that of the load's, tip frame
   Vector3 size_m = Vector3::Zero();
+
+  bool operator==(const Companion&) const = default;
 };
 using Company = std::vector<Companion>;
 

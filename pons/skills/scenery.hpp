@@ -18,6 +18,8 @@ struct Load {
   Vector3 size_m = Vector3::Zero();           // along its own axes
   double yaw_in_tip_rad = 0;                  // of its x axis, about the tip's z
   Vector3 offset_in_tip_m = Vector3::Zero();  // of the middle of its top face from the tip
+
+  bool operator==(const Load&) const = default;
 };
 
 // Upstream of it something may lie on the belt that no camera has shown yet, x in m.

@@ -33,9 +33,19 @@ Vector3 vector_from(const Json& json, const char* key) {
 
 }  // namespace
 
-Json TakeUp::carries() const {
-  if (!cell_.held && !cell_.lost) return {};
-  const Held& held = cell_.held ? *cell_.held : *cell_.lost;
+const Json& TakeUp::carries() {
+  const std::optional<Held>& held = cell_.held ? cell_.held : cell_.lost;
+  const bool gone = !cell_.held;
+  if (held != told_ || gone != told_gone_) {
+    carries_ = held ? written(*held) : Json{};
+    if (held && gone) carries_["gone"] = true;
+    told_ = held;
+    told_gone_ = gone;
+  }
+  return carries_;
+}
+
+Json TakeUp::written(const Held& held) const {
   Json carried = {{"code", held.code},
                   {"mass_kg", held.mass_kg},
                   {"size_m", of(held.load.size_m)},
@@ -45,7 +55,6 @@ Json TakeUp::carries() const {
                   {"doubtful", held.doubtful},
                   {"falls", std::span(held.falls).first(cell_.world.places.size())}};
   if (held.from_m) carried["from_m"] = of(*held.from_m);
-  if (!cell_.held) carried["gone"] = true;
   return carried;
 }
 

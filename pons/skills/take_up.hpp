@@ -17,8 +17,9 @@ class TakeUp {
   explicit TakeUp(Cell& cell) : cell_(cell) {}
 
   // What is on the cups, to be written down whenever it changes: {"code":…,"mass_kg":…,"size_m":[…],"yaw_rad":…,
-  // "offset_m":[…],"alone":…,"doubtful":…,"falls":[…],"from_m":[…]}, as in Held; null when nothing is.
-  [[nodiscard]] task::Json carries() const;
+  // "offset_m":[…],"alone":…,"doubtful":…,"falls":[…],"from_m":[…]}, as in Held; null when nothing is. Valid until the
+  // next call.
+  [[nodiscard]] const task::Json& carries();
 
   // After refresh(): believes what was written last, as far as the cups still hold something. What only the bridge that
   // wrote it had seen, beyond the cameras' view, is an obstacle from now on.
@@ -43,6 +44,7 @@ class TakeUp {
   [[nodiscard]] bool settle(Time now);
 
  private:
+  [[nodiscard]] task::Json written(const Held& held) const;
   [[nodiscard]] Falls falls_from(const task::Json& carried) const;
   [[nodiscard]] std::vector<const world::Place*> fallen_into() const;
   [[nodiscard]] bool is_over(const std::string& place) const;
@@ -53,6 +55,9 @@ class TakeUp {
   void hide_below();
 
   Cell& cell_;
+  std::optional<Held> told_;  // of which carries_ tells, which need not be made anew each tick
+  bool told_gone_ = false;
+  task::Json carries_;
   std::string carried_;  // the code that was written down, whether still held or not
   std::optional<Time> called_;
   Time looks_until_;

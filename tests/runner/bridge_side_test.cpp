@@ -59,7 +59,7 @@ class TakeOverTest : public testing::Test {
             .halt = [] {},
             .raise_emergency = [] {},
             .release_emergency = [] {},
-            .carries = [this] { return carries_; },
+            .carries = [this]() -> const bridge::Json& { return carries_; },
             .takes_until_m = world_.belt.pick_x_max_m,
             .restore = [this](const bridge::Json&) { ++restores_; },
             .resume = [](const task::Task&, std::size_t done) { return bridge::Resumption{.done = done}; },

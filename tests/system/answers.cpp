@@ -56,9 +56,10 @@ void Senders::hear_submit(const std::string& id, const Json& answer) {
   }
   for (const Json& one : answer.at("tasks")) {
     const auto name = one.at("id").get<std::string>();
-    Wish& wish = wishes_.at(name);
+    Wishes::value_type& wished = *wishes_.find(name);
+    Wish& wish = wished.second;
     if (!wish.accepted) say_(fmt::format("{} hears that it is accepted", name));
-    if (wish.hopeless) pursued_.push_back(name);  // an answer to an earlier question, late
+    if (wish.hopeless) pursued_.push_back(&wished);  // an answer to an earlier question, late
     wish.accepted = true;
     wish.hopeless = false;
     const auto task = task::task_from(wish.task);

@@ -53,13 +53,12 @@ void Plant::step(Time now, const link::State& loop, const body::SetPoints& told)
 void Plant::ride() {
   const double by_m = kPeriod_s * sensors_.belt_speed_m_s;
   if (by_m == 0) return;
-  std::erase_if(on_belt_, [&](const std::string& code) {
-    Parcel& parcel = parcels_.at(code);
-    parcel.x_m += by_m;
-    if (parcel.x_m < world_.belt.x_end_m) return false;
-    parcel.where = Parcel::Where::kPlace;
-    parcel.place = "exception";
-    say_(fmt::format("{} rides off the belt", code));
+  std::erase_if(on_belt_, [&](Parcel* const parcel) {
+    parcel->x_m += by_m;
+    if (parcel->x_m < world_.belt.x_end_m) return false;
+    parcel->where = Parcel::Where::kPlace;
+    parcel->place = "exception";
+    say_(fmt::format("{} rides off the belt", parcel->code));
     return true;
   });
 }
@@ -93,7 +92,7 @@ void Plant::leave(Parcel& parcel, std::string_view how) {
     parcel.where = Parcel::Where::kBelt;
     parcel.x_m = beside_others(from.x());
     parcel.y_m = from.y();
-    on_belt_.push_back(parcel.code);
+    on_belt_.push_back(&parcel);
     say_(fmt::format("{} is {} over the belt, at {:.2f} m", parcel.code, how, from.x()));
     return;
   }
@@ -111,29 +110,28 @@ void Plant::leave(Parcel& parcel, std::string_view how) {
 
 // What falls onto another slides off it.
 double Plant::beside_others(double x_m) const {
-  const auto touches = [&](const std::string& code) { return std::abs(parcels_.at(code).x_m - x_m) < 2 * kBeside_m; };
+  const auto touches = [&](const Parcel* other) { return std::abs(other->x_m - x_m) < 2 * kBeside_m; };
   while (std::ranges::any_of(on_belt_, touches)) x_m += kBeside_m;
   return x_m;
 }
 
 std::optional<Vector3> Plant::top_of(const std::string& code) const {
-  if (std::ranges::find(on_belt_, code) == on_belt_.end()) return std::nullopt;
-  const Parcel& parcel = parcels_.at(code);
-  return Vector3(parcel.x_m, parcel.y_m, world_.belt.surface_z_m + kParcelHeight_m);
+  const auto parcel = std::ranges::find(on_belt_, code, &Parcel::code);
+  if (parcel == on_belt_.end()) return std::nullopt;
+  return Vector3((*parcel)->x_m, (*parcel)->y_m, world_.belt.surface_z_m + kParcelHeight_m);
 }
 
 void Plant::take(Time) {
   if (told_cups_ == 0 || !held_.empty() || misses_ || on_belt_.empty()) return;
   const Vector3 at = tip();
   if (std::abs(at.z() - world_.belt.surface_z_m - kParcelHeight_m) > kReach_m) return;
-  for (const std::string& code : on_belt_) {
-    Parcel& parcel = parcels_.at(code);
-    if (std::hypot(parcel.x_m - at.x(), parcel.y_m - at.y()) > kBeside_m) continue;
-    held_ = code;
-    parcel.where = Parcel::Where::kCups;
-    ++parcel.taken;
-    say_(fmt::format("the cups take {}", code));
-    std::erase(on_belt_, held_);
+  for (Parcel* const parcel : on_belt_) {
+    if (std::hypot(parcel->x_m - at.x(), parcel->y_m - at.y()) > kBeside_m) continue;
+    held_ = parcel->code;
+    parcel->where = Parcel::Where::kCups;
+    ++parcel->taken;
+    say_(fmt::format("the cups take {}", held_));
+    std::erase(on_belt_, parcel);
     return;
   }
 }
@@ -144,26 +142,24 @@ void Plant::put_on_belt(const std::string& code, const std::string& destination)
                 .track = ++tracks_,
                 .x_m = world_.belt.x_start_m,
                 .y_m = world_.belt.y_center_m};
-  for (const std::string& other : on_belt_)
-    parcel.x_m = std::min(parcel.x_m, parcels_.at(other).x_m - kParcelLength_m - kGap_m);
-  parcels_.emplace(code, std::move(parcel));
-  on_belt_.push_back(code);
+  for (const Parcel* const other : on_belt_) parcel.x_m = std::min(parcel.x_m, other->x_m - kParcelLength_m - kGap_m);
+  on_belt_.push_back(&parcels_.emplace(code, std::move(parcel)).first->second);
 }
 
 std::vector<ObjectBelief> Plant::beliefs(Time now) const {
   std::vector<ObjectBelief> beliefs;
-  for (const std::string& code : on_belt_) {
-    const Parcel& parcel = parcels_.at(code);
-    if (parcel.x_m < world_.belt.x_start_m) continue;
+  beliefs.reserve(on_belt_.size());
+  for (const Parcel* const parcel : on_belt_) {
+    if (parcel->x_m < world_.belt.x_start_m) continue;
     ObjectBelief& belief = beliefs.emplace_back();
-    belief.track = parcel.track;
+    belief.track = parcel->track;
     belief.stamp = belief.last_seen = now;
-    belief.world_from_top.translation() = Vector3(parcel.x_m, parcel.y_m, world_.belt.surface_z_m + kParcelHeight_m);
+    belief.world_from_top.translation() = Vector3(parcel->x_m, parcel->y_m, world_.belt.surface_z_m + kParcelHeight_m);
     belief.velocity_m_s.x() = sensors_.belt_speed_m_s;
     belief.size_m = {kParcelLength_m, kParcelWidth_m, kParcelHeight_m};
     belief.confidence = 1;
     belief.frames_seen = 100;
-    belief.code = code;
+    belief.code = parcel->code;
   }
   return beliefs;
 }

@@ -84,7 +84,7 @@ class Plant {
   Say say_;
   body::Sensors sensors_;
   std::map<std::string, Parcel> parcels_;
-  std::vector<std::string> on_belt_;
+  std::vector<Parcel*> on_belt_;
   std::string held_;  // a code
   std::map<std::pair<std::string, int>, int> printed_;
   std::uint32_t told_cups_ = 0;

@@ -148,7 +148,7 @@ runner::SkillPort Process::skill_port() {
               [this] {
                 if (outside_.steps.alive()) end_.clear_emergency_stop();
               },
-          .carries = [this] { return take_up_.carries(); },
+          .carries = [this]() -> const Json& { return take_up_.carries(); },
           .restore = [this](const Json& carried) { take_up_.restore(carried); },
           .resume = [this](const task::Task& task, std::size_t done) { return resume(task, done); },
           .settle = [this](Time now) { return take_up_.settle(now); }};

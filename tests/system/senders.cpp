@@ -64,8 +64,8 @@ void Senders::step(Time now) {
     meddle(now);
     next_meddling_ = now + (calm_ ? from_s(2) : about(random_, to_s(asking.every) / asking.minds_change));
   }
-  std::erase_if(pursued_, [&](const std::string& id) {
-    Wish& wish = wishes_.at(id);
+  std::erase_if(pursued_, [&](Wishes::value_type* const wished) {
+    auto& [id, wish] = *wished;
     const bool over = wish.ended || wish.hopeless;
     if (!over && now >= wish.ask_at) pursue(id, wish, now);
     return over;
@@ -84,8 +84,8 @@ void Senders::wish(Time now) {
   const std::string all = together > 1 ? Json{{"op", "submit"}, {"tasks", tasks}}.dump() : std::string();
   for (std::size_t i = 0; i < together; ++i) {
     say_(fmt::format("wish {}", tasks[i].dump()));
-    wishes_[ids[i]] = {.task = tasks[i], .together = all, .ask_at = now};
-    pursued_.push_back(ids[i]);
+    const Wish wish{.task = tasks[i], .together = all, .ask_at = now};
+    pursued_.push_back(&*wishes_.insert_or_assign(ids[i], wish).first);
   }
 }
 

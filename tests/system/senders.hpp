@@ -76,10 +76,11 @@ class Senders {
   Referee& referee_;
   Random random_;
   Say say_, wrong_;
-  std::map<std::string, Wish> wishes_;
+  using Wishes = std::map<std::string, Wish>;
+  Wishes wishes_;
   std::vector<std::string> ids_;
-  std::vector<std::string> pursued_;  // of those, the ones that are not over
-  std::set<std::string> paused_;      // tasks that somebody has told to pause, other people's too
+  std::vector<Wishes::value_type*> pursued_;  // of those, the ones that are not over
+  std::set<std::string> paused_;              // tasks that somebody has told to pause, other people's too
   std::map<std::int64_t, Asked> asked_;
   std::int64_t questions_ = 0;
   Time next_wish_, next_meddling_, next_hostility_;

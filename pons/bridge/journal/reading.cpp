@@ -150,7 +150,7 @@ Expected<std::vector<Event>> Journal::outline(std::string_view id, std::string_v
 
 Expected<std::vector<Event>> Journal::history(std::string_view order, std::int64_t after) const {
   // An order may have any number of tasks; who hears what is new in it must not have all of them read each time.
-  constexpr std::int64_t kFew = 1000;
+  constexpr std::int64_t kFew = 64;
   Statement& finds = newest() - after <= kFew ? impl_->news_of_order : impl_->events_of_order;
   return impl_->all_of(finds.bind(order).bind(after));
 }
