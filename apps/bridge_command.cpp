@@ -108,7 +108,7 @@ constexpr int kFarewell = 30;  // periods in which whoever waits for an outcome 
 // Its tasks' outcomes, before the journal is closed.
 int body_gone(BridgeHalf& half, const rt::MonotonicClock& clock) {
   auto told = bridge::end_with_body(*half.journal, clock.now());
-  if (told) told = half.journal->commit();
+  if (told) told = half.bridge->commit(clock.now());  // its own, for the views to tell of it
   if (!told) return bad_run(told.error());
   const rt::MonotonicClock own;  // the body's may stand still
   rt::PeriodicLoop loop(own, runner::kBridgePeriod);

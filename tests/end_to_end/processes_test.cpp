@@ -255,7 +255,9 @@ TEST_F(Processes, APersonsStopOutlivesTheBridgeThatWasTold) {
 
 TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   Running first_body(folder_.path(), "body", body(6));
-  Running bridge_process(folder_.path(), "bridge", bridge(6));
+  std::vector<std::string> recorded = bridge(6);
+  recorded.insert(recorded.end(), {"--record", folder_ / "r.mcap"});
+  Running bridge_process(folder_.path(), "bridge", recorded);
   ASSERT_TRUE(eventually([&] { return !task_at("attempt", "pick").empty(); })) << bridge_process.err();
   const std::string id = task_at("attempt", "pick");
   Running watch(folder_.path(), "watch", {"task", "watch", id, "--socket", folder_ / "s"});
@@ -272,6 +274,9 @@ TEST_F(Processes, ABodyThatIsKilledEndsItsBridgeAndLeavesTheJournalWhole) {
   const Finished watched = watch.wait();
   EXPECT_EQ(watched.code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("FAILED: its body is gone"));
+  (void)run_pons(
+      {"recording", "export", folder_ / "r.mcap", "--jsonl", folder_ / "r.jsonl", "--topic", "/pons/task_events"});
+  EXPECT_THAT(read_text(folder_ / "r.jsonl"), HasSubstr("its body is gone")) << "views hear of it, too";
 
   // What it left does not hinder the next body; the journal of its run is of no use to that one's bridge.
   Running next_body(folder_.path(), "next", body(6, "next"));

@@ -84,8 +84,8 @@ class Plant {
   Say say_;
   body::Sensors sensors_;
   std::map<std::string, Parcel> parcels_;
-  std::vector<Parcel*> on_belt_;
-  std::string held_;  // a code
+  std::vector<Parcel*> on_belt_;  // of those
+  std::string held_;              // a code
   std::map<std::pair<std::string, int>, int> printed_;
   std::uint32_t told_cups_ = 0;
   bool misses_ = false;  // since the cups were switched on
