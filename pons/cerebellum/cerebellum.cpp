@@ -127,8 +127,9 @@ void Cerebellum::take_measurement(Time now, const body::Sensors& sensors) {
     if (still && !is_still_) still_since_ = now;
     is_still_ = still;
   }
-  // The plant may step slower than this loop: carry the measurement on to now, else its age reads as an error.
-  const double age_s = to_s(std::clamp(now - measured_stamp_, Duration{0}, settings_.silence_timeout));
+  // The plant may step slower than this loop, and a tick that was held up finds what was measured after it began: carry
+  // the measurement to now, else its age reads as an error.
+  const double age_s = to_s(std::clamp(now - measured_stamp_, -settings_.silence_timeout, settings_.silence_timeout));
   const bool carries = seen_ && powered_;
   position_now_ = measured_position_;
   speed_now_ = measured_speed_;

@@ -62,6 +62,22 @@ INSTANTIATE_TEST_SUITE_P(Plants, Tracking,
                                          PlantCase{"masses 5 % lighter, 2 ms", {.step = 2ms, .masses = 0.95}, 1e-3}),
                          [](const auto& c) { return "Case" + std::to_string(c.index); });
 
+// A tick that another program held up once it had begun finds the arm where it is some milliseconds later. It must not
+// be pulled back: the drives would do so until the next tick.
+TEST(HeldUp, AnArmMeasuredAfterTheTickBeganIsNotPulledBack) {
+  Bench bench({.step = 1ms});
+  get_moving(bench);
+  const AxisVector before_nm = bench.plant.set_points.torque_nm;
+  bench.plant.advance_to(bench.now + 5ms);
+  bench.tick();
+  const AxisVector change =
+      (bench.plant.set_points.torque_nm - before_nm).cwiseQuotient(bench_robot().limits.torque_nm);
+  EXPECT_LT(change.cwiseAbs().maxCoeff(), 0.05);
+  bench.now += 4ms;
+  bench.run(100ms);
+  EXPECT_TRUE(bench.operational()) << name(bench.state().cause);
+}
+
 // One fast move of every axis with `carried` on the flange; the worst error.
 double move_with(const model::Payload& carried, const model::Payload& told) {
   Settings settings;

@@ -52,7 +52,7 @@ class Navigate final : public Driven {
   }
 
  private:
-  enum class Phase : std::uint8_t { kBacksOff, kPlans, kDrives, kSettles };
+  enum class Phase : std::uint8_t { kPlans, kDrives, kSettles };
 
   void begin_anew() override {
     drives_ = false;
@@ -65,13 +65,13 @@ class Navigate final : public Driven {
   }
 
   Progress go(Time now) override {
-    if (!chassis_.wheels.operational()) return is_stopped(now);
+    if (!chassis_.wheels.operational()) return is_stopped();
+    if (struck_) return remember_what_it_struck(now);
     if (!chassis_.sure()) return look_for_itself(now);
     unsure_since_.reset();
     drives_ = true;
+    if (backs_off_from_) return back_off(now);
     switch (phase_) {
-      case Phase::kBacksOff:
-        return back_off(now);
       case Phase::kPlans:
         return plan(now);
       case Phase::kDrives:
@@ -82,14 +82,24 @@ class Navigate final : public Driven {
     return {Status::kFailed, "unreachable"};
   }
 
-  // By the loop. A stop on a collision ends by itself: what the lidar does not show it would run into again and again.
-  Progress is_stopped(Time now) {
-    if (!std::exchange(drives_, false)) return {};
-    plan_anew();
-    if (!chassis_.wheels.has_struck()) return {};
+  // By the loop. A stop on a collision ends by itself.
+  Progress is_stopped() {
+    const Pose2& here = chassis_.map_from_base();
+    if (std::exchange(drives_, false)) {
+      plan_anew();
+      if (chassis_.wheels.has_struck())
+        struck_ = Struck{here, chassis_.drive.twist(chassis_.wheels.state().commanded.speed).ahead < 0};
+    }
+    // What it ran into may have given way while it braked.
+    if (struck_ && struck_->is_ahead(here.position())) struck_->from = here;
+    return {};
+  }
+
+  // It may drive again. What the lidar does not show it would run into again and again.
+  Progress remember_what_it_struck(Time now) {
     const Vector2 at = feel_front(now);
     notes_.push_back({"collision", {{"at", {at.x(), at.y()}}}});
-    phase_ = Phase::kBacksOff;
+    backs_off_from_ = std::exchange(struck_, std::nullopt);
     renewed_at_.reset();
     if (++collisions_ < kMostCollisions) return {};
     return {Status::kFailed,
@@ -100,9 +110,7 @@ class Navigate final : public Driven {
 
   // Whatever stopped it stands somewhere along the side on which it drove. Where the middle of that is, map frame.
   Vector2 feel_front(Time now) {
-    struck_ = {chassis_.map_from_base(), chassis_.drive.twist(chassis_.wheels.state().commanded.speed).ahead < 0};
-    Pose2 front = struck_.from;
-    if (struck_.backwards) front.yaw += std::numbers::pi;
+    const Pose2 front = struck_->front();
     const auto towards = [&](double aside_rad) {
       return front * Vector2(chassis_.world.base->radius_m * Vector2(std::cos(aside_rad), std::sin(aside_rad)));
     };
@@ -118,11 +126,11 @@ class Navigate final : public Driven {
     renewed_at_ = now;
     const Time from = chassis_.wheels.splice_time(now);
     const Rolling start = chassis_.expected(from);
-    if ((start.map_from_base.position() - struck_.from.position()).norm() >= kBackedOff_m) {
-      phase_ = Phase::kPlans;
+    if ((start.map_from_base.position() - backs_off_from_->from.position()).norm() >= kBackedOff_m) {
+      backs_off_from_.reset();
       return {};
     }
-    const model::Twist2 back{struck_.backwards ? kBacksOff_m_s : -kBacksOff_m_s, 0};
+    const model::Twist2 back{backs_off_from_->backwards ? kBacksOff_m_s : -kBacksOff_m_s, 0};
     if (const auto held = steer_.hold(start, from, back, Room::kKnown)) {
       if (auto sent = chassis_.wheels.stream(*held); !sent) return {Status::kRetry, sent.error().line(), detail()};
     }
@@ -270,13 +278,17 @@ class Navigate final : public Driven {
   std::optional<Time> blocked_since_, unsure_since_;
   std::optional<Pose2> headway_from_;
   int looks_in_vain_ = 0;
-  // Where it was when it ran into something, and how it drove.
+  // Where it touched what it ran into, and how it drove.
   struct Struck {
     Pose2 from;
     bool backwards = false;
+    // It looks where it drove.
+    [[nodiscard]] Pose2 front() const { return {from.x, from.y, from.yaw + (backwards ? std::numbers::pi : 0)}; }
+    [[nodiscard]] bool is_ahead(const Vector2& at) const { return (at - from.position()).dot(front().ahead()) > 0; }
   };
-  Struck struck_;
-  bool drives_ = false;  // so that a stop is of what it did itself
+  std::optional<Struck> struck_;          // since it was stopped so, until it may drive again;
+  std::optional<Struck> backs_off_from_;  // from then on, until it is out of touch
+  bool drives_ = false;                   // so that a stop is of what it did itself
   int corrections_ = 0, detours_ = 0, collisions_ = 0;
   double way_m_ = 0;
   std::vector<task::Note> notes_;

@@ -24,9 +24,11 @@ class NavigateTest : public ::testing::Test {
   Progress tick() {
     now_ += std::chrono::milliseconds(10);
     link::State state;
-    state.safety = link::SafetyState::kOperational;
+    state.safety = stopped_ ? link::SafetyState::kProtectiveStop : link::SafetyState::kOperational;
+    state.cause = stopped_ ? link::StopCause::kCollision : link::StopCause::kNone;
+    state.epoch = epoch_;
     state.stamp = now_;
-    state.commanded = chassis_.wheels.planned(now_);
+    state.commanded = stopped_ ? *stopped_ : chassis_.wheels.planned(now_);
     state.position = state.commanded.position;
     state.speed = state.commanded.speed;
     rolled_ = chassis_.drive.rolled(rolled_, wheels_rad_, state.position);
@@ -45,6 +47,21 @@ class NavigateTest : public ::testing::Test {
   }
   Progress run_to_end() {
     return run_until([] { return false; });
+  }
+  // The loop's stop: it rolls on by `coasts_m` while it brakes for as long as `brakes`, and may then drive again.
+  void strike(double coasts_m, Duration brakes) {
+    const AxisState from = chassis_.wheels.planned(now_);
+    const double wheel_rad = coasts_m / world_.base->wheel_radius_m;
+    const Time end = now_ + brakes;
+    for (const Time began = now_; now_ < end;) {
+      const double share =
+          std::min(1.0, (now_ - began + std::chrono::milliseconds(10)) / std::chrono::duration<double>(brakes));
+      stopped_ = at_rest(AxisVector(from.position.array() + share * wheel_rad));
+      stopped_->speed = from.speed * (1 - share);
+      (void)tick();
+    }
+    stopped_.reset();
+    ++epoch_;
   }
   void scan() {
     BaseBelief belief;
@@ -67,6 +84,8 @@ class NavigateTest : public ::testing::Test {
   Time now_ = Time(std::chrono::seconds(1)), scanned_;
   Pose2 rolled_ = world_.base->start, off_;
   AxisVector wheels_rad_ = AxisVector::Zero(2);
+  std::optional<AxisState> stopped_;  // by the loop, which says where its wheels are
+  std::uint32_t epoch_ = 1;
   std::unique_ptr<task::Skill> skill_;
 };
 
@@ -79,6 +98,20 @@ TEST_F(NavigateTest, ACorrectionMoves) {
   EXPECT_EQ(end.status, Status::kSucceeded) << end.reason;
   EXPECT_EQ(end.detail.at("corrections"), 1);
   EXPECT_LT(std::abs(wrapped(chassis_.map_from_base().yaw)), 0.02);
+}
+
+// What it ran into was pushed along while it braked: it stands where it touches it, and gets away from there.
+TEST_F(NavigateTest, WhatGaveWayIsFeltWhereTheBaseCameToRest) {
+  begin({{"place", "middle_aisle"}});
+  run_until([&] { return from_goal_m({0, 0}) > 1.0; });
+  strike(0.2, std::chrono::milliseconds(800));
+  const Vector2 rests = chassis_.map_from_base().position();
+  ASSERT_GT(from_goal_m({0, 0}), 1.15);
+  (void)tick();
+  EXPECT_GT(chassis_.floor.clearance_m(rests), world_.base->radius_m - 2 * world_.map->resolution_m());
+  const Progress end = run_to_end();
+  EXPECT_EQ(end.status, Status::kSucceeded) << end.reason;
+  EXPECT_EQ(end.detail.at("collisions"), 1);
 }
 
 }  // namespace
