@@ -84,7 +84,8 @@ void Referee::watch(const Glance& glance) {
     emergency_at_ = glance.now;
     needs_person_ = true;
   }
-  if (cerebellum::is_emergency(before_) && !is_emergency && !(reset_at_ && *reset_at_ > emergency_at_))
+  // In one period the loop steps first: what the bridge hears in that of a stop it hears after it.
+  if (cerebellum::is_emergency(before_) && !is_emergency && !(reset_at_ && *reset_at_ >= emergency_at_))
     wrong_("the arm has left an emergency stop that nobody has reset");
   if (needs_person_ && cerebellum::moves(state)) {
     if (!(armed_at_ && *armed_at_ > emergency_at_)) wrong_("the arm was armed after an emergency stop, and by nobody");

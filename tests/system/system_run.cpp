@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <map>
@@ -44,6 +45,7 @@ void tell_failure(const Options& options, std::uint64_t seed, const EpisodeResul
   for (const std::string& line : result.wrong) fmt::print("seed {}: {}\n", seed, line);
   fmt::print("replay it: system_run --seed {} --minutes {:g}{} --trace\n", seed, options.minutes,
              options.never_sync ? " --never-sync" : "");
+  (void)std::fflush(stdout);  // the other processes may take an hour
 }
 
 // One process: every seed that leaves `job` when divided by the number of jobs.
